@@ -1,0 +1,127 @@
+"""The engine protocol: subclass `Engine` and `Simulation` to bring an engine of your own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios import Scenario
+from scenarios.errors import DropspinError, UnknownName
+
+Array = NDArray[np.float64]
+
+
+class EngineMissing(DropspinError):
+    """An engine whose package is not installed; the text says how to get it."""
+
+
+class Diverged(Exception):
+    """The engine gave up on a simulation; the text says at which step and why."""
+
+
+@dataclass(frozen=True)
+class AsBuilt:
+    """What an engine says it has built, read back from it.
+
+    Attributes:
+        mass: [kg].
+        inertia: About the centre of mass, in the body frame [kg m²], shape (3, 3).
+        gravity: [m/s²], shape (3,).
+    """
+
+    mass: float
+    inertia: Array
+    gravity: Array
+
+
+class Simulation:
+    """One scene at one time step, built and ready to go; a context manager.
+
+    Attributes:
+        staggered: Whether velocity lags position by half a step, as under semi-implicit Euler.
+        settings: What the results are stamped with, versions included; values that JSON knows.
+    """
+
+    staggered: bool = False
+    settings: Mapping[str, Any] = {}
+
+    def advance(self, steps: int) -> None:
+        """Take some native steps and do nothing else: this is what gets timed."""
+        raise NotImplementedError
+
+    def state(self) -> Array:
+        """Position, orientation [x, y, z, w], velocity, angular velocity; all in the world frame, y up, shape (13,)."""
+        raise NotImplementedError
+
+    def record(self, steps: int, every: int = 1) -> Array:
+        """States now and after each `every` of `steps` steps, shape (1 + steps // every, 13)."""
+        rows = np.empty((1 + steps // every, 13))
+        rows[0] = self.state()
+        for row in rows[1:]:
+            self.advance(every)
+            row[:] = self.state()
+        return rows
+
+    def as_built(self) -> AsBuilt | None:
+        """What the engine built, read back from the engine itself; None if it cannot say."""
+        return None
+
+    def close(self) -> None:
+        """Give back what the simulation holds."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine with its options.
+
+    Attributes:
+        options: The options that differ from the defaults.
+    """
+
+    name: ClassVar[str]
+    order: ClassVar[float | None] = None
+    """Claimed order of accuracy in free flight; inf for exact, None for no claim."""
+    precision: ClassVar[type] = np.float64
+    """What the engine's state carries: numpy.float64 or numpy.float32."""
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """Each option's values, the default first."""
+    package: ClassVar[str] = ""
+    """The distribution that must be installed, if any."""
+
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for option, value in self.options.items():
+            if option not in self.choices:
+                raise UnknownName(f"option of engine {self.name!r}", option, self.choices)
+            if value not in self.choices[option]:
+                raise UnknownName(f"value of {option} for engine {self.name!r}", value, self.choices[option])
+        chosen = {key: value for key, value in sorted(self.options.items()) if value != self.choices[key][0]}
+        object.__setattr__(self, "options", chosen)
+
+    def option(self, name: str) -> str:
+        """An option's value, given or default."""
+        return self.options.get(name, self.choices[name][0])
+
+    @property
+    def label(self) -> str:
+        """The canonical name: `name[option=value,…]`, options sorted, defaults left out."""
+        listed = ",".join(f"{key}={value}" for key, value in self.options.items())
+        return f"{self.name}[{listed}]" if listed else self.name
+
+    def declines(self, scene: Scenario) -> str | None:
+        """Why this engine cannot run a scene as meant, or None: it can."""
+        return None
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        """Build a scene at a time step [s], start included."""
+        raise NotImplementedError

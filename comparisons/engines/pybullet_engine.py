@@ -1,0 +1,175 @@
+"""The engine `pybullet`, calibrated: the scene as meant, by settings Bullet has but does not default to.
+
+Maximal coordinates (btRigidBody) give v+ = -e v exactly, once the contact thresholds that start a collision early, the error
+reduction that adds penetration to the rebound, and the speed below which restitution is dropped are all set to 0.
+"""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from comparisons.engines.base import Array, AsBuilt, Engine, Simulation
+from scenarios import Scenario
+from scenarios.body import Box, Sphere
+
+STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact there
+FLOOR_HALF_SIZE = 1e3  # m; thick enough that nothing tunnels, and Bullet loses no digits to it
+
+
+class PyBullet(Engine):
+    """Bullet's rigid body in maximal coordinates, on a plane (ball) or a large box (anything with corners)."""
+
+    name = "pybullet"
+    order = 1.0
+    package = "pybullet"
+
+    def declines(self, scene: Scenario) -> str | None:
+        """What calibration cannot map."""
+        inertia = scene.body.inertia_tensor
+        if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
+            return "PyBullet takes inertia along the body's own axes only; these are not principal axes"
+        floor = scene.floor
+        if floor is None:
+            return None
+        if not isinstance(scene.body, (Sphere, Box)):
+            return "only spheres and boxes are mapped onto a floor"
+        if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
+            return f"Bullet caps friction at {STRONGEST_FRICTION:g}, got {floor.friction:g}"
+        return None
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return PyBulletSimulation(scene, dt)
+
+
+class PyBulletSimulation(Simulation):
+    """A connection of its own to the physics server in this process."""
+
+    staggered = True
+
+    def __init__(self, scene: Scenario, dt: float) -> None:
+        self._bullet = _import_quietly()
+        self._client = self._bullet.connect(self._bullet.DIRECT)
+        if self._client < 0:
+            raise RuntimeError("PyBullet gave no connection")
+        try:
+            self._build(scene, dt)
+        except BaseException:
+            self.close()
+            raise
+
+    def _build(self, scene: Scenario, dt: float) -> None:
+        bullet, client = self._bullet, self._client
+        parameters = {
+            "fixedTimeStep": dt,
+            "numSubSteps": 0,
+            "solverResidualThreshold": 1e-14,
+            "erp": 0.0,
+            "contactERP": 0.0,
+            "frictionERP": 0.0,
+            "contactSlop": 0.0,
+            "restitutionVelocityThreshold": 0.0 if scene.floor is None else scene.floor.rest_speed,
+            "useSplitImpulse": 1,
+            "splitImpulsePenetrationThreshold": 0.0,
+            "enableConeFriction": 1,
+            "deterministicOverlappingPairs": 1,
+        }
+        bullet.setPhysicsEngineParameter(physicsClientId=client, **parameters)
+        bullet.setGravity(*map(float, scene.acceleration), physicsClientId=client)
+        contact = {} if scene.floor is None else _contact_properties(scene)
+        if scene.floor is not None:
+            self._add_floor(scene, contact)
+        self._body = bullet.createMultiBody(
+            baseMass=scene.body.mass,
+            baseCollisionShapeIndex=-1 if scene.floor is None else self._shape(scene),
+            basePosition=scene.start.position,
+            baseOrientation=scene.start.orientation,
+            useMaximalCoordinates=True,
+            physicsClientId=client,
+        )
+        bullet.changeDynamics(
+            self._body,
+            -1,
+            mass=scene.body.mass,
+            localInertiaDiagonal=[float(moment) for moment in np.diag(scene.body.inertia_tensor)],
+            # Maximal coordinates damp as v (1 - k)^t: this k is the scene's exponential decay.
+            linearDamping=0.0 if scene.damping is None else -np.expm1(-scene.damping.linear),
+            angularDamping=0.0 if scene.damping is None else -np.expm1(-scene.damping.angular),
+            activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            physicsClientId=client,
+            **contact,
+        )
+        bullet.resetBaseVelocity(self._body, scene.start.velocity, scene.start.angular_velocity, physicsClientId=client)
+        self.settings = {"version": version("pybullet"), "profile": "calibrated", "coordinates": "maximal", **parameters, **contact}
+
+    def _shape(self, scene: Scenario) -> int:
+        bullet, client = self._bullet, self._client
+        if isinstance(scene.body, Sphere):
+            return int(bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=scene.body.radius, physicsClientId=client))
+        assert isinstance(scene.body, Box)
+        return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=scene.body.half_extents, physicsClientId=client))
+
+    def _add_floor(self, scene: Scenario, contact: dict[str, float]) -> None:
+        bullet, client = self._bullet, self._client
+        if isinstance(scene.body, Sphere):
+            shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0], physicsClientId=client)
+            top = 0.0
+        else:  # on a plane, a box gets one contact point a step
+            shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3, physicsClientId=client)
+            top = FLOOR_HALF_SIZE
+        floor = bullet.createMultiBody(0, shape, basePosition=[0, -top, 0], useMaximalCoordinates=True, physicsClientId=client)
+        # Bullet multiplies the two bodies' coefficients; the floor's are 1, so the body's are the scene's.
+        bullet.changeDynamics(floor, -1, **contact | {"restitution": 1.0, "lateralFriction": 1.0}, physicsClientId=client)
+
+    def advance(self, steps: int) -> None:
+        step, client = self._bullet.stepSimulation, self._client
+        for _ in range(steps):
+            step(client)
+
+    def state(self) -> Array:
+        position, orientation = self._bullet.getBasePositionAndOrientation(self._body, self._client)
+        velocity, angular_velocity = self._bullet.getBaseVelocity(self._body, self._client)
+        return np.array(position + orientation + velocity + angular_velocity)
+
+    def as_built(self) -> AsBuilt:
+        dynamics = self._bullet.getDynamicsInfo(self._body, -1, physicsClientId=self._client)
+        world = self._bullet.getPhysicsEngineParameters(physicsClientId=self._client)
+        gravity = np.array([world[f"gravityAcceleration{axis}"] for axis in "XYZ"])
+        return AsBuilt(dynamics[0], np.diag(dynamics[2]), gravity)
+
+    def close(self) -> None:
+        self._bullet.disconnect(self._client)
+
+
+def _contact_properties(scene: Scenario) -> dict[str, float]:
+    assert scene.floor is not None
+    friction = {"none": 0.0, "infinite": STRONGEST_FRICTION}.get(str(scene.floor.friction))
+    return {
+        "restitution": scene.floor.restitution,
+        "lateralFriction": float(scene.floor.friction) if friction is None else friction,
+        "contactProcessingThreshold": 0.0,
+    }
+
+
+def _import_quietly() -> Any:
+    """Import pybullet without the build date that it writes to the standard error of every process."""
+    with _no_standard_error():
+        return import_module("pybullet")
+
+
+@contextmanager
+def _no_standard_error() -> Iterator[None]:
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

@@ -1,0 +1,20 @@
+"""The method of Huamin Wang's lecture note "Rigid Body Dynamics", executable: arrays in, arrays out.
+
+It knows no scene and no engine. README.md beside this file is the ledger: equation, function, test.
+"""
+
+from reference_impl.contact import Floor
+from reference_impl.inertia import solid_box_inertia, solid_sphere_inertia, total_mass, vertex_inertia
+from reference_impl.simulate import Body, World, simulate, step
+
+__all__ = [
+    "Body",
+    "Floor",
+    "World",
+    "simulate",
+    "solid_box_inertia",
+    "solid_sphere_inertia",
+    "step",
+    "total_mass",
+    "vertex_inertia",
+]

@@ -1,0 +1,36 @@
+"""Mass and inertia: the note's eq 2 and 8, and the solids that engines build from a shape."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def total_mass(masses: NDArray[np.float64]) -> float:
+    """Eq 2: M = Σ mᵢ [kg]."""
+    return float(masses.sum())
+
+
+def vertex_inertia(points: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Eq 8 with its masses: I_body = Σ mᵢ (pᵢᵀpᵢ 1 − pᵢpᵢᵀ).
+
+    The note prints the formula without mᵢ; masses of 1 give it as printed, whatever the body weighs.
+
+    Args:
+        points: Vertices in the body frame, from the centre of mass [m], shape (n, 3).
+        masses: Mass of each vertex [kg], shape (n,).
+
+    Returns:
+        Inertia about the centre of mass [kg m²], shape (3, 3).
+    """
+    squares = np.sum(masses * np.sum(points * points, axis=1))
+    return squares * np.eye(3) - (points.T * masses) @ points
+
+
+def solid_box_inertia(mass: float, half_extents: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inertia of a uniform box, m/3 (b² + c²) about the axis of a [kg m²], shape (3, 3)."""
+    a, b, c = half_extents**2
+    return np.diag(mass / 3.0 * np.array([b + c, c + a, a + b]))
+
+
+def solid_sphere_inertia(mass: float, radius: float) -> NDArray[np.float64]:
+    """Inertia of a uniform ball, 2/5 m R² [kg m²], shape (3, 3)."""
+    return 0.4 * mass * radius**2 * np.eye(3)

@@ -1,0 +1,173 @@
+"""The `[body]` table: what falls or spins, and the mass, inertia and vertices that follow from it."""
+
+from functools import cached_property
+from itertools import product
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+Array = NDArray[np.float64]
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Vector = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
+PositiveVector = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
+
+
+class Table(BaseModel):
+    """A table of a scene file: unknown keys are refused, values stay as loaded."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _possible(moments: tuple[float, ...]) -> tuple[float, ...]:
+    largest = max(moments)
+    if largest > (sum(moments) - largest) * (1 + 1e-12):
+        raise ValueError("no body has these moments: the largest must not exceed the sum of the other two")
+    return moments
+
+
+PrincipalMoments = Annotated[PositiveVector, AfterValidator(_possible)]
+
+
+class _Body(Table):
+    mass: Positive
+
+    @property
+    def vertices(self) -> Array:
+        """The points that may touch the floor, from the centre of mass [m], shape (n, 3)."""
+        raise NotImplementedError
+
+    @property
+    def rounding(self) -> float:
+        """How far the surface stands out from the vertices [m]: a ball is one point, rounded by its radius."""
+        return 0.0
+
+    @property
+    def inertia_tensor(self) -> Array:
+        """Inertia about the centre of mass, in the body frame [kg m²], shape (3, 3)."""
+        raise NotImplementedError
+
+    @cached_property
+    def size(self) -> float:
+        """The farthest that any part is from the centre of mass [m]."""
+        return float(np.sqrt(np.max(np.sum(self.vertices**2, axis=1)))) + self.rounding
+
+    @property
+    def resting_height(self) -> float:
+        """The lowest that the centre of mass can come on a floor [m]."""
+        raise NotImplementedError
+
+
+class Sphere(_Body):
+    """A ball."""
+
+    shape: Literal["sphere"]
+    radius: Positive
+    inertia: Literal["solid"] | PrincipalMoments = "solid"
+
+    @cached_property
+    def vertices(self) -> Array:
+        return np.zeros((1, 3))
+
+    @property
+    def rounding(self) -> float:
+        return self.radius
+
+    @cached_property
+    def inertia_tensor(self) -> Array:
+        if self.inertia == "solid":
+            return 0.4 * self.mass * self.radius**2 * np.eye(3)
+        return np.diag(self.inertia)
+
+    @property
+    def resting_height(self) -> float:
+        return self.radius
+
+
+class Box(_Body):
+    """A box; its half extents lie along its own x, y and z."""
+
+    shape: Literal["box"]
+    half_extents: PositiveVector
+    inertia: Literal["solid", "vertices", "note"] | PrincipalMoments = "solid"
+
+    @cached_property
+    def vertices(self) -> Array:
+        return np.array(list(product((-1.0, 1.0), repeat=3))) * self.half_extents
+
+    @cached_property
+    def inertia_tensor(self) -> Array:
+        if isinstance(self.inertia, tuple):
+            return np.diag(self.inertia)
+        a, b, c = np.square(self.half_extents)
+        about_axes = np.diag([b + c, c + a, a + b])
+        # A uniform box, eight equal corner masses, and eight corner masses of 1 (eq 8 as printed).
+        return about_axes * {"solid": self.mass / 3, "vertices": self.mass, "note": 8.0}[self.inertia]
+
+    @property
+    def resting_height(self) -> float:
+        return min(self.half_extents)
+
+
+class Vertices(_Body):
+    """Any set of points, with equal masses unless they are given."""
+
+    shape: Literal["vertices"]
+    points: Annotated[tuple[Vector, ...], Field(min_length=2, max_length=10_000)]
+    masses: Annotated[tuple[Positive, ...], Field(min_length=2)] | None = None
+    inertia: Literal["vertices", "note"] | PrincipalMoments = "vertices"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mass_from_masses(cls, table: dict[str, Any]) -> dict[str, Any]:
+        masses = table.get("masses")
+        if "mass" not in table and isinstance(masses, (list, tuple)) and all(type(m) in (int, float) for m in masses):
+            return {**table, "mass": float(sum(masses))}
+        return table
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.masses is not None and len(self.masses) != len(self.points):
+            raise ValueError(f"masses has {len(self.masses)} entries for {len(self.points)} points; each point needs one")
+        if self.masses is not None and not np.isclose(self.mass, np.sum(self.masses), rtol=1e-9, atol=0):
+            raise ValueError(f"mass is {self.mass:g} but masses add up to {np.sum(self.masses):g}; they must agree")
+        moments = np.linalg.eigvalsh(self.inertia_tensor)
+        if moments[0] <= 1e-12 * moments[2]:
+            raise ValueError("the points lie on one line, about which they have no inertia; they must span a plane at least")
+        return self
+
+    @cached_property
+    def _point_masses(self) -> Array:
+        if self.masses is None:
+            return np.full(len(self.points), self.mass / len(self.points))
+        return np.array(self.masses)
+
+    @cached_property
+    def vertices(self) -> Array:
+        points = np.array(self.points)
+        return points - np.average(points, axis=0, weights=self._point_masses)
+
+    @cached_property
+    def inertia_tensor(self) -> Array:
+        if isinstance(self.inertia, tuple):
+            return np.diag(self.inertia)
+        masses = self._point_masses if self.inertia == "vertices" else np.ones(len(self.points))
+        spread = np.einsum("i,ij,ik->jk", masses, self.vertices, self.vertices)
+        return np.trace(spread) * np.eye(3) - spread
+
+    @cached_property
+    def resting_height(self) -> float:
+        # On its most stable face; a plane set of points can lie flat.
+        centred = self.vertices - self.vertices.mean(axis=0)
+        if np.linalg.matrix_rank(centred, tol=1e-9 * self.size) < 3:
+            return 0.0
+        from scipy.spatial import ConvexHull
+
+        return float(np.min(np.abs(ConvexHull(self.vertices).equations[:, 3])))
+
+
+Body = Annotated[Sphere | Box | Vertices, Field(discriminator="shape")]

@@ -1,0 +1,31 @@
+"""Everything that can go wrong because of what was asked, with a message that is fit to be shown as it is.
+
+    DropspinError
+    ├── SceneError      a scene file or mapping that is not a scene
+    └── UnknownName     a scene, engine, option or metric that does not exist
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class DropspinError(Exception):
+    """Bad input: its text is one line that says where, what was given, what is allowed."""
+
+
+class SceneError(DropspinError):
+    """A scene that cannot be loaded."""
+
+
+class UnknownName(DropspinError):
+    """A name that is not in its list."""
+
+    def __init__(self, what: str, given: str, known: Iterable[str]) -> None:
+        known = sorted(known)
+        super().__init__(f"{what} {given!r} is unknown.{did_you_mean(given, known)} Known: {', '.join(known) or 'none'}.")
+
+
+def did_you_mean(given: str, known: Iterable[str]) -> str:
+    """' Did you mean …?' for the nearest known name, or nothing."""
+    nearest = difflib.get_close_matches(given, list(known), n=1, cutoff=0.55)
+    return f" Did you mean {nearest[0]!r}?" if nearest else ""

@@ -1,0 +1,138 @@
+"""From a name, a path or a mapping to a `Scenario`; bad input gets one line that says what is wrong and what is allowed."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from scenarios.body import Box, Sphere, Vertices
+from scenarios.errors import SceneError, did_you_mean
+from scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
+
+CATALOGUE = Path(__file__).parent / "catalogue"
+LARGEST_FILE = 1_000_000  # bytes; a scene of ten thousand vertices takes less
+FEATURES = {"floor": Floor, "gravity": Gravity, "start": Start, "damping": Damping, "ensemble": Ensemble, "expect": Expectation}
+SHAPES = {"sphere": Sphere, "box": Box, "vertices": Vertices}
+
+
+def names() -> list[str]:
+    """The scenes of the catalogue, in its order: drops before spins, as a newcomer meets them."""
+    return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
+
+
+def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
+    """Load a scene by its catalogue name, from the path of a TOML file, or from a mapping with the same keys.
+
+    Raises:
+        SceneError: It is not a scene. The text names the file, the key, the value and what is allowed.
+    """
+    if isinstance(scene, Mapping):
+        name = scene.get("name", "scene")
+        return _validate(str(name), f"scene {name!r}", {key: value for key, value in scene.items() if key != "name"})
+    path = _find(scene)
+    return _validate(path.stem, str(scene), _read(path, str(scene)))
+
+
+def _find(scene: str | Path) -> Path:
+    text = str(scene)
+    if isinstance(scene, str) and (CATALOGUE / f"{text}.toml").is_file() and re.fullmatch(r"[a-z0-9-]+", text):
+        return CATALOGUE / f"{text}.toml"
+    path = Path(scene)
+    looks_like_a_path = path.suffix == ".toml" or path.parent != Path() or path.exists()
+    if looks_like_a_path:
+        return path
+    raise SceneError(
+        f"scene {text!r} is not in the catalogue and no file of that name exists."
+        f"{did_you_mean(text, names())} Give the path of a .toml file or one of: {', '.join(names())}."
+    )
+
+
+def _read(path: Path, given: str) -> dict[str, Any]:
+    if path.is_dir():
+        raise SceneError(f"{given}: is a directory; a scene is one TOML file.")
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise SceneError(f"{given}: {path.stat().st_size:,} bytes; a scene file has at most {LARGEST_FILE:,}.")
+        text = path.read_bytes().decode("utf-8")
+        return tomllib.loads(text)
+    except OSError as error:
+        raise SceneError(f"{given}: {error.strerror}; give the path of a readable .toml file.") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{given}: byte {error.start} is not UTF-8 text; a scene is a TOML file in UTF-8.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{given}: not TOML: {error}.") from None
+    except RecursionError:
+        raise SceneError(f"{given}: nested too deeply to be a scene.") from None
+
+
+def _validate(name: str, where: str, content: dict[str, Any]) -> Scenario:
+    if "name" in content:
+        raise SceneError(f"{where}: name: got {_shown(content['name'])}; a scene's name is its file's, the key is not allowed.")
+    try:
+        return Scenario.model_validate({"name": name, **content})
+    except ValidationError as error:
+        problems = error.errors(include_url=False)
+        more = f" ({len(problems) - 1} more in this file)" if len(problems) > 1 else ""
+        raise SceneError(f"{where}: {_described(problems[0])}{more}") from None
+
+
+def _described(problem: Any) -> str:
+    """One pydantic problem as 'key: got value; what is allowed'."""
+    location = _without_union_members(problem["loc"])
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".") or "scene"
+    given = _shown(problem["input"])
+    kind = problem["type"]
+    if kind == "extra_forbidden":
+        allowed = _keys_allowed(location)
+        return f"{key}: unknown key, with the value {given}.{did_you_mean(str(location[-1]), allowed)} Allowed: {', '.join(allowed)}."
+    if kind == "missing":
+        return f"{key}: missing; it has no default."
+    if kind == "union_tag_not_found":
+        return f"{key}.shape: missing; must be one of {', '.join(map(repr, SHAPES))}."
+    if kind == "union_tag_invalid":
+        return f"{key}.shape: got {_shown(problem['input']['shape'])}; must be one of {', '.join(map(repr, SHAPES))}."
+    if kind == "value_error":
+        return f"{key}: got {given}; {problem['ctx']['error']}."
+    if kind in ("too_short", "too_long"):
+        bound = problem["ctx"].get("min_length") if kind == "too_short" else problem["ctx"]["max_length"]
+        wanted = f"must have {'at least' if kind == 'too_short' else 'at most'} {bound} entries"
+        return f"{key}: got {given}; {wanted}, has {problem['ctx']['actual_length']}."
+    message = problem["msg"].replace("Input should be", "must be").replace("valid ", "")
+    return f"{key}: got {given}; {message}{_alternatives(location)}."
+
+
+def _without_union_members(location: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Pydantic names the tried member of a union in the location; a file has no such key."""
+    return tuple(
+        part
+        for index, part in enumerate(location)
+        if not (isinstance(part, str) and (("[" in part) or (index > 0 and location[index - 1] == "body" and part in SHAPES)))
+        and part not in ("float", "constrained-float")
+    )
+
+
+def _alternatives(location: tuple[Any, ...]) -> str:
+    """What else a key takes, where pydantic reports on the first alternative alone."""
+    if location[-2:] == ("floor", "friction"):
+        return ", 'infinite', or a Coulomb coefficient of 0 or more"
+    if location[-2:] == ("body", "inertia"):
+        return ", or three positive moments [Ixx, Iyy, Izz]"
+    return ""
+
+
+def _keys_allowed(location: tuple[Any, ...]) -> list[str]:
+    table: type[BaseModel] = Scenario
+    if len(location) > 1:
+        if location[0] == "body":
+            keys = set().union(*(shape.model_fields for shape in SHAPES.values()))
+            return sorted(keys)
+        table = FEATURES[location[0]]
+    return [key for key in table.model_fields if key != "name"]
+
+
+def _shown(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,40 @@
+"""Energy, angular momentum and lowest point of a scene's body along a trajectory."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.model import Scenario
+from scenarios.rotations import rotate, unrotate
+from scenarios.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+
+def angular_momentum(scene: Scenario, motion: Trajectory) -> Array:
+    """L = R I Rᵀ ω about the centre of mass, world frame [kg m²/s], shape (n, 3)."""
+    spin = unrotate(motion.orientation, motion.angular_velocity)
+    return rotate(motion.orientation, spin @ scene.body.inertia_tensor)
+
+
+def kinetic_energy(scene: Scenario, motion: Trajectory) -> Array:
+    """M v²/2 + ω·L/2 [J], shape (n,)."""
+    linear = 0.5 * scene.body.mass * np.sum(motion.velocity**2, axis=1)
+    return linear + 0.5 * np.sum(motion.angular_velocity * angular_momentum(scene, motion), axis=1)
+
+
+def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Array:
+    """Kinetic plus potential energy [J], shape (n,); potential energy is 0 at rest on the floor, or at the start.
+
+    Synchronised means that a staggered engine's velocity is first brought to the time of its position, to first order:
+    E* = E + lag M g·v. Semi-implicit Euler conserves E* exactly in free fall, and E only to first order in dt.
+    """
+    mass, g = scene.body.mass, scene.acceleration
+    origin = np.array([0.0, scene.body.resting_height, 0.0]) if scene.floor else np.array(scene.start.position)
+    total = kinetic_energy(scene, motion) - mass * (motion.position - origin) @ g
+    return total + motion.velocity_lag * mass * motion.velocity @ g if synchronised else total
+
+
+def lowest_height(scene: Scenario, motion: Trajectory) -> Array:
+    """Height of the body's lowest point above the floor [m], shape (n,)."""
+    corners = rotate(motion.orientation[:, None, :], scene.body.vertices[None, :, :])
+    return motion.position[:, 1] + corners[:, :, 1].min(axis=1) - scene.body.rounding

@@ -1,0 +1,52 @@
+"""Rotations by quaternions [x, y, z, w], body to world, over any leading axes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def multiply(a: Array, b: Array) -> Array:
+    """The rotation by b, then by a; shapes (..., 4)."""
+    av, aw = a[..., :3], a[..., 3:]
+    bv, bw = b[..., :3], b[..., 3:]
+    vector = aw * bv + bw * av + np.cross(av, bv)
+    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
+    return np.concatenate([vector, scalar], axis=-1)
+
+
+def conjugate(q: Array) -> Array:
+    """The inverse of a unit quaternion, shape (..., 4)."""
+    return q * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+def rotate(q: Array, vectors: Array) -> Array:
+    """Vectors in the world frame, (..., 3), of body-frame ones."""
+    axis, w = q[..., :3], q[..., 3:]
+    twice = 2.0 * np.cross(axis, vectors)
+    return vectors + w * twice + np.cross(axis, twice)
+
+
+def unrotate(q: Array, vectors: Array) -> Array:
+    """Vectors in the body frame, (..., 3), of world-frame ones."""
+    return rotate(conjugate(q), vectors)
+
+
+def about(axis: Array, angle: Array) -> Array:
+    """The rotation about a unit axis, (3,), by angles [rad], (...): shape (..., 4)."""
+    half = 0.5 * np.asarray(angle)[..., None]
+    return np.concatenate([np.sin(half) * axis, np.cos(half)], axis=-1)
+
+
+def angle_between_orientations(a: Array, b: Array) -> Array:
+    """The angle [rad] of the rotation from a to b; q and -q are the same orientation.
+
+    By the half-angle's sine and cosine together, so that it resolves 1e-16 rad and is sound at pi (W. Kahan).
+    """
+    difference = multiply(conjugate(a), b)
+    return 2.0 * np.arctan2(np.linalg.norm(difference[..., :3], axis=-1), np.abs(difference[..., 3]))
+
+
+def angle_between_vectors(a: Array, b: Array) -> Array:
+    """The angle [rad] between vectors, (..., 3)."""
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))

@@ -1,0 +1,54 @@
+"""What a run leaves behind: states over time."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A body's motion, all in the world frame.
+
+    Attributes:
+        t: Times [s], shape (n,).
+        position: Centre of mass [m], shape (n, 3).
+        orientation: Unit quaternions [x, y, z, w], body to world, shape (n, 4).
+        velocity: Of the centre of mass [m/s], shape (n, 3).
+        angular_velocity: World frame [rad/s], shape (n, 3).
+        velocity_lag: How far velocities lag positions [s]: half a step for a staggered engine (semi-implicit Euler is
+            leapfrog), else 0.
+    """
+
+    t: Array
+    position: Array
+    orientation: Array
+    velocity: Array
+    angular_velocity: Array
+    velocity_lag: float = 0.0
+
+    @classmethod
+    def from_states(cls, t: Array, states: Array, velocity_lag: float = 0.0) -> Self:
+        """From rows of position, orientation, velocity, angular velocity, shape (n, 13)."""
+        return cls(t, states[:, 0:3], states[:, 3:7], states[:, 7:10], states[:, 10:13], velocity_lag)
+
+    @property
+    def states(self) -> Array:
+        """All states, shape (n, 13)."""
+        return np.hstack([self.position, self.orientation, self.velocity, self.angular_velocity])
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Self:
+        """The same motion at some of its times."""
+        return type(self).from_states(self.t[rows], self.states[rows], self.velocity_lag)
+
+    @property
+    def first_bad_row(self) -> int | None:
+        """The first row with a number that is not finite, or None."""
+        bad = ~np.isfinite(self.states).all(axis=1)
+        return int(np.argmax(bad)) if bad.any() else None

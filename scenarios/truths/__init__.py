@@ -1,0 +1,22 @@
+"""The exact answers. Each file is one problem: its formula, its source, what it is valid for."""
+
+from scenarios.model import Scenario
+from scenarios.truths.bounce import bounce_ladder
+from scenarios.truths.corner_impact import corner_impact
+from scenarios.truths.flight import flight
+from scenarios.truths.truth import Impact, Truth
+
+__all__ = ["Impact", "Truth", "truth_for"]
+
+
+def truth_for(scene: Scenario) -> Truth | None:
+    """The exact motion of a scene, or None where there is no closed form for it.
+
+    Returns:
+        A callable of times [s] that gives a `Trajectory`, with the impacts in `events` and its limit in `horizon`.
+    """
+    for problem in (flight, bounce_ladder, corner_impact):
+        truth = problem(scene)
+        if truth is not None:
+            return truth
+    return None

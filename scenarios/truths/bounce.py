@@ -1,0 +1,104 @@
+"""A body that falls flat: the bounce ladder.
+
+    u₀ = √(w² + 2 g H),   t₀ = (w + u₀) / g          first impact; w upward start speed, H clearance
+    u_k = e^k u₀,         t_k = t_(k-1) + 2 u_k / g   the impacts after it
+    h_k = u_k² / 2g = e^(2k) h_0                      the apexes
+
+For e < 1 the impacts pile up at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time; then the body rests.
+
+Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
+Valid for: a ball on a frictionless floor, with any spin about any axis; a ball or a box without spin that lands on a face, on
+any floor if nothing moves sideways, on a frictionless one otherwise; gravity straight down, no damping.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.body import Sphere
+from scenarios.model import Floor, Scenario
+from scenarios.rotations import rotate
+from scenarios.truths.flight import flight_states
+from scenarios.truths.truth import Impact, States, Truth
+
+Array = NDArray[np.float64]
+
+SHORTEST_FLIGHT = 1e-12
+"""Flights shorter than this share of the first fall count as rest: their apexes are below 1e-24 of the drop's."""
+
+
+def bounce_ladder(scene: Scenario) -> Truth | None:
+    """The truth of a flat drop."""
+    if scene.floor is None or scene.damping is not None or not _falls_straight_down(scene) or not _stays_flat(scene):
+        return None
+    g = -float(scene.acceleration[1])
+    start = scene.initial_state
+    upward = float(start[8])
+    u0 = math.sqrt(upward**2 + 2.0 * g * max(scene.clearance, 0.0))
+    t0 = (upward + u0) / g
+    leaving = _leaving_speeds(u0, g, scene.floor, scene.duration - t0)
+    starts = np.concatenate([[0.0, t0], t0 + np.cumsum(2.0 / g * leaving)])
+    # Starts of flight 0 (the fall), of each flight after an impact, and of rest.
+    speeds = np.concatenate([[upward], leaving, [0.0]])
+    floor_height = start[1] - scene.clearance
+    heights = np.concatenate([[start[1]], np.full(len(speeds) - 1, floor_height)])
+    sideways_and_spin = flight_states(start, scene.body.inertia_tensor, np.zeros(3))
+
+    def states(t: Array) -> Array:
+        # An impact's own time belongs to the flight before it: before an impact means up to it.
+        flight = np.maximum(np.searchsorted(starts, t, side="left") - 1, 0)
+        since, speed = t - starts[flight], speeds[flight]
+        pull = np.where(flight == len(speeds) - 1, 0.0, g)
+        rows = sideways_and_spin(t)
+        rows[:, 1] = heights[flight] + speed * since - 0.5 * pull * since**2
+        rows[:, 8] = speed - pull * since
+        return rows
+
+    events = tuple(
+        _impact(float(time), states, floor_height, float(speed))
+        for time, speed in zip(starts[1:], speeds[1:], strict=True)
+        if time <= scene.duration
+    )
+    statement = "bounce ladder h_k = e^(2k) H with impact times by geometric sums (Newton's restitution)"
+    return Truth("bounce-ladder", statement, states, events, scene.duration)
+
+
+def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array:
+    """Speeds after the impacts that are followed by a flight, until the end of the scene or until rest."""
+    speeds = []
+    speed, time = u0, 0.0
+    while time <= remaining and speed >= floor.rest_speed:
+        speed *= floor.restitution
+        if speed <= SHORTEST_FLIGHT * u0:
+            break
+        speeds.append(speed)
+        time += 2.0 * speed / g
+    return np.array(speeds)
+
+
+def _impact(time: float, states: States, floor_height: float, leaving: float) -> Impact:
+    before = states(np.array([time]))[0]
+    before[1] = floor_height
+    after = before.copy()
+    after[8] = leaving
+    return Impact(time, before, after)
+
+
+def _falls_straight_down(scene: Scenario) -> bool:
+    g = scene.acceleration
+    return g[1] < 0.0 and g[0] == 0.0 and g[2] == 0.0
+
+
+def _stays_flat(scene: Scenario) -> bool:
+    """Whether every impact is one upward impulse through the centre of mass."""
+    assert scene.floor is not None
+    start = scene.start
+    if scene.floor.friction != "none" and (start.velocity[0] or start.velocity[2] or any(start.angular_velocity)):
+        return False
+    if isinstance(scene.body, Sphere):
+        return scene.body.inertia == "solid" or not any(start.angular_velocity)
+    corners = rotate(np.array(start.orientation), scene.body.vertices)
+    lowest = corners[corners[:, 1] <= corners[:, 1].min() + 1e-12 * scene.body.size]
+    under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size
+    return len(lowest) >= 3 and bool(under_centre) and not any(start.angular_velocity)

@@ -1,0 +1,23 @@
+"""Engines run, measured and judged."""
+
+from comparisons.engines.base import AsBuilt, Diverged, Engine, EngineMissing, Simulation
+from comparisons.engines.registry import engine, engine_names
+from comparisons.metrics import METRICS
+from comparisons.results import Results
+from comparisons.run import DEFAULT_DTS, measure, run, simulate
+
+__all__ = [
+    "DEFAULT_DTS",
+    "METRICS",
+    "AsBuilt",
+    "Diverged",
+    "Engine",
+    "EngineMissing",
+    "Results",
+    "Simulation",
+    "engine",
+    "engine_names",
+    "measure",
+    "run",
+    "simulate",
+]

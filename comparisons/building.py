@@ -1,0 +1,42 @@
+"""Every engine must simulate the same body: what was built is read back and held against the scene."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.engines.base import Engine, Simulation
+from scenarios import Scenario
+
+ULPS = 8
+
+
+class BuiltDifferently(Exception):
+    """An engine that simulates something else than the scene; the text says what."""
+
+
+def assert_built_as_meant(engine: Engine, scene: Scenario, simulation: Simulation) -> None:
+    """Raise `BuiltDifferently` unless state, mass, inertia and gravity equal the scene's to 8 ulp of the engine's precision."""
+    state, start = simulation.state(), scene.initial_state
+    if state.shape != (13,):
+        raise BuiltDifferently(f"the state has shape {state.shape}, not (13,)")
+    for name, part in (
+        ("position", slice(0, 3)),
+        ("orientation", slice(3, 7)),
+        ("velocity", slice(7, 10)),
+        ("angular velocity", slice(10, 13)),
+    ):
+        _assert_equal(engine, f"{name} at the start", state[part], start[part])
+    built = simulation.as_built()
+    if built is not None:
+        _assert_equal(engine, "mass", np.array([built.mass]), np.array([scene.body.mass]))
+        _assert_equal(engine, "inertia", built.inertia, scene.body.inertia_tensor)
+        _assert_equal(engine, "gravity", built.gravity, scene.acceleration)
+
+
+def _assert_equal(engine: Engine, what: str, found: NDArray[np.float64], meant: NDArray[np.float64]) -> None:
+    allowed = ULPS * float(np.finfo(engine.precision).eps) * float(np.max(np.abs(meant)))
+    difference = float(np.max(np.abs(found - meant)))
+    if not difference <= allowed:
+        raise BuiltDifferently(
+            f"{what} is {np.array2string(found, precision=17)}, the scene says {np.array2string(meant, precision=17)}; "
+            f"they differ by {difference:.3g}, {ULPS} ulp are {allowed:.3g}"
+        )

@@ -1,0 +1,127 @@
+"""A motion beside the one it should have been: what every metric looks at.
+
+Where the truth has impacts, velocities are compared in the inner half of each of the truth's flights: near an impact they
+differ for a step or two because the impact comes a little early or late, which is an error of time and is judged as one
+(`position_error`). A body that does not bounce at all still fails, because the truth's flights say where to look.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios import Scenario, Trajectory, Truth
+from scenarios.mechanics import kinetic_energy
+from scenarios.rotations import rotate
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+SHORTEST_FLIGHT = 16  # steps; a flight of fewer is not resolved, and not judged
+
+
+class Unresolved(Exception):
+    """The time step is too coarse for a metric; the text says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """One motion beside another of the same scene.
+
+    Attributes:
+        scene: The scene that was run.
+        motion: What the engine did; at least two rows, equally far apart in time.
+        reference: What it is held against, at the same times as far as it goes: the truth, or another engine's motion.
+            None where there is neither.
+        impacts: When the body hits the floor, by the truth [s]; empty where that is not known.
+    """
+
+    scene: Scenario
+    motion: Trajectory
+    reference: Trajectory | None = None
+    impacts: tuple[float, ...] = ()
+
+    @classmethod
+    def with_truth(cls, scene: Scenario, motion: Trajectory, truth: Truth | None) -> "Comparison":
+        """Hold a motion against the truth, as far as the truth goes."""
+        if truth is None:
+            return cls(scene, motion)
+        held = motion.t <= truth.horizon * (1.0 + 1e-9)
+        return cls(scene, motion, truth(motion.t[held]), tuple(event.time for event in truth.events))
+
+    @cached_property
+    def exact(self) -> Trajectory:
+        """The reference; metrics that need one are asked only where there is one."""
+        assert self.reference is not None
+        return self.reference
+
+    @cached_property
+    def compared(self) -> Trajectory:
+        """The motion at the reference's times."""
+        return self.motion[: len(self.exact)]
+
+    @cached_property
+    def dt(self) -> float:
+        """Time between two rows [s]."""
+        return float(self.motion.t[1] - self.motion.t[0])
+
+    @cached_property
+    def flights(self) -> list[Rows]:
+        """Rows in the inner half of each flight, the whole first half of the first one included."""
+        rows = np.arange(len(self.motion if self.reference is None else self.reference))
+        times = self.motion.t[rows]
+        if not self.impacts:
+            contact = self.first_contact
+            return [rows if contact is None else rows[: contact[0] + 1]]
+        edges = [0.0, *self.impacts, times[-1]]
+        inner = []
+        for number, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+            # The last flight may be cut short by the scene's end; its impact is as uncertain as the flight before is long.
+            before = 0.0 if number == 0 else 0.25 * max(end - start, start - edges[number - 1])
+            after = 0.0 if number == len(self.impacts) else 0.25 * (end - start)
+            held = rows[(times >= start + before) & (times <= end - after)]
+            if end - start >= SHORTEST_FLIGHT * self.dt and len(held):
+                inner.append(held)
+        if not inner:
+            raise Unresolved(f"no flight lasts {SHORTEST_FLIGHT} steps of {self.dt:g} s")
+        return inner
+
+    @cached_property
+    def energy_scale(self) -> float:
+        """The energy the scene plays with [J]: M g H down to the floor or the start's kinetic energy, whichever is larger.
+
+        Without a floor it is the reference's largest kinetic energy.
+        """
+        if self.scene.floor is None and self.reference is not None:
+            return float(kinetic_energy(self.scene, self.reference).max())
+        fall = self.scene.body.mass * float(np.linalg.norm(self.scene.acceleration)) * self.scene.clearance
+        return max(fall, float(kinetic_energy(self.scene, self.motion[:1])[0]))
+
+    @cached_property
+    def first_contact(self) -> tuple[int, int] | None:
+        """The rows just before and just after the floor first changes the velocity, or None.
+
+        Without contact, a step changes the velocity by gravity and damping alone. What is left over counts as contact above
+        1e-3 of gravity's share, 1e-6 of the speed (an engine in single precision) and twice the damping's share (each engine
+        damps by a law of its own).
+        """
+        if self.scene.floor is None:
+            return None
+        v, g = self.motion.velocity, self.scene.acceleration
+        left_over = np.linalg.norm(np.diff(v, axis=0) - self.dt * g, axis=1)
+        damped = 0.0 if self.scene.damping is None else 2.0 * self.dt * self.scene.damping.linear
+        allowed = 1e-3 * self.dt * np.linalg.norm(g) + (1e-6 + damped) * np.linalg.norm(v[:-1], axis=1)
+        touching = left_over > allowed
+        if not touching.any():
+            return None
+        first = int(np.argmax(touching))
+        free = np.flatnonzero(~touching[first:])
+        return first, first + int(free[0]) if len(free) else len(v) - 1
+
+    def normal_velocity_of_contact(self, row: int, contact_row: int) -> float:
+        """Vertical velocity [m/s] at one row of the point that is lowest at another."""
+        offsets = rotate(self.motion.orientation[contact_row], self.scene.body.vertices)
+        lowest = offsets[:, 1] <= offsets[:, 1].min() + 1e-6 * self.scene.body.size
+        point = offsets[lowest].mean(axis=0) - np.array([0.0, self.scene.body.rounding, 0.0])
+        return float((self.motion.velocity[row] + np.cross(self.motion.angular_velocity[row], point))[1])

@@ -1,0 +1,216 @@
+"""The metrics: each takes a motion beside its reference to a number, or to one for each flight.
+
+Flights are kept apart so that errors are averaged over start phases before the largest is picked, not after.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.comparison import Comparison, Unresolved
+from scenarios import Scenario, Trajectory, Truth
+from scenarios.mechanics import angular_momentum, energy, lowest_height
+from scenarios.rotations import angle_between_orientations, angle_between_vectors
+
+Array = NDArray[np.float64]
+Measure = Callable[[Comparison], float | Array]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One metric.
+
+    Attributes:
+        name: As in the results.
+        unit: SI; '1' for a ratio.
+        kind: What it is held against: the closed-form truth, or a conservation law.
+        signed: Whether its sign says something.
+        definition: One sentence.
+        needs: What a scene must have, in words.
+        applies: Whether a scene, with its truth, has that.
+        measure: From a comparison to the number, or one a flight; raises `Unresolved` where the step is too coarse.
+        agreement: Whether two engines are held against each other by it.
+    """
+
+    name: str
+    unit: str
+    kind: Literal["truth", "invariant"]
+    signed: bool
+    definition: str
+    needs: str
+    applies: Callable[[Scenario, Truth | None], bool]
+    measure: Measure
+    agreement: bool = False
+
+    def value(self, cases: Sequence[Comparison]) -> float:
+        """The mean over start phases, and of several flights the largest in size, with its sign.
+
+        Raises:
+            Unresolved: The time step is too coarse to tell.
+        """
+        measured = [np.atleast_1d(self.measure(case)) for case in cases]
+        flights = min(map(len, measured))
+        means = np.mean([values[:flights] for values in measured], axis=0)
+        return float(means[np.argmax(np.abs(means))])
+
+
+METRICS: dict[str, Metric] = {}
+
+
+def metrics_for(scene: Scenario, truth: Truth | None) -> list[Metric]:
+    """The metrics that a scene can be measured by."""
+    return [metric for metric in METRICS.values() if metric.applies(scene, truth)]
+
+
+def _metric(
+    unit: str,
+    kind: Literal["truth", "invariant"],
+    needs: str,
+    applies: Callable[[Scenario, Truth | None], bool],
+    *,
+    signed: bool = False,
+    agreement: bool = False,
+) -> Callable[[Measure], Measure]:
+    """Register a function as a metric; its name is the metric's, its docstring the definition."""
+
+    def register(measure: Measure) -> Measure:
+        name, definition = measure.__name__, " ".join((measure.__doc__ or "").split())
+        METRICS[name] = Metric(name, unit, kind, signed, definition, needs, applies, measure, agreement)
+        return measure
+
+    return register
+
+
+def _has_truth(scene: Scenario, truth: Truth | None) -> bool:
+    return truth is not None
+
+
+def _spins(scene: Scenario, truth: Truth | None) -> bool:
+    states = [] if truth is None else [scene.initial_state, *(event.after for event in truth.events)]
+    return any(np.any(state[10:13] != 0.0) for state in states)
+
+
+def _has_impact(scene: Scenario, truth: Truth | None) -> bool:
+    return truth is not None and len(truth.events) > 0 and scene.clearance > 0.0
+
+
+def _has_floor(scene: Scenario, truth: Truth | None) -> bool:
+    return scene.floor is not None
+
+
+def _keeps_energy(scene: Scenario, truth: Truth | None) -> bool:
+    return scene.damping is None
+
+
+def _keeps_horizontal_momentum(scene: Scenario, truth: Truth | None) -> bool:
+    upright = scene.acceleration[0] == 0.0 and scene.acceleration[2] == 0.0
+    return upright and scene.damping is None and scene.floor is not None and scene.floor.friction == "none"
+
+
+@_metric("1", "truth", "a truth", _has_truth, signed=True, agreement=True)
+def energy_error(case: Comparison) -> Array:
+    """Largest difference of energy from the truth in flight, with velocity brought to the time of position, over the
+    energy the scene plays with.
+    """
+    found = energy(case.scene, case.compared) - energy(case.scene, case.exact)
+    return _largest_of_each_flight(found, case) / case.energy_scale
+
+
+@_metric("1", "truth", "a truth", _has_truth, signed=True)
+def energy_error_raw(case: Comparison) -> Array:
+    """The same with the state as it stands: what a user sees who does not know that velocity lags by half a step."""
+    found = energy(case.scene, case.compared, synchronised=False) - energy(case.scene, case.exact)
+    return _largest_of_each_flight(found, case) / case.energy_scale
+
+
+@_metric("1", "invariant", "no damping", _keeps_energy, signed=True)
+def energy_drift(case: Comparison) -> float:
+    """Change of energy from the start to the end of the first flight, over the energy the scene plays with."""
+    rows = case.flights[0]
+    over_time = energy(case.scene, case.motion[rows])
+    return float(over_time[-1] - over_time[0]) / case.energy_scale
+
+
+@_metric("1", "invariant", "no damping", _keeps_energy)
+def energy_gain(case: Comparison) -> float:
+    """Largest rise of energy above any earlier value, over the energy the scene plays with."""
+    over_time = energy(case.scene, case.motion)
+    return float(np.max(over_time - np.minimum.accumulate(over_time))) / case.energy_scale
+
+
+@_metric("1", "truth", "a truth with an impact", _has_impact, signed=True, agreement=True)
+def bounce_height_error(case: Comparison) -> float:
+    """Apex of the centre of mass after the first impact minus the truth's, over the height of the drop."""
+    if len(case.flights) < 2:
+        raise Unresolved(f"the flight after the impact is too short for steps of {case.dt:g} s")
+    rows = case.flights[1]
+    found, exact = (_apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
+    return float(np.mean(found - exact)) / case.scene.clearance
+
+
+@_metric("1", "truth", "a truth with an impact", _has_impact, signed=True)
+def restitution_error(case: Comparison) -> float:
+    """Separation speed over approach speed of the contact point in the first impact, native rows just before and just
+    after it, minus the scene's restitution.
+    """
+    assert case.scene.floor is not None
+    if case.first_contact is None:
+        return float("nan")  # it should have hit the floor
+    before, after = case.first_contact
+    approach, separation = (case.normal_velocity_of_contact(row, contact_row=before) for row in (before, after))
+    return -separation / approach - case.scene.floor.restitution
+
+
+@_metric("1", "truth", "a truth with spin", _spins, agreement=True)
+def angular_momentum_error(case: Comparison) -> Array:
+    """Largest difference of angular momentum from the truth in flight, over the truth's largest."""
+    found, exact = (angular_momentum(case.scene, motion) for motion in (case.compared, case.exact))
+    scale = np.max(np.linalg.norm(exact, axis=1))
+    return _largest_of_each_flight(np.linalg.norm(found - exact, axis=1), case) / scale
+
+
+@_metric("rad", "truth", "a truth with spin", _spins)
+def angular_momentum_direction_error(case: Comparison) -> Array:
+    """Largest angle in flight between the angular momentum and the truth's."""
+    found, exact = (angular_momentum(case.scene, motion) for motion in (case.compared, case.exact))
+    return _largest_of_each_flight(angle_between_vectors(found, exact), case)
+
+
+@_metric("1", "invariant", "a frictionless floor, gravity straight down, no damping", _keeps_horizontal_momentum)
+def horizontal_momentum_error(case: Comparison) -> float:
+    """Largest change of the horizontal velocity, over the speed that belongs to the energy the scene plays with."""
+    sideways = (case.motion.velocity - np.array(case.scene.start.velocity))[:, [0, 2]]
+    speed = np.sqrt(2.0 * case.energy_scale / case.scene.body.mass)
+    return float(np.max(np.linalg.norm(sideways, axis=1)) / speed)
+
+
+@_metric("m", "truth", "a truth", _has_truth)
+def position_error(case: Comparison) -> float:
+    """Largest distance of the centre of mass from the truth's."""
+    return float(np.max(np.linalg.norm(case.compared.position - case.exact.position, axis=1)))
+
+
+@_metric("rad", "truth", "a truth with spin", _spins)
+def orientation_error(case: Comparison) -> float:
+    """Largest angle of the rotation that takes the truth's attitude to the engine's."""
+    return float(np.max(angle_between_orientations(case.compared.orientation, case.exact.orientation)))
+
+
+@_metric("m", "invariant", "a floor", _has_floor)
+def penetration(case: Comparison) -> float:
+    """Largest depth of the body's lowest point below the floor."""
+    return float(np.max(np.maximum(-lowest_height(case.scene, case.motion), 0.0)))
+
+
+def _apex(scene: Scenario, motion: Trajectory) -> Array:
+    """The height to which a body in flight rises, or has risen [m], from each of its states alike."""
+    v = motion.velocity[:, 1]
+    return v * v / (2.0 * np.linalg.norm(scene.acceleration)) + motion.position[:, 1] - motion.velocity_lag * v
+
+
+def _largest_of_each_flight(values: Array, case: Comparison) -> Array:
+    """The value of largest size in each flight, with its sign."""
+    return np.array([values[rows][np.argmax(np.abs(values[rows]))] for rows in case.flights])

@@ -1,0 +1,58 @@
+"""Where figures come from: versions, machine, commit, time."""
+
+import os
+import platform
+import subprocess
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+STAMPED = ("dropspin", "numpy", "numba", "scipy", "mujoco", "pybullet")
+
+
+def provenance(asked: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """What `run.json` holds besides the scenes themselves."""
+    return {
+        "asked": dict(asked),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "cpu": processor(),
+        "cores": os.cpu_count(),
+        "commit": _commit(),
+        "settings": dict(settings),
+    }
+
+
+def versions() -> dict[str, str | None]:
+    """Installed versions of what the figures depend on; None where a package is missing."""
+    return {package: _version(package) for package in STAMPED}
+
+
+def processor() -> str:
+    """The processor's name, as well as the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    named = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return named[0] if named else platform.machine()
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _commit() -> str | None:
+    """The commit of the working directory, which is the user's own repository as often as not."""
+    try:
+        answer = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, timeout=5, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return answer.stdout.strip() or None

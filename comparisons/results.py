@@ -1,0 +1,66 @@
+"""What a run gives: the table, the trajectories, and where they come from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import pandas as pd
+
+from comparisons.verdicts import BREAKDOWNS, FAILURES
+from scenarios import Scenario, Trajectory
+
+COLUMNS = {
+    "scene": "str",
+    "engine": "str",
+    "dt": "float64",
+    "seed": "int64",
+    "metric": "str",
+    "value": "float64",
+    "unit": "str",
+    "kind": "str",
+    "truth": "str",
+    "lower": "float64",
+    "upper": "float64",
+    "verdict": "str",
+    "cause": "str",
+    "reason": "str",
+    "time_per_step": "float64",
+    "steps": "int64",
+}
+KEY = ["scene", "engine", "dt", "seed", "metric", "kind", "truth"]
+
+TrajectoryKey = tuple[str, str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A run.
+
+    Attributes:
+        frame: One row per measurement; the columns of `COLUMNS`, dt and time_per_step in s.
+        scenes: The scenes, by name, in the order they were run.
+        engines: The engines' labels, in order.
+        trajectories: By (scene, engine, dt): the scene as written, every step.
+        provenance: What was asked, versions, machine, settings per engine and scene.
+    """
+
+    frame: pd.DataFrame
+    scenes: Mapping[str, Scenario]
+    engines: tuple[str, ...]
+    trajectories: Mapping[TrajectoryKey, Trajectory]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def exit_code(self, named: frozenset[str] = frozenset()) -> int:
+        """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""
+        verdicts = self.frame["verdict"]
+        missing = (verdicts == "missing") & self.frame["engine"].isin(named)
+        if verdicts.isin(BREAKDOWNS).any() or missing.any():
+            return 3
+        return int(verdicts.isin(FAILURES).any())
+
+
+def as_frame(rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """Rows of results as a table with the columns and types of `COLUMNS`; what a row leaves out is empty."""
+    blank = {"str": "", "float64": float("nan"), "int64": 0}
+    filled = [{name: row.get(name, blank[kind]) for name, kind in COLUMNS.items()} for row in rows]
+    return pd.DataFrame(filled, columns=list(COLUMNS)).astype(COLUMNS)

@@ -1,0 +1,263 @@
+"""The main job: scenes × engines × time steps, measured against truth and against each other, and judged."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from comparisons.building import assert_built_as_meant
+from comparisons.comparison import Comparison, Unresolved
+from comparisons.engines.base import Diverged, Engine, EngineMissing
+from comparisons.engines.registry import engine as engine_named
+from comparisons.metrics import Metric, metrics_for
+from comparisons.phases import start_phases
+from comparisons.provenance import provenance
+from comparisons.results import Results, TrajectoryKey, as_frame
+from comparisons.verdicts import assert_metrics_exist, judge
+from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+
+DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
+TIMED_REPEATS = 3
+LEAST_STEPS = 4
+
+Progress = Callable[[str], None]
+Row = dict[str, Any]
+
+
+def simulate(scene: Scenario, engine: str | Engine, dt: float, every: int = 1) -> Trajectory:
+    """Run one scene through one engine.
+
+    Args:
+        scene: The scene.
+        engine: An engine, or its name with options, such as `mujoco[integrator=rk4]`.
+        dt: Time step [s].
+        every: Steps between two rows.
+
+    Returns:
+        The motion, the start as its first row.
+
+    Raises:
+        DropspinError: There is no such engine, it is not installed, or it declines the scene.
+        Diverged: The engine gave up.
+    """
+    chosen = engine_named(engine) if isinstance(engine, str) else engine
+    _assert_step_fits(scene, dt)
+    refusal = chosen.declines(scene)
+    if refusal is not None:
+        raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
+    with chosen.prepare(scene, dt) as simulation:
+        assert_built_as_meant(chosen, scene, simulation)
+        states = simulation.record(scene.steps(dt), every)
+        lag = 0.5 * dt if simulation.staggered else 0.0
+    return Trajectory.from_states(dt * every * np.arange(len(states)), states, lag)
+
+
+def run(
+    scenes: Sequence[Scenario],
+    engines: Sequence[str],
+    dts: Sequence[float] = DEFAULT_DTS,
+    progress: Progress = lambda done: None,
+) -> Results:
+    """Run every scene through every engine at every step, measure, and judge.
+
+    Args:
+        scenes: The scenes; their names must differ.
+        engines: Names with options. One that is not installed is `missing` in the results, and the rest runs.
+        dts: Time steps [s].
+        progress: Called with a short text after each of len(scenes) * len(engines) * len(dts) pieces of work.
+
+    Raises:
+        DropspinError: Something was asked for that cannot be: an unknown engine, a step that is no step, equal names.
+    """
+    _assert_sensible(scenes, dts)
+    contestants = [_contestant(name) for name in engines]
+    labels = [contestant.label for contestant in contestants]
+    if len(set(labels)) < len(labels):
+        raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
+    rows: list[Row] = []
+    trajectories: dict[TrajectoryKey, Trajectory] = {}
+    settings: dict[str, dict[str, Any]] = {}
+    for scene in scenes:
+        for dt in dts:
+            phases = [(phase, truth_for(phase)) for phase in start_phases(scene, truth_for(scene), dt)]
+            attempts: list[_Attempt] = []
+            for contestant in contestants:
+                attempt = _attempt(contestant, scene, dt, [phase for phase, _ in phases])
+                if attempt.motion is not None:
+                    trajectories[scene.name, contestant.label, dt] = attempt.motion
+                    settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
+                rows += _truth_rows(scene, dt, attempt, phases)
+                attempts.append(attempt)
+                progress(f"{scene.name} {contestant.label} dt={dt:g}")
+            for first, second in combinations(attempts, 2):
+                rows += _agreement_rows(scene, dt, first, second, phases)
+    asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)}
+    return Results(
+        as_frame(rows), {scene.name: scene for scene in scenes}, tuple(labels), trajectories, provenance(asked, settings)
+    )
+
+
+def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:
+    """Every metric that the scene has, of one motion; NaN where the step is too coarse for it."""
+    truth = truth_for(scene)
+    case = Comparison.with_truth(scene, motion, truth)
+    return {metric.name: _value_or_nan(metric, case) for metric in metrics_for(scene, truth)}
+
+
+@dataclass(frozen=True)
+class _Contestant:
+    label: str
+    engine: Engine | None
+    missing: str = ""
+
+
+@dataclass
+class _Attempt:
+    """What came of one engine on one scene at one step."""
+
+    label: str
+    verdict: str = ""
+    reason: str = ""
+    motion: Trajectory | None = None
+    phases: list[Trajectory] = field(default_factory=list)
+    settings: dict[str, Any] = field(default_factory=dict)
+    time_per_step: float = float("nan")
+
+
+def _contestant(name: str) -> _Contestant:
+    try:
+        created = engine_named(name)
+    except EngineMissing as error:
+        return _Contestant(name.strip(), None, str(error))
+    return _Contestant(created.label, created)
+
+
+def _attempt(contestant: _Contestant, scene: Scenario, dt: float, phases: list[Scenario]) -> _Attempt:
+    attempt = _Attempt(contestant.label)
+    engine = contestant.engine
+    if engine is None:
+        attempt.verdict, attempt.reason = "missing", contestant.missing
+        return attempt
+    # An engine is somebody else's code: whatever it raises costs its own row and is told there.
+    try:
+        refusal = engine.declines(scene)
+        if refusal is not None:
+            attempt.verdict, attempt.reason = "declined", refusal
+            return attempt
+        attempt.motion = simulate(scene, engine, dt)
+        attempt.phases = [attempt.motion] if phases == [scene] else [simulate(phase, engine, dt) for phase in phases]
+        attempt.settings, attempt.time_per_step = _settings_and_time(engine, scene, dt)
+    except Diverged as error:
+        attempt.verdict, attempt.reason = "diverged", str(error)
+    except Exception as error:
+        attempt.verdict, attempt.reason = "crashed", f"{type(error).__name__}: {error}"
+    return attempt
+
+
+def _settings_and_time(engine: Engine, scene: Scenario, dt: float) -> tuple[dict[str, Any], float]:
+    """The engine's stamp, and the least of three timings of its native stepping alone [s per step]."""
+    steps = scene.steps(dt)
+    timings = []
+    for _ in range(TIMED_REPEATS):
+        with engine.prepare(scene, dt) as simulation:
+            settings = dict(simulation.settings)
+            start = time.perf_counter()
+            simulation.advance(steps)
+            timings.append(time.perf_counter() - start)
+    return settings, min(timings) / steps
+
+
+def _truth_rows(scene: Scenario, dt: float, attempt: _Attempt, phases: list[tuple[Scenario, Truth | None]]) -> list[Row]:
+    steps = scene.steps(dt)
+    shared: Row = {"scene": scene.name, "engine": attempt.label, "dt": dt, "time_per_step": attempt.time_per_step, "steps": steps}
+    if attempt.verdict:
+        return [shared | {"verdict": attempt.verdict, "reason": attempt.reason}]
+    assert attempt.motion is not None
+    bad = next((motion for motion in [attempt.motion, *attempt.phases] if motion.first_bad_row is not None), None)
+    if bad is not None:
+        reason = f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s"
+        return [shared | {"verdict": "diverged", "reason": reason}]
+    cases = [
+        Comparison.with_truth(phase, motion, truth) for (phase, truth), motion in zip(phases, attempt.phases, strict=True)
+    ]
+    truth = phases[0][1]
+    rows = []
+    for metric in metrics_for(scene, truth):
+        row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}
+        if metric.kind == "truth" and truth is not None:
+            row["truth"] = truth.name
+        rows.append(row | _measured(scene, dt, attempt.label, metric, cases))
+    if truth is None:
+        rows.append(shared | {"verdict": "no_truth", "reason": "no closed form is known for this scene"})
+    return rows
+
+
+def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: list[Comparison]) -> Row:
+    """A metric's mean over the start phases, judged."""
+    try:
+        value = metric.value(cases)
+    except Unresolved as error:
+        return {"verdict": "measured", "cause": "unresolved", "reason": str(error)}
+    judgement = judge(scene, label, dt, metric, value)
+    return {
+        "value": value,
+        "lower": judgement.lower,
+        "upper": judgement.upper,
+        "verdict": judgement.verdict,
+        "reason": judgement.reason,
+    }
+
+
+def _agreement_rows(
+    scene: Scenario, dt: float, first: _Attempt, second: _Attempt, phases: list[tuple[Scenario, Truth | None]]
+) -> list[Row]:
+    """How far two engines are apart, by the metrics that mean something between engines."""
+    if first.verdict or second.verdict or any(m.first_bad_row is not None for m in first.phases + second.phases):
+        return []
+    cases = []
+    for (phase, truth), one, other in zip(phases, first.phases, second.phases, strict=True):
+        impacts = () if truth is None else tuple(event.time for event in truth.events)
+        until = len(one) if truth is None else int(np.sum(one.t <= truth.horizon * (1.0 + 1e-9)))
+        cases.append(Comparison(phase, one, other[:until], impacts))
+    shared: Row = {"scene": scene.name, "engine": first.label, "dt": dt, "kind": "agreement", "truth": second.label}
+    shared["steps"] = scene.steps(dt)
+    rows = []
+    for metric in metrics_for(scene, phases[0][1]):
+        if not metric.agreement:
+            continue
+        try:
+            found: Row = {"value": metric.value(cases)}
+        except Unresolved as error:
+            found = {"cause": "unresolved", "reason": str(error)}
+        rows.append(shared | {"metric": metric.name, "unit": metric.unit, "verdict": "measured"} | found)
+    return rows
+
+
+def _value_or_nan(metric: Metric, case: Comparison) -> float:
+    try:
+        return metric.value([case])
+    except Unresolved:
+        return float("nan")
+
+
+def _assert_sensible(scenes: Sequence[Scenario], dts: Sequence[float]) -> None:
+    names = [scene.name for scene in scenes]
+    if len(set(names)) < len(names):
+        raise DropspinError(f"two scenes have the same name ({', '.join(names)}); a scene's name is its file's, rename one.")
+    for scene in scenes:
+        assert_metrics_exist(scene)
+        for dt in dts:
+            _assert_step_fits(scene, dt)
+
+
+def _assert_step_fits(scene: Scenario, dt: float) -> None:
+    if not (np.isfinite(dt) and dt > 0.0 and scene.steps(dt) >= LEAST_STEPS):
+        raise DropspinError(
+            f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be above 0 "
+            f"and at most {scene.duration / LEAST_STEPS:g} s."
+        )
+
+

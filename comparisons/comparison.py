@@ -7,6 +7,7 @@ differ for a step or two because the impact comes a little early or late, which 
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ class Comparison:
             return [rows if contact is None else rows[: contact[0] + 1]]
         edges = [0.0, *self.impacts, times[-1]]
         inner = []
-        for number, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        for number, (start, end) in enumerate(pairwise(edges)):
             # The last flight may be cut short by the scene's end; its impact is as uncertain as the flight before is long.
             before = 0.0 if number == 0 else 0.25 * max(end - start, start - edges[number - 1])
             after = 0.0 if number == len(self.impacts) else 0.25 * (end - start)

@@ -112,23 +112,21 @@ def _keeps_horizontal_momentum(scene: Scenario, truth: Truth | None) -> bool:
 
 @_metric("1", "truth", "a truth", _has_truth, signed=True, agreement=True)
 def energy_error(case: Comparison) -> Array:
-    """Largest difference of energy from the truth in flight, with velocity brought to the time of position, over the
-    energy the scene plays with.
-    """
+    """Largest difference of energy from the truth in flight, velocity synchronised with position, over the scene's energy."""
     found = energy(case.scene, case.compared) - energy(case.scene, case.exact)
     return _largest_of_each_flight(found, case) / case.energy_scale
 
 
 @_metric("1", "truth", "a truth", _has_truth, signed=True)
 def energy_error_raw(case: Comparison) -> Array:
-    """The same with the state as it stands: what a user sees who does not know that velocity lags by half a step."""
+    """The same from the state as it stands: what a user sees who does not know that velocity lags by half a step."""
     found = energy(case.scene, case.compared, synchronised=False) - energy(case.scene, case.exact)
     return _largest_of_each_flight(found, case) / case.energy_scale
 
 
 @_metric("1", "invariant", "no damping", _keeps_energy, signed=True)
 def energy_drift(case: Comparison) -> float:
-    """Change of energy from the start to the end of the first flight, over the energy the scene plays with."""
+    """Change of energy from the start to the end of the first flight, over the scene's energy."""
     rows = case.flights[0]
     over_time = energy(case.scene, case.motion[rows])
     return float(over_time[-1] - over_time[0]) / case.energy_scale
@@ -136,7 +134,7 @@ def energy_drift(case: Comparison) -> float:
 
 @_metric("1", "invariant", "no damping", _keeps_energy)
 def energy_gain(case: Comparison) -> float:
-    """Largest rise of energy above any earlier value, over the energy the scene plays with."""
+    """Largest rise of energy above any earlier value, over the scene's energy."""
     over_time = energy(case.scene, case.motion)
     return float(np.max(over_time - np.minimum.accumulate(over_time))) / case.energy_scale
 
@@ -153,9 +151,7 @@ def bounce_height_error(case: Comparison) -> float:
 
 @_metric("1", "truth", "a truth with an impact", _has_impact, signed=True)
 def restitution_error(case: Comparison) -> float:
-    """Separation speed over approach speed of the contact point in the first impact, native rows just before and just
-    after it, minus the scene's restitution.
-    """
+    """Separation over approach speed of the contact point in the first impact, native rows, minus the restitution."""
     assert case.scene.floor is not None
     if case.first_contact is None:
         return float("nan")  # it should have hit the floor
@@ -181,7 +177,7 @@ def angular_momentum_direction_error(case: Comparison) -> Array:
 
 @_metric("1", "invariant", "a frictionless floor, gravity straight down, no damping", _keeps_horizontal_momentum)
 def horizontal_momentum_error(case: Comparison) -> float:
-    """Largest change of the horizontal velocity, over the speed that belongs to the energy the scene plays with."""
+    """Largest change of the horizontal velocity, over the speed that belongs to the scene's energy."""
     sideways = (case.motion.velocity - np.array(case.scene.start.velocity))[:, [0, 2]]
     speed = np.sqrt(2.0 * case.energy_scale / case.scene.body.mass)
     return float(np.max(np.linalg.norm(sideways, axis=1)) / speed)

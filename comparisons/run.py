@@ -52,7 +52,7 @@ def simulate(scene: Scenario, engine: str | Engine, dt: float, every: int = 1) -
         assert_built_as_meant(chosen, scene, simulation)
         states = simulation.record(scene.steps(dt), every)
         lag = 0.5 * dt if simulation.staggered else 0.0
-    return Trajectory.from_states(dt * every * np.arange(len(states)), states, lag)
+    return Trajectory.from_states(dt * every * np.arange(len(states), dtype=float), states, lag)
 
 
 def run(
@@ -180,9 +180,7 @@ def _truth_rows(scene: Scenario, dt: float, attempt: _Attempt, phases: list[tupl
     if bad is not None:
         reason = f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s"
         return [shared | {"verdict": "diverged", "reason": reason}]
-    cases = [
-        Comparison.with_truth(phase, motion, truth) for (phase, truth), motion in zip(phases, attempt.phases, strict=True)
-    ]
+    cases = [Comparison.with_truth(phase, motion, truth) for (phase, truth), motion in zip(phases, attempt.phases, strict=True)]
     truth = phases[0][1]
     rows = []
     for metric in metrics_for(scene, truth):
@@ -259,5 +257,3 @@ def _assert_step_fits(scene: Scenario, dt: float) -> None:
             f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be above 0 "
             f"and at most {scene.duration / LEAST_STEPS:g} s."
         )
-
-

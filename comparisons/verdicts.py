@@ -58,7 +58,11 @@ def judge(scene: Scenario, engine: str, dt: float, metric: Metric, value: float)
     lower, upper = max(low for low, _ in bounds), min(high for _, high in bounds)
     verdict: Verdict = "passed" if lower <= value <= upper else "failed"
     reason = "; ".join(expectation.reason for expectation in binding)
-    return Judgement(*(bound if math.isfinite(bound) else math.nan for bound in (lower, upper)), verdict, reason)
+    return Judgement(_finite_or_nan(lower), _finite_or_nan(upper), verdict, reason)
+
+
+def _finite_or_nan(bound: float) -> float:
+    return bound if math.isfinite(bound) else math.nan
 
 
 def _narrowness(expectation: Expectation) -> int:

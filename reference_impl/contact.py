@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import Mat3, Vec3, compiled, cross, dot, solve, transpose
+from reference_impl.vectors import Mat3, Vec3, compiled, cross, dot, row, solve, transpose
 
 N = Vec3(0.0, 1.0, 0.0)
 """The floor's normal, upwards."""
@@ -38,7 +38,7 @@ def contact_point(R, v, w, height, body):
     total = Vec3(0.0, 0.0, 0.0)
     count = 0
     for i in range(body.points.shape[0]):
-        p = Vec3(body.points[i, 0], body.points[i, 1], body.points[i, 2])
+        p = row(body.points, i)
         # A rounded vertex touches at its lowest point. That is a departure from the note, for balls; radius is 0 otherwise.
         r = R @ p - body.radius * N
         if height + dot(r, N) < 0.0 and dot(v + cross(w, r), N) < 0.0:
@@ -74,4 +74,3 @@ def impulse_response(r, I_inverse, mass):
 def cross_matrix(r):
     """Eq 14: the matrix r* for which r* j = r × j."""
     return Mat3(Vec3(0.0, -r.z, r.y), Vec3(r.z, 0.0, -r.x), Vec3(-r.y, r.x, 0.0))
-

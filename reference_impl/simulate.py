@@ -107,7 +107,9 @@ def _run(state: Array, body: Body, world: World, dt: float, steps: int, every: i
     inverse = np.linalg.inv(body.inertia)
     # The margin covers the rounding of R: a vertex must never reach the floor before the bounding sphere does.
     reach = (math.sqrt(float(np.max(np.sum(points**2, axis=1)))) + body.radius) * (1.0 + 1e-12)
-    kernel_body = _KernelBody(float(body.mass), Mat3(*(Vec3(*row) for row in inverse)), points, float(body.radius), reach)
+    kernel_body = _KernelBody(
+        float(body.mass), Mat3(*(Vec3(*map(float, row)) for row in inverse)), points, float(body.radius), reach
+    )
     gravity = None if world.gravity is None else Vec3(*map(float, world.gravity))
     damping = None if world.damping is None else _KernelDamping(*(math.exp(-rate * dt) for rate in world.damping))
     rows = np.empty((1 + steps // every, 13))
@@ -117,10 +119,10 @@ def _run(state: Array, body: Body, world: World, dt: float, steps: int, every: i
 
 @compiled
 def _fill(rows, state, dt, every, body, gravity, forces, damping, floor):
-    x = Vec3(state[0], state[1], state[2])
-    q = Quat(state[3], state[4], state[5], state[6])
-    v = Vec3(state[7], state[8], state[9])
-    w = Vec3(state[10], state[11], state[12])
+    x = Vec3(float(state[0]), float(state[1]), float(state[2]))
+    q = Quat(float(state[3]), float(state[4]), float(state[5]), float(state[6]))
+    v = Vec3(float(state[7]), float(state[8]), float(state[9]))
+    w = Vec3(float(state[10]), float(state[11]), float(state[12]))
     rows[0] = state
     for row in range(1, rows.shape[0]):
         for _ in range(every):

@@ -5,7 +5,7 @@ A part that is None (no gravity, no forces, no damping, no floor) is left out of
 
 from reference_impl.contact import handle_collision
 from reference_impl.quaternion import normalise, product, rotation_matrix
-from reference_impl.vectors import Quat, Vec3, compiled, cross, transpose
+from reference_impl.vectors import Quat, Vec3, compiled, cross, row, transpose
 
 
 @compiled
@@ -32,8 +32,8 @@ def apply_forces(q, v, w, dt, body, forces):
     force = Vec3(0.0, 0.0, 0.0)
     torque = Vec3(0.0, 0.0, 0.0)
     for i in range(body.points.shape[0]):
-        p = Vec3(body.points[i, 0], body.points[i, 1], body.points[i, 2])
-        f = Vec3(forces[i, 0], forces[i, 1], forces[i, 2])
+        p = row(body.points, i)
+        f = row(forces, i)
         force = force + f
         torque = torque + cross(R @ p, f)  # eq 9
     I_inverse = R @ body.inverse_inertia @ transpose(R)  # eq 7

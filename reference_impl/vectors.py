@@ -1,7 +1,7 @@
 """The value types that the equations are written in: `Vec3`, `Quat`, `Mat3`.
 
 Each is a named tuple with operators, so that a kernel line reads as the note prints it: `v + dt * g`,
-`R @ I_body @ transpose(R)`. An operator is one plain function: Python calls it as a method, and numba compiles the same
+`R @ I_body @ transpose(R)`. An operator is one plain function: a method calls it in Python and numba compiles the same
 text, so interpreted and compiled arithmetic round alike.
 """
 
@@ -72,15 +72,20 @@ class Vec3(NamedTuple):
     y: float
     z: float
 
-    # A NumPy scalar on the left must leave the product to __rmul__ instead of turning the vector into an array.
-    __array_ufunc__ = None
-    __add__ = _add3
-    __sub__ = _subtract3
-    __truediv__ = _divide3
-    __neg__ = _negate3
+    def __add__(self, other):
+        return _add3(self, other)
+
+    def __sub__(self, other):
+        return _subtract3(self, other)
 
     def __rmul__(self, scale):
         return _scale3(scale, self)
+
+    def __truediv__(self, scale):
+        return _divide3(self, scale)
+
+    def __neg__(self):
+        return _negate3(self)
 
 
 class Quat(NamedTuple):
@@ -91,12 +96,14 @@ class Quat(NamedTuple):
     z: float
     w: float
 
-    __array_ufunc__ = None
-    __add__ = _add4
-    __truediv__ = _divide4
+    def __add__(self, other):
+        return _add4(self, other)
 
     def __rmul__(self, scale):
         return _scale4(scale, self)
+
+    def __truediv__(self, scale):
+        return _divide4(self, scale)
 
 
 class Mat3(NamedTuple):
@@ -106,8 +113,8 @@ class Mat3(NamedTuple):
     row2: Vec3
     row3: Vec3
 
-    __array_ufunc__ = None
-    __sub__ = _subtract_matrix
+    def __sub__(self, other):
+        return _subtract_matrix(self, other)
 
     def __rmul__(self, scale):
         return _scale_matrix(scale, self)
@@ -117,19 +124,26 @@ class Mat3(NamedTuple):
 
 
 @compiled
+def row(array, i):
+    """Row i of an (n, 3) array, as plain floats: NumPy's scalars would be slow and take over the operators below."""
+    return Vec3(float(array[i, 0]), float(array[i, 1]), float(array[i, 2]))
+
+
+@compiled
 def dot(a, b):
-    """a · b."""
+    """A · b."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 @compiled
 def cross(a, b):
-    """a × b."""
+    """A × b."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
 @compiled
 def transpose(m):
+    """The matrix with rows and columns exchanged."""
     return Mat3(
         Vec3(m.row1.x, m.row2.x, m.row3.x),
         Vec3(m.row1.y, m.row2.y, m.row3.y),
@@ -149,10 +163,10 @@ def solve(m, b):
 def _is(numba_type: Any, kind: type) -> bool:
     if kind is float:
         return isinstance(numba_type, types.Number)
-    return isinstance(numba_type, types.BaseNamedTuple) and numba_type.instance_class is kind
+    return isinstance(numba_type, types.NamedTuple | types.NamedUniTuple) and numba_type.instance_class is kind
 
 
-def _teach_numba(symbol: Callable, source: Callable, *kinds: type) -> None:
+def _teach_numba(symbol: Callable[..., Any], source: Callable[..., Any], *kinds: type) -> None:
     """Let compiled code use `source` for `symbol` on operands of these kinds."""
     if len(kinds) == 1:
 

@@ -1,8 +1,8 @@
 """Everything that can go wrong because of what was asked, with a message that is fit to be shown as it is.
 
-    DropspinError
-    ├── SceneError      a scene file or mapping that is not a scene
-    └── UnknownName     a scene, engine, option or metric that does not exist
+DropspinError
+├── SceneError      a scene file or mapping that is not a scene
+└── UnknownName     a scene, engine, option or metric that does not exist
 """
 
 import difflib

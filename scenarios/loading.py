@@ -14,8 +14,15 @@ from scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scen
 
 CATALOGUE = Path(__file__).parent / "catalogue"
 LARGEST_FILE = 1_000_000  # bytes; a scene of ten thousand vertices takes less
-FEATURES = {"floor": Floor, "gravity": Gravity, "start": Start, "damping": Damping, "ensemble": Ensemble, "expect": Expectation}
-SHAPES = {"sphere": Sphere, "box": Box, "vertices": Vertices}
+FEATURES: dict[str, type[BaseModel]] = {
+    "floor": Floor,
+    "gravity": Gravity,
+    "start": Start,
+    "damping": Damping,
+    "ensemble": Ensemble,
+    "expect": Expectation,
+}
+SHAPES: dict[str, type[BaseModel]] = {"sphere": Sphere, "box": Box, "vertices": Vertices}
 
 
 def names() -> list[str]:
@@ -87,7 +94,8 @@ def _described(problem: Any) -> str:
     kind = problem["type"]
     if kind == "extra_forbidden":
         allowed = _keys_allowed(location)
-        return f"{key}: unknown key, with the value {given}.{did_you_mean(str(location[-1]), allowed)} Allowed: {', '.join(allowed)}."
+        guess = did_you_mean(str(location[-1]), allowed)
+        return f"{key}: unknown key, with the value {given}.{guess} Allowed: {', '.join(allowed)}."
     if kind == "missing":
         return f"{key}: missing; it has no default."
     if kind == "union_tag_not_found":

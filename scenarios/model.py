@@ -15,6 +15,8 @@ def _unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
     length = math.hypot(*quaternion)
     if length == 0.0:
         raise ValueError("must not be the zero quaternion")
+    if abs(length - 1.0) < 4e-16:  # unit already, to the last digit; a saved scene loads as it was
+        return quaternion
     return tuple(component / length for component in quaternion)
 
 

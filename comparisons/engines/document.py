@@ -85,4 +85,7 @@ def _world(scene: Scenario) -> reference_impl.World:
 def _floor_settings(scene: Scenario) -> dict[str, Any]:
     if scene.floor is None:
         return {}
-    return {"impulse": "eq 17 (sticking)" if scene.floor.friction == "infinite" else "eq 15 (frictionless)", "contact": "mean point"}
+    return {
+        "impulse": "eq 17 (sticking)" if scene.floor.friction == "infinite" else "eq 15 (frictionless)",
+        "contact": "mean point",
+    }

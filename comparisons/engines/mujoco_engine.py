@@ -8,7 +8,7 @@ a_ref = -b v - k r; with k = 0 and b = (1 + e) / dt, one step of a one-stage int
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
-from typing import Any
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -34,7 +34,7 @@ class MuJoCo(Engine):
     """MuJoCo with exact restitution: one free body, one explicit contact pair with the floor."""
 
     name = "mujoco"
-    choices = {"integrator": tuple(INTEGRATORS)}
+    choices: ClassVar = {"integrator": tuple(INTEGRATORS)}
     package = "mujoco"
 
     @property

@@ -105,7 +105,13 @@ class PyBulletSimulation(Simulation):
             **contact,
         )
         bullet.resetBaseVelocity(self._body, scene.start.velocity, scene.start.angular_velocity, physicsClientId=client)
-        self.settings = {"version": version("pybullet"), "profile": "calibrated", "coordinates": "maximal", **parameters, **contact}
+        self.settings = {
+            "version": version("pybullet"),
+            "profile": "calibrated",
+            "coordinates": "maximal",
+            **parameters,
+            **contact,
+        }
 
     def _shape(self, scene: Scenario) -> int:
         bullet, client = self._bullet, self._client

@@ -32,7 +32,7 @@ def jacobi(u: Array, m1: float) -> Jacobi:
         sech = 1.0 / np.cosh(u)
         return Jacobi(np.tanh(u), sech, sech)
     a, b = 1.0, math.sqrt(m1)
-    ratios = []
+    ratios: list[float] = []
     while abs(a - b) > 1e-17 * a and len(ratios) < 60:
         a, b, c = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)
         ratios.append(c / a)

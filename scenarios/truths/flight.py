@@ -38,7 +38,7 @@ def flight(scene: Scenario) -> Truth | None:
     parabola = "" if scene.gravity is None else "x = x0 + v0 t + g t²/2; "
     if isinstance(rotor, AsymmetricTop):
         name = "free-rotor"
-        turning = "Jacobi elliptic functions for angular velocity and attitude (Landau & Lifshitz, section 37; Whittaker, section 69)"
+        turning = "Jacobi's elliptic functions for rates and attitude (Landau & Lifshitz, section 37; Whittaker, section 69)"
     else:
         name = "principal-spin" if np.any(w) else "parabola"
         turning = "angular velocity constant, angle ωt" if np.any(w) else "orientation constant"

@@ -1,0 +1,129 @@
+"""The report: one HTML file that needs no network."""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
+
+from comparisons import METRICS, Results
+from reports import numbers
+from reports.colours import engine_colours
+from reports.findings import counts, failures, finding_sentences, verdict_sentence, worst_verdicts
+from reports.plots import convergence_figure, time_figure
+from reports.svg import svg
+from scenarios import Scenario, truth_for
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("reports"),
+        autoescape=select_autoescape(default=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"written": numbers.written, "word": numbers.word}
+    environment.globals |= {"bound": numbers.bound, "marks": numbers.MARKS}
+    return environment
+
+
+def html_report(results: Results, plots: dict[str, str]) -> str:
+    """The whole page.
+
+    Args:
+        results: The run.
+        plots: SVG elements by name, from `svg_plots`.
+    """
+    return _environment().get_template("report.html").render(_context(results, plots))
+
+
+def markdown_report(results: Results) -> str:
+    """The same in short, for a pull request."""
+    return _environment().get_template("report.md").render(_context(results, {}))
+
+
+def svg_plots(results: Results) -> Iterator[tuple[str, str]]:
+    """Name and SVG of each plot of the report."""
+    for number, scene in enumerate(results.scenes):
+        yield f"{number:02d}-time", svg(time_figure(results, scene), f"s{number:02d}-time")
+        figure = convergence_figure(results, scene)
+        if figure is not None:
+            yield f"{number:02d}-convergence", svg(figure, f"s{number:02d}-convergence")
+
+
+def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
+    worst = worst_verdicts(results)
+    return {
+        "verdict": verdict_sentence(results),
+        "held": counts(results).failed == 0 and counts(results).broken == 0,
+        "findings": finding_sentences(results),
+        "engines": results.engines,
+        "colours": engine_colours(results.engines),
+        "matrix": {name: {engine: worst.get((name, engine), "missing") for engine in results.engines} for name in results.scenes},
+        "failures": [_row(row) for row in failures(results).itertuples()],
+        "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
+        "metrics": METRICS,
+        "provenance": results.provenance,
+        "settings": _settings(results),
+    }
+
+
+def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> dict[str, Any]:
+    scene = results.scenes[name]
+    truth = truth_for(scene)
+    frame = results.frame[results.frame["scene"] == name]
+    dts = sorted(frame["dt"].unique(), reverse=True)
+    own = frame[(frame["kind"] != "agreement") & (frame["metric"] != "")]
+    return {
+        "id": f"scene-{number:02d}",
+        "name": name,
+        "scene": scene,
+        "modelled": modelled(scene),
+        "left_out": left_out(scene),
+        "truth": None if truth is None else truth.statement,
+        "dts": dts,
+        "metrics": list(own["metric"].unique()),
+        "cells": {(row.metric, row.engine, row.dt): _row(row) for row in own.itertuples()},
+        "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
+        "agreement": _agreement(frame, min(dts)),
+        "time_plot": Markup(plots.get(f"{number:02d}-time", "")),  # our own SVG; its text is escaped by matplotlib
+        "convergence_plot": Markup(plots.get(f"{number:02d}-convergence", "")),
+    }
+
+
+def modelled(scene: Scenario) -> list[str]:
+    """What of a scene is simulated, in words."""
+    parts = [f"a {scene.body.shape} of {scene.body.mass:g} kg" if scene.body.shape != "vertices" else "a set of vertices"]
+    if scene.gravity is not None:
+        parts.append("gravity")
+    if scene.floor is not None:
+        friction = scene.floor.friction
+        grip = {"none": "no friction", "infinite": "infinite friction"}.get(str(friction), f"friction {friction}")
+        parts.append(f"a floor of restitution {scene.floor.restitution:g} and {grip}")
+    if scene.damping is not None:
+        parts.append(f"damping of {scene.damping.linear:g} and {scene.damping.angular:g} per second")
+    return parts
+
+
+def left_out(scene: Scenario) -> list[str]:
+    """What a scene does not model, so that no engine pays for it."""
+    return [part for part in ("gravity", "floor", "damping") if getattr(scene, part) is None]
+
+
+def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
+    pairs = frame[(frame["kind"] == "agreement") & (frame["dt"] == dt)]
+    return [_row(row) for row in pairs.itertuples()]
+
+
+def _row(row: Any) -> dict[str, Any]:
+    return {str(key): value for key, value in row._asdict().items()}
+
+
+def _settings(results: Results) -> dict[str, dict[str, Any]]:
+    """Each engine's settings in its first scene, one line each."""
+    stamped = results.provenance.get("settings", {})
+    return {engine: next(iter(scenes.values())) for engine, scenes in stamped.items() if scenes}

@@ -1,0 +1,72 @@
+"""The run on a terminal: scene by scene, engines side by side."""
+
+import math
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from comparisons import METRICS, Results
+from reports.findings import failures, finding_sentences, verdict_sentence
+from reports.numbers import MARKS, bound, word, written
+
+NUMBER_WIDTH = 9  # as in -1.23e-04: a narrow terminal may fold the names, never a number
+STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diverged": "bold red", "timed_out": "bold red"}
+
+
+def print_table(results: Results, console: Console | None = None) -> None:
+    """Print a run at its finest step: every metric against truth, and the engines against each other."""
+    out = console or Console()
+    for name in results.scenes:
+        out.print(_scene_table(results, name))
+        _print_remarks(results, name, out)
+        out.print()
+    _print_failures(results, out)
+    for sentence in finding_sentences(results):
+        out.print(Text(sentence))
+    out.print(Text(verdict_sentence(results), style="bold"))
+
+
+def _scene_table(results: Results, name: str) -> Table:
+    frame = results.frame[results.frame["scene"] == name]
+    finest = frame[frame["dt"] == frame["dt"].min()]
+    own = finest[(finest["kind"] != "agreement") & (finest["metric"] != "")]
+    pairs = finest[finest["kind"] == "agreement"]
+    summary = results.scenes[name].summary
+    title = Text(name, style="bold").append(f"  {summary}" if summary else "", style="not bold")
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=20)
+    for engine in results.engines:
+        table.add_column(Text(engine), justify="right", min_width=NUMBER_WIDTH + 2)
+    if not pairs.empty:
+        table.add_column("apart by", justify="right", min_width=NUMBER_WIDTH)
+    for metric in own["metric"].unique():
+        unit = METRICS[metric].unit
+        cells: list[Text] = [Text(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))]
+        for engine in results.engines:
+            row = own[(own["metric"] == metric) & (own["engine"] == engine)]
+            cells.append(_cell(float(row["value"].iloc[0]), str(row["verdict"].iloc[0])) if len(row) else Text("–"))
+        if not pairs.empty:
+            apart = float(pairs.loc[pairs["metric"] == metric, "value"].abs().max())
+            cells.append(Text("" if math.isnan(apart) else written(apart)))
+        table.add_row(*cells)
+    return table
+
+
+def _cell(value: float, verdict: str) -> Text:
+    return Text(f"{written(value)} {MARKS[verdict]}", style=STYLES.get(verdict, ""))
+
+
+def _print_remarks(results: Results, name: str, out: Console) -> None:
+    frame = results.frame[(results.frame["scene"] == name) & (results.frame["metric"] == "")]
+    for row in frame.drop_duplicates(["engine", "verdict", "reason"]).to_dict("records"):
+        out.print(Text(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))
+
+
+def _print_failures(results: Results, out: Console) -> None:
+    for row in failures(results).to_dict("records"):
+        if row["metric"]:
+            told = f"{row['metric']} is {written(row['value'])}, expected {bound(row['lower'], row['upper'])}: {row['reason']}"
+            again = f"dropspin run {row['scene']} -e '{row['engine']}' --dt {row['dt']:g}"
+            out.print(Text(f"✗ {row['scene']} · {row['engine']} · {row['dt']:g} s: {told}. Again: {again}", style="red"))

@@ -57,7 +57,7 @@ def simulate(scene: Scenario, engine: str | Engine, dt: float, every: int = 1) -
 
 def run(
     scenes: Sequence[Scenario],
-    engines: Sequence[str],
+    engines: Sequence[str | Engine],
     dts: Sequence[float] = DEFAULT_DTS,
     progress: Progress = lambda done: None,
 ) -> Results:
@@ -65,7 +65,7 @@ def run(
 
     Args:
         scenes: The scenes; their names must differ.
-        engines: Names with options. One that is not installed is `missing` in the results, and the rest runs.
+        engines: Engines, or names with options. One that is not installed is `missing` in the results, and the rest runs.
         dts: Time steps [s].
         progress: Called with a short text after each of len(scenes) * len(engines) * len(dts) pieces of work.
 
@@ -127,11 +127,13 @@ class _Attempt:
     time_per_step: float = float("nan")
 
 
-def _contestant(name: str) -> _Contestant:
+def _contestant(chosen: str | Engine) -> _Contestant:
+    if isinstance(chosen, Engine):
+        return _Contestant(chosen.label, chosen)
     try:
-        created = engine_named(name)
+        created = engine_named(chosen)
     except EngineMissing as error:
-        return _Contestant(name.strip(), None, str(error))
+        return _Contestant(chosen.strip(), None, str(error))
     return _Contestant(created.label, created)
 
 

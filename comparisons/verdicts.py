@@ -48,7 +48,7 @@ def judge(scene: Scenario, engine: str, dt: float, metric: Metric, value: float)
         for expectation in scene.expect
         if expectation.metric == metric.name
         and expectation.engine in (None, engine)
-        and (expectation.dt is None or math.isclose(expectation.dt, dt, rel_tol=1e-9))
+        and (expectation.dt is None or any(math.isclose(step, dt, rel_tol=1e-9) for step in expectation.dt))
     ]
     if not matching:
         return Judgement(math.nan, math.nan, "measured", "")

@@ -215,7 +215,8 @@ def _description(scene: "Scenario") -> list[dict[str, str]]:
     for expectation in scene.expect:
         below, within, above = expectation.below, expectation.within, expectation.above
         limits = (-below, below) if below else within or (above, float("nan"))
-        who = " at ".join(filter(None, [expectation.engine, f"{expectation.dt:g} s" if expectation.dt else None])) or "all"
+        steps = ", ".join(f"{dt:g}" for dt in expectation.dt or ())
+        who = " at ".join(filter(None, [expectation.engine or "any engine", f"{steps} s" if steps else ""]))
         facts[f"expect {expectation.metric} ({who})"] = f"{bound(*limits)}: {expectation.reason}"
     return [{"what": key, "is": value} for key, value in facts.items() if value]
 

@@ -96,5 +96,6 @@ def finding_sentences(results: Results) -> list[str]:
                 f"from {steps[-1]:g} to {steps[0]:g} s: it is the model's, no step cures it."
             )
         elif total:
-            sentences.append(f"{engine}: in all {total} scenes every error above {NEGLIGIBLE:g} shrinks with the step.")
+            where = f"in all {total} scenes " if total > 1 else ""
+            sentences.append(f"{engine}: {where}every error above {NEGLIGIBLE:g} shrinks with the step.")
     return sentences

@@ -5,7 +5,7 @@ import math
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
 from scenarios.rotations import rotate
@@ -69,16 +69,21 @@ class Ensemble(Table):
 class Expectation(Table):
     """What a run is held to: one bound on one metric, for all engines and steps or for those named.
 
-    `below` bounds the size of the value, `above` and `within` the value with its sign.
+    `dt` names one step or several [s]. `below` bounds the size of the value, `above` and `within` the value with its sign.
     """
 
     metric: str
     engine: str | None = None
-    dt: Positive | None = None
+    dt: tuple[Positive, ...] | None = None
     below: Positive | None = None
     above: Number | None = None
     within: Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)] | None = None
     reason: Annotated[str, Field(min_length=1)]
+
+    @field_validator("dt", mode="before")
+    @classmethod
+    def _one_step_is_a_list_of_one(cls, dt: object) -> object:
+        return [dt] if isinstance(dt, float | int) else dt
 
     @model_validator(mode="after")
     def _one_bound(self) -> Self:

@@ -6,11 +6,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def cross(a: Array, b: Array) -> Array:
+    """A × b over the last axis; numpy.cross takes four times as long on the few vectors that root finding asks for."""
+    a, b = np.broadcast_arrays(a, b)
+    product = np.empty(a.shape)
+    product[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    product[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    product[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return product
+
+
 def multiply(a: Array, b: Array) -> Array:
     """The rotation by b, then by a; shapes (..., 4)."""
     av, aw = a[..., :3], a[..., 3:]
     bv, bw = b[..., :3], b[..., 3:]
-    vector = aw * bv + bw * av + np.cross(av, bv)
+    vector = aw * bv + bw * av + cross(av, bv)
     scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
     return np.concatenate([vector, scalar], axis=-1)
 
@@ -23,8 +33,8 @@ def conjugate(q: Array) -> Array:
 def rotate(q: Array, vectors: Array) -> Array:
     """Vectors in the world frame, (..., 3), of body-frame ones."""
     axis, w = q[..., :3], q[..., 3:]
-    twice = 2.0 * np.cross(axis, vectors)
-    return vectors + w * twice + np.cross(axis, twice)
+    twice = 2.0 * cross(axis, vectors)
+    return vectors + w * twice + cross(axis, twice)
 
 
 def unrotate(q: Array, vectors: Array) -> Array:
@@ -49,4 +59,4 @@ def angle_between_orientations(a: Array, b: Array) -> Array:
 
 def angle_between_vectors(a: Array, b: Array) -> Array:
     """The angle [rad] between vectors, (..., 3)."""
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+    return np.arctan2(np.linalg.norm(cross(a, b), axis=-1), np.sum(a * b, axis=-1))

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from importlib import metadata
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
@@ -12,6 +14,12 @@ from scenarios import Scenario
 from scenarios.errors import DropspinError, UnknownName
 
 Array = NDArray[np.float64]
+
+
+@cache
+def version(package: str) -> str:
+    """The installed version of a distribution; looked up once, because each look parses its metadata."""
+    return metadata.version(package)
 
 
 class EngineMissing(DropspinError):

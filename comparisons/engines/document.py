@@ -1,12 +1,11 @@
 """The engine `document`: the note, literally."""
 
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 import reference_impl
-from comparisons.engines.base import Array, AsBuilt, Engine, Simulation
+from comparisons.engines.base import Array, AsBuilt, Engine, Simulation, version
 from scenarios import Scenario
 from scenarios.body import Body, Box, Sphere, Vertices
 

@@ -7,13 +7,12 @@ a_ref = -b v - k r; with k = 0 and b = (1 + e) / dt, one step of a one-stage int
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
+from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, version
 from scenarios import Scenario
 from scenarios.body import Box, Sphere
 from scenarios.rotations import conjugate, rotate

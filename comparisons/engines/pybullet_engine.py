@@ -9,12 +9,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt, Engine, Simulation
+from comparisons.engines.base import Array, AsBuilt, Engine, Simulation, version
 from scenarios import Scenario
 from scenarios.body import Box, Sphere
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenarios.rotations import about, multiply, rotate, unrotate
+from scenarios.rotations import about, cross, multiply, rotate, unrotate
 from scenarios.truths.elliptic import Jacobi, argument, integral_of_sn2, jacobi, quarter_period
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> R
         angular_velocity: At t = 0, world frame [rad/s], shape (3,).
     """
     momentum = rotate(orientation, inertia @ unrotate(orientation, angular_velocity))
-    tilt = np.linalg.norm(np.cross(momentum, angular_velocity))
+    tilt = np.linalg.norm(cross(momentum, angular_velocity))
     if tilt <= 4e-16 * np.linalg.norm(momentum) * np.linalg.norm(angular_velocity):
         return principal_spin(orientation, angular_velocity)
     return AsymmetricTop(inertia, orientation, angular_velocity)
@@ -129,9 +129,9 @@ class AsymmetricTop:
         spins = np.column_stack([self._a * cn, self._b * sn, self._c * dn])
         along = spins * self._moments
         along /= np.linalg.norm(along, axis=1, keepdims=True)
-        first = np.cross(along, np.eye(3)[self._pole])
+        first = cross(along, np.eye(3)[self._pole])
         first /= np.linalg.norm(first, axis=1, keepdims=True)
-        return np.stack([first, np.cross(along, first), along], axis=2), spins
+        return np.stack([first, cross(along, first), along], axis=2), spins
 
 
 def _principal_axes(inertia: Array) -> tuple[Array, Array]:

@@ -82,8 +82,11 @@ def _validate(name: str, where: str, content: dict[str, Any]) -> Scenario:
         return Scenario.model_validate({"name": name, **content})
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        more = f" ({len(problems) - 1} more in this file)" if len(problems) > 1 else ""
-        raise SceneError(f"{where}: {_described(problems[0])}{more}") from None
+        # A key that takes a word or something else is reported once for each; the word is beside the point for a number.
+        telling = [problem for problem in problems if problem["type"] != "literal_error" or isinstance(problem["input"], str)]
+        others = len({_without_union_members(problem["loc"])[:2] for problem in problems}) - 1
+        more = f" ({others} more in this file)" if others else ""
+        raise SceneError(f"{where}: {_described((telling or problems)[0])}{more}") from None
 
 
 def _described(problem: Any) -> str:

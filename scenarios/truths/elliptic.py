@@ -13,6 +13,9 @@ from scipy.special import elliprf, elliprj
 Array = NDArray[np.float64]
 
 
+CONVERGED = 1e-8  # the arithmetic-geometric mean squares its error: one more mean reaches the last digit
+
+
 class Jacobi(NamedTuple):
     """sn, cn and dn at some arguments."""
 
@@ -24,23 +27,30 @@ class Jacobi(NamedTuple):
 def jacobi(u: Array, m1: float) -> Jacobi:
     """sn, cn and dn of u for the complementary parameter m₁ = 1 - k² in [0, 1].
 
-    By the descending Landen transformation (arithmetic-geometric mean).
+    By Gauss's transformation, on cn/sn rather than on the amplitude: the amplitude would lose half the digits where sn is
+    near 1, which is nearly everywhere on a motion near the separatrix.
 
-    Source: Abramowitz & Stegun (1964), 16.4 and 16.6; R. Bulirsch, Numer. Math. 7 (1965), for the use of m₁.
+    Source: R. Bulirsch, Numerische Mathematik 7 (1965), 78-90, procedure sncndn.
     """
     if m1 == 0.0:
         sech = 1.0 / np.cosh(u)
         return Jacobi(np.tanh(u), sech, sech)
     a, b = 1.0, math.sqrt(m1)
-    ratios: list[float] = []
-    while abs(a - b) > 1e-17 * a and len(ratios) < 60:
-        a, b, c = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)
-        ratios.append(c / a)
-    amplitude = (2.0 ** len(ratios)) * a * u
-    for ratio in reversed(ratios):
-        amplitude = 0.5 * (amplitude + np.arcsin(ratio * np.sin(amplitude)))
-    sn, cn = np.sin(amplitude), np.cos(amplitude)
-    return Jacobi(sn, cn, np.sqrt(m1 + (1.0 - m1) * cn * cn))
+    steps = [(a, b)]
+    while abs(a - b) > CONVERGED * a:
+        a, b = 0.5 * (a + b), math.sqrt(a * b)
+        steps.append((a, b))
+    mean = 0.5 * (a + b)
+    sine, cosine = np.sin(mean * u), np.cos(mean * u)
+    at_zero = sine == 0.0
+    ratio = cosine / np.where(at_zero, 1.0, sine)
+    c, dn = mean * ratio, np.ones_like(ratio)
+    for a, b in reversed(steps):
+        ratio, c = c * ratio, c * dn
+        dn = (b + ratio) / (a + ratio)
+        ratio = c / a
+    sn = np.copysign(1.0 / np.sqrt(c * c + 1.0), sine)
+    return Jacobi(np.where(at_zero, 0.0, sn), np.where(at_zero, cosine, c * sn), np.where(at_zero, 1.0, dn))
 
 
 def quarter_period(m1: float) -> float:

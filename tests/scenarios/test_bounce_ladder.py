@@ -1,0 +1,106 @@
+"""The bounce ladder against mpmath's event by event sums, and its limits."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios import load, truth_for
+
+
+def ball(restitution=0.5, height=1.0, g=9.8, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), duration=3.0, **floor):
+    return load(
+        {
+            "duration": duration,
+            "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0},
+            "start": {"position": [0.0, 0.1 + height, 0.0], "velocity": list(velocity), "angular_velocity": list(spin)},
+            "gravity": {"acceleration": [0.0, -g, 0.0]},
+            "floor": {"restitution": restitution, "friction": "none"} | floor,
+        }
+    )
+
+
+@pytest.mark.parametrize(("restitution", "zeno"), [(0.3, 0.838972), (0.5, 1.355262), (0.7, 2.559939), (0.9, 8.583325)])
+def test_zeno_time(restitution, zeno):
+    """The impacts pile up at t₀ + 2 u₀ e / (g (1 - e)); published to six decimals for a drop of 1 m."""
+    truth = truth_for(ball(restitution, duration=zeno + 0.01))
+    assert truth.events[-1].time == pytest.approx(zeno, abs=1e-6)
+    assert truth([zeno + 0.005]).position[0, 1] == pytest.approx(0.1, abs=1e-15)
+    assert truth([zeno + 0.005]).velocity[0, 1] == 0.0
+
+
+@given(st.floats(0.05, 1.0), st.floats(0.01, 20), st.floats(-3, 3))
+def test_against_mpmath(restitution, height, upward):
+    """Ten bounces summed one by one with 40 digits: times, speeds and apexes to 1e-13 relative."""
+    truth = truth_for(ball(restitution, height, velocity=(0.0, upward, 0.0), duration=20.0))
+    with mpmath.mp.workdps(40):
+        g, e = mpmath.mpf(9.8), mpmath.mpf(restitution)
+        lowest = mpmath.mpf(0.1 + height) - mpmath.mpf(0.1)
+        speed = mpmath.sqrt(mpmath.mpf(upward) ** 2 + 2 * g * lowest)
+        time = (mpmath.mpf(upward) + speed) / g
+        first = speed
+        for event in truth.events[:10]:
+            assert event.time == pytest.approx(float(time), rel=1e-13)
+            assert -event.before[8] == pytest.approx(float(speed), rel=1e-12)
+            speed *= e
+            if speed <= 1e-12 * first:
+                assert event.after[8] == 0.0  # counts as rest
+                break
+            assert event.after[8] == pytest.approx(float(speed), rel=1e-12)
+            half = time + speed / g
+            if half < 20:
+                apex = truth([float(half)]).position[0, 1]
+                assert apex == pytest.approx(0.1 + float(speed**2 / (2 * g)), rel=1e-12)
+            time += 2 * speed / g
+
+
+def test_elastic_ball_keeps_its_energy():
+    """At e = 1 every apex is the drop height, for as long as asked."""
+    truth = truth_for(ball(1.0, duration=100.0))
+    assert len(truth.events) == math.floor((100 + math.sqrt(2 / 9.8)) / (2 * math.sqrt(2 / 9.8)))
+    assert all(event.after[8] == pytest.approx(math.sqrt(19.6), rel=1e-13) for event in truth.events)
+
+
+def test_dead_ball_stays():
+    """At e = 0 there is one impact, and rest."""
+    truth = truth_for(ball(0.0))
+    assert len(truth.events) == 1
+    np.testing.assert_array_equal(truth([1.0, 2.0]).velocity, 0.0)
+
+
+def test_rest_speed_ends_the_ladder():
+    """Restitution is 0 from the first impact that is slower than rest_speed: u = 4.43, 2.21, 1.11, 0.55 m/s."""
+    truth = truth_for(ball(0.5, rest_speed=1.0))
+    assert [round(float(event.after[8]), 3) for event in truth.events] == [2.214, 1.107, 0.553, 0.0]
+
+
+def test_sideways_motion_and_spin_go_on():
+    """A smooth floor changes neither."""
+    truth = truth_for(ball(velocity=(2.0, 0.0, -1.0), spin=(0.0, 3.0, 4.0)))
+    end = truth([2.5])
+    np.testing.assert_allclose(end.position[0, [0, 2]], [5.0, -2.5], rtol=1e-15)
+    np.testing.assert_array_equal(end.angular_velocity[0], [0.0, 3.0, 4.0])
+
+
+def test_what_it_is_not_valid_for():
+    """A rough floor with sideways motion, a tilted box, damping, slanting gravity: no ladder."""
+    assert truth_for(ball(velocity=(1.0, 0.0, 0.0), friction="infinite")) is None
+    assert truth_for(ball(spin=(1.0, 0.0, 0.0), friction=0.3)) is None
+    assert truth_for(ball(friction="infinite")).name == "bounce-ladder"
+    box = ball().model_dump(exclude_none=True)
+    box["body"] = {"shape": "box", "mass": 1.0, "half_extents": [0.1, 0.1, 0.1]}
+    assert truth_for(load(box)).name == "bounce-ladder"
+    box["start"]["orientation"] = [0.0, 0.0, 0.1, 1.0]
+    assert truth_for(load(box)) is None  # lands on an edge: two corners at once
+    assert truth_for(load(ball().model_dump(exclude_none=True) | {"damping": {"linear": 0.1}})) is None
+
+
+def test_times_outside_are_refused():
+    """A truth does not guess."""
+    with pytest.raises(ValueError, match="holds for 0 <= t <= 3 s"):
+        truth_for(ball())([-0.1])
+    with pytest.raises(ValueError, match="holds for 0 <= t <= 3 s"):
+        truth_for(ball())([3.1])

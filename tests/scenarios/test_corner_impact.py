@@ -1,0 +1,124 @@
+"""The corner impact against published figures, its own laws, and mpmath."""
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from scenarios import load, truth_for
+from scenarios.mechanics import angular_momentum, energy, lowest_height
+from scenarios.model import Floor
+from scenarios.rotations import rotate
+from scenarios.truths.corner_impact import velocities_after
+
+UP = np.array([0.0, 1.0, 0.0])
+vectors = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
+
+
+def dropped_from_rest(friction):
+    return load(
+        {
+            "duration": 0.6,
+            "body": {"shape": "box", "half_extents": [0.25, 0.35, 0.5], "mass": 1.0, "inertia": "vertices"},
+            "start": {"position": [0.0, 1.5, 0.0], "orientation": [0.2, 0.1, -0.3, 0.9]},
+            "gravity": {"acceleration": [0.0, -9.8, 0.0]},
+            "floor": {"restitution": 0.5, "friction": friction},
+        }
+    )
+
+
+def test_published_figures():
+    """A box of corner masses dropped from rest: time and velocities after, to the six published decimals."""
+    [smooth] = truth_for(dropped_from_rest("none")).events
+    assert smooth.time == pytest.approx(0.426939, abs=5e-7)
+    np.testing.assert_allclose(smooth.after[7:10], [0, 1.084631, 0], rtol=0, atol=5e-7)
+    np.testing.assert_allclose(smooth.after[10:13], [-3.903102, -0.284375, 0.051236], rtol=0, atol=5e-7)
+    [rough] = truth_for(dropped_from_rest("infinite")).events
+    np.testing.assert_allclose(rough.after[7:10], [-0.038962, 1.558309, -1.253507], rtol=0, atol=5e-7)
+
+
+@pytest.mark.parametrize("name", ["drop-box-corner", "drop-box-sticking"])
+def test_laws_of_the_catalogue_scenes(name):
+    """What every single-corner impact keeps, to 1e-13: L about the corner, and what its friction law says."""
+    scene = load(name)
+    truth = truth_for(scene)
+    [impact] = truth.events
+    before, after = truth.states(np.array([impact.time]))[0], impact.after
+    np.testing.assert_allclose(before, impact.before, rtol=0, atol=1e-14)
+    offsets = rotate(impact.before[3:7], scene.body.vertices)
+    corner = offsets[np.argmin(offsets[:, 1])]
+    assert impact.before[1] + corner[1] == pytest.approx(0.0, abs=1e-14)
+
+    axes = rotate(impact.before[3:7], np.eye(3)).T
+    inertia = axes @ scene.body.inertia_tensor @ axes.T
+    kick = scene.body.mass * (after[7:10] - impact.before[7:10])
+    turn = inertia @ (after[10:13] - impact.before[10:13])
+    np.testing.assert_allclose(turn, np.cross(corner, kick), rtol=0, atol=1e-13 * np.linalg.norm(kick))
+    contact_before, contact_after = (s[7:10] + np.cross(s[10:13], corner) for s in (impact.before, after))
+    assert contact_after[1] == pytest.approx(-0.5 * contact_before[1], rel=1e-13)
+    if name == "drop-box-corner":
+        np.testing.assert_allclose(kick[[0, 2]], 0.0, rtol=0, atol=1e-13)
+    else:
+        np.testing.assert_allclose(contact_after[[0, 2]], 0.0, rtol=0, atol=1e-13)
+
+    t = np.linspace(0, scene.duration, 400)
+    motion = truth(t)
+    assert lowest_height(scene, motion).min() >= -1e-12  # no second impact before the end
+    flights = [t <= impact.time, t > impact.time]
+    for flight in flights:
+        assert np.ptp(energy(scene, motion)[flight]) <= 1e-12 * energy(scene, motion)[0]
+        L = angular_momentum(scene, motion)[flight]
+        assert np.abs(L - L[0]).max() <= 1e-12 * np.linalg.norm(L[0])
+    assert energy(scene, motion)[-1] < energy(scene, motion)[0]
+
+
+@given(vectors.filter(lambda r: r[1] < -0.1), vectors.filter(lambda v: v[1] < -0.1), vectors, st.floats(0, 1))
+def test_impulse_against_mpmath(corner, v, w, e):
+    """Both laws solved once more with 40 digits from eq 12 and the contact condition as one 9 x 9 system, to 1e-11."""
+    inertia, mass = np.diag([0.3, 0.5, 0.6]), 1.3
+    state = np.concatenate([[0, 1, 0], [0, 0, 0, 1], v, w])
+    approach = v + np.cross(w, corner)
+    for friction in ("none", "infinite"):
+        found = velocities_after(state, corner, mass, inertia, Floor(restitution=e, friction=friction))
+        with mpmath.mp.workdps(40):
+            A, b = mpmath.zeros(9), mpmath.zeros(9, 1)  # unknown: v⁺, ω⁺, j
+            rx = mpmath.matrix([[0, -corner[2], corner[1]], [corner[2], 0, -corner[0]], [-corner[1], corner[0], 0]])
+            for i in range(3):
+                A[i, i], A[i, 6 + i], b[i] = mass, -1, mass * mpmath.mpf(v[i])  # M v⁺ - j = M v
+                A[3 + i, 3 + i], b[3 + i] = inertia[i, i], inertia[i, i] * mpmath.mpf(w[i])  # I ω⁺ - r × j = I ω
+                for k in range(3):
+                    A[3 + i, 6 + k] = -rx[i, k]
+            rows = [1] if friction == "none" else [0, 1, 2]
+            for i in range(3):
+                if i in rows:  # (v⁺ + ω⁺ × r)_i = -e v_n N_i
+                    A[6 + i, i] = 1
+                    for k in range(3):
+                        A[6 + i, 3 + k] = -rx[i, k]
+                    b[6 + i] = -mpmath.mpf(e) * mpmath.mpf(approach[1]) if i == 1 else 0
+                else:  # no friction: j_i = 0
+                    A[6 + i, 6 + i] = 1
+            exact = [float(value) for value in mpmath.lu_solve(A, b)[:6]]
+        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11 * (1 + np.abs(exact).max()))
+
+
+def test_it_ends_with_the_second_impact():
+    """The horizon is where another corner comes down."""
+    scene = load("drop-box-corner").model_copy(update={"duration": 5.0})
+    truth = truth_for(scene)
+    assert 0.6 < truth.horizon < 0.8
+    heights = lowest_height(scene, truth(np.linspace(0, truth.horizon, 300)))
+    assert heights.min() >= -1e-12
+    assert heights[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_scenes_without_it():
+    """An edge that lands flat, a Coulomb floor, damping: no closed form here; a flight that ends in the air has one."""
+    content = dropped_from_rest("none").model_dump(exclude_none=True)
+    coulomb = content | {"floor": {"restitution": 0.5, "friction": 0.3}}
+    assert truth_for(load(coulomb)) is None
+    edge = content | {"start": {"position": [0, 1.5, 0], "orientation": [0.3, 0, 0, 1]}}
+    assert truth_for(load(edge)) is None
+    assert truth_for(load(content | {"damping": {"linear": 0.1}})) is None
+    assert truth_for(load(content | {"duration": 0.3})).events == ()

@@ -1,0 +1,90 @@
+"""Rotations, mass properties and mechanics against SciPy and by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+from scenarios import Trajectory, load, rotations
+from scenarios.mechanics import angular_momentum, energy, kinetic_energy, lowest_height
+
+quaternions = arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1).map(lambda q: q / np.linalg.norm(q))
+vectors = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
+
+
+@given(quaternions, quaternions, vectors)
+def test_rotations_are_scipys(p, q, v):
+    """Product, rotation and its inverse, to 1e-15 of the size."""
+    P, Q = Rotation.from_quat(p), Rotation.from_quat(q)
+    np.testing.assert_allclose(rotations.rotate(p, v), P.apply(v), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(rotations.unrotate(p, rotations.rotate(p, v)), v, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(rotations.rotate(rotations.multiply(p, q), v), (P * Q).apply(v), rtol=0, atol=1e-14)
+
+
+@given(quaternions, vectors.filter(lambda v: np.linalg.norm(v) > 0.1), st.floats(1e-12, 3.1))
+def test_a_planted_angle_is_measured(q, axis, angle):
+    """From 1e-12 rad to nearly pi, to 1e-15; and q and -q are one orientation."""
+    turned = rotations.multiply(rotations.about(axis / np.linalg.norm(axis), np.array(angle)), q)
+    assert rotations.angle_between_orientations(q, turned) == pytest.approx(angle, abs=3e-15)
+    assert rotations.angle_between_orientations(q, -turned) == pytest.approx(angle, abs=3e-15)
+    assert rotations.angle_between_orientations(q, -q) == 0.0
+
+
+def test_angle_between_vectors_resolves_small_and_straight_angles():
+    """The arc cosine would lose half the digits at both ends."""
+    x = np.array([1.0, 0.0, 0.0])
+    assert rotations.angle_between_vectors(x, np.array([1.0, 1e-12, 0.0])) == pytest.approx(1e-12, rel=1e-12)
+    assert rotations.angle_between_vectors(x, -x) == pytest.approx(np.pi)
+
+
+def body(**table):
+    return load({"duration": 1.0, "body": table}).body
+
+
+def test_inertia_in_words():
+    """Solid, corner masses, eq 8 as printed; a ball; a given tensor."""
+    box = {"shape": "box", "half_extents": [1.0, 2.0, 3.0], "mass": 6.0}
+    np.testing.assert_allclose(np.diag(body(**box).inertia_tensor), [26, 20, 10], rtol=1e-15)
+    np.testing.assert_allclose(np.diag(body(**box, inertia="vertices").inertia_tensor), [78, 60, 30], rtol=1e-15)
+    np.testing.assert_allclose(np.diag(body(**box, inertia="note").inertia_tensor), [104, 80, 40], rtol=1e-15)
+    np.testing.assert_allclose(np.diag(body(**box, inertia=[3, 4, 5]).inertia_tensor), [3, 4, 5], rtol=1e-15)
+    np.testing.assert_allclose(body(shape="sphere", radius=0.5, mass=2.0).inertia_tensor, 0.2 * np.eye(3), rtol=1e-15)
+
+
+def test_vertices_are_centred_on_their_masses():
+    """A dumb-bell of 1 and 3 kg, 4 m long, with a light cross bar: the centre is nearer to the heavy end."""
+    points = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [3.0, 1.0, 0.0], [3.0, -1.0, 0.0]]
+    found = body(shape="vertices", points=points, masses=[1.0, 3.0, 0.5, 0.5])
+    assert found.mass == 5.0
+    np.testing.assert_allclose(found.vertices[:, 0], [-3, 1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(found.inertia_tensor, np.diag([1.0, 12.0, 13.0]), atol=1e-14)
+    assert found.resting_height == 0.0
+
+
+def test_resting_height_of_a_solid_set_of_vertices():
+    """The corners of a box rest as the box does."""
+    corners = [[x, y, z] for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]
+    assert body(shape="vertices", points=corners, mass=1.0).resting_height == pytest.approx(1.0, rel=1e-12)
+
+
+def test_energy_momentum_and_height_by_hand():
+    """A box of 2 kg moving at 3 m/s and turning at 4 rad/s about its y axis, 5 m up."""
+    scene = load("drop-box-flat").model_copy(update={})
+    states = np.array([[0, 5, 0, 0, 0, 0, 1, 3, 0, 0, 0, 4, 0]], dtype=float)
+    motion = Trajectory.from_states(np.zeros(1), states)
+    about_y = (0.1**2 + 0.25**2) / 3
+    assert kinetic_energy(scene, motion)[0] == pytest.approx(0.5 * 9 + 0.5 * about_y * 16, rel=1e-15)
+    np.testing.assert_allclose(angular_momentum(scene, motion)[0], [0, 4 * about_y, 0], atol=1e-16)
+    assert energy(scene, motion)[0] == pytest.approx(0.5 * 9 + 0.5 * about_y * 16 + 9.8 * (5 - 0.1), rel=1e-15)
+    assert lowest_height(scene, motion)[0] == pytest.approx(5 - 0.15, rel=1e-15)
+
+
+def test_lag_is_half_a_step_of_power():
+    """Synchronised energy adds lag M g·v."""
+    scene = load("drop-ball")
+    states = np.array([[0, 1, 0, 0, 0, 0, 1, 0, -2, 0, 0, 0, 0]], dtype=float)
+    motion = Trajectory.from_states(np.zeros(1), states, velocity_lag=0.01)
+    raw, synchronised = (energy(scene, motion, flag)[0] for flag in (False, True))
+    assert synchronised - raw == pytest.approx(0.01 * 9.8 * 2, rel=1e-12)

@@ -1,0 +1,114 @@
+"""Loading: good scenes come through unchanged, bad ones get one line that says where, what was given and what is allowed."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenarios
+from scenarios import SceneError, load
+
+MALFORMED = sorted((Path(__file__).parent / "malformed").glob("*.toml"))
+BALL = {"duration": 1.0, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}}
+
+
+def test_there_are_enough_malformed_files():
+    """A glob that finds nothing would test nothing."""
+    assert len(MALFORMED) >= 30
+
+
+@pytest.mark.parametrize("path", MALFORMED, ids=lambda path: path.stem)
+def test_malformed_file(path):
+    """Each file says in its first lines what its error must say; the error is one line that starts with the file."""
+    expected = re.findall(r"^# says: (.*)$", path.read_bytes().decode("latin-1"), flags=re.MULTILINE)
+    assert expected
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    for part in expected:
+        assert part in message
+
+
+def test_files_that_are_no_files(tmp_path):
+    """Missing, a directory, far too large, nested too deeply."""
+    with pytest.raises(SceneError, match=r"absent\.toml: No such file or directory; give the path"):
+        load(tmp_path / "absent.toml")
+    with pytest.raises(SceneError, match="is a directory; a scene is one TOML file"):
+        load(tmp_path)
+    huge = tmp_path / "huge.toml"
+    with huge.open("wb") as file:
+        file.truncate(100_000_000)
+    with pytest.raises(SceneError, match=r"huge\.toml: 100,000,000 bytes; a scene file has at most 1,000,000"):
+        load(huge)
+    deep = tmp_path / "deep.toml"
+    deep.write_text("a = " + "[" * 5000 + "]" * 5000)
+    with pytest.raises(SceneError, match=r"deep\.toml: "):
+        load(deep)
+
+
+def test_did_you_mean():
+    """A slip in a name gets the nearest one, and the list."""
+    with pytest.raises(SceneError, match=r"'drop-bal' is not in the catalogue.*Did you mean 'drop-ball'\?.*spin-principal"):
+        load("drop-bal")
+
+
+@pytest.mark.parametrize("name", scenarios.names())
+def test_catalogue(name):
+    """Every scene says where it is from, has a truth, and gives each expectation's measured value in its reason."""
+    scene = load(name)
+    assert scene.name == name
+    assert scene.summary
+    assert scene.source
+    assert scenarios.truth_for(scene) is not None
+    assert scene.expect
+    for expectation in scene.expect:
+        assert "measured" in expectation.reason
+
+
+def test_defaults_and_absent_tables():
+    """Origin, identity, at rest; nothing that is not in the file is modelled."""
+    scene = load(BALL)
+    np.testing.assert_array_equal(scene.initial_state, [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0])
+    assert (scene.gravity, scene.floor, scene.damping, scene.ensemble) == (None, None, None, None)
+    assert load(BALL | {"floor": {"restitution": 1, "friction": 0}, "start": {"position": [0, 1, 0]}}).floor.friction == "none"
+
+
+def test_orientation_is_normalised_once():
+    """Any length will do; a unit quaternion keeps its last digit, so that a saved scene loads as it was."""
+    scene = load(BALL | {"start": {"orientation": [0.2, 0.1, -0.3, 0.9]}})
+    assert math.hypot(*scene.start.orientation) == pytest.approx(1.0, abs=2e-16)
+    again = load(scene.model_dump(exclude_none=True))
+    assert again.start.orientation == scene.start.orientation
+    assert again.digest == scene.digest
+
+
+def test_digest_is_of_the_physics():
+    """Text and expectations do not change it; a number does."""
+    scene = load("drop-ball")
+    assert scene.model_copy(update={"summary": "x", "expect": ()}).digest == scene.digest
+    assert scene.model_copy(update={"duration": 1.6}).digest != scene.digest
+
+
+def test_steps_do_not_lose_the_last_to_rounding():
+    """1.5 / 0.001 is 1500 steps, 0.3 / 0.1 is 3."""
+    assert load("drop-ball").steps(1e-3) == 1500
+    assert load(BALL | {"duration": 0.3}).steps(0.1) == 3
+
+
+def test_a_name_from_the_mapping():
+    """A mapping may carry the name that a file would have; no name will do too."""
+    assert load(BALL | {"name": "mine"}).name == "mine"
+    assert load(BALL).name == "scene"
+
+
+def test_a_file_beside_a_catalogue_name_needs_a_path(tmp_path, monkeypatch):
+    """A bare name is the catalogue's; a path is a path."""
+    monkeypatch.chdir(tmp_path)
+    Path("drop-ball.toml").write_text('duration = 9.0\n[body]\nshape = "sphere"\nradius = 1.0\nmass = 1.0\n')
+    assert load("drop-ball").duration == 1.5
+    assert load("drop-ball.toml").duration == 9.0
+    assert load(Path("drop-ball.toml")).duration == 9.0

@@ -80,7 +80,7 @@ def run(scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...
     """
     import comparisons
     import reports
-    from reports.write import assert_replaceable
+    from reports.folder import assert_replaceable
 
     assert_replaceable(output)
     loaded = [_load(name) for name in scenes] if scenes else _core_catalogue()

@@ -92,7 +92,7 @@ def _validate(name: str, where: str, content: dict[str, Any]) -> Scenario:
 def _described(problem: Any) -> str:
     """One pydantic problem as 'key: got value; what is allowed'."""
     location = _without_union_members(problem["loc"])
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".") or "scene"
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
     given = _shown(problem["input"])
     kind = problem["type"]
     if kind == "extra_forbidden":
@@ -105,14 +105,18 @@ def _described(problem: Any) -> str:
         return f"{key}.shape: missing; must be one of {', '.join(map(repr, SHAPES))}."
     if kind == "union_tag_invalid":
         return f"{key}.shape: got {_shown(problem['input']['shape'])}; must be one of {', '.join(map(repr, SHAPES))}."
+    if kind == "value_error" and isinstance(problem["input"], dict):  # a whole table: the text itself names keys and values
+        return f"{key}: {problem['ctx']['error']}.".removeprefix(": ")
     if kind == "value_error":
         return f"{key}: got {given}; {problem['ctx']['error']}."
     if kind in ("too_short", "too_long"):
         bound = problem["ctx"].get("min_length") if kind == "too_short" else problem["ctx"]["max_length"]
         wanted = f"must have {'at least' if kind == 'too_short' else 'at most'} {bound} entries"
         return f"{key}: got {given}; {wanted}, has {problem['ctx']['actual_length']}."
+    if kind in {"model_type", "model_attributes_type"}:
+        return f"{key}: got {given}; must be a table, such as [{key}] with its keys below."
     message = problem["msg"].replace("Input should be", "must be").replace("valid ", "")
-    return f"{key}: got {given}; {message}{_alternatives(location)}."
+    return f"{key}: got {given}; {message}{_alternatives(location, kind)}."
 
 
 def _without_union_members(location: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -125,11 +129,11 @@ def _without_union_members(location: tuple[Any, ...]) -> tuple[Any, ...]:
     )
 
 
-def _alternatives(location: tuple[Any, ...]) -> str:
-    """What else a key takes, where pydantic reports on the first alternative alone."""
-    if location[-2:] == ("floor", "friction"):
-        return ", 'infinite', or a Coulomb coefficient of 0 or more"
-    if location[-2:] == ("body", "inertia"):
+def _alternatives(location: tuple[Any, ...], kind: str) -> str:
+    """What else a key takes, where pydantic reports on one alternative alone."""
+    if location == ("floor", "friction"):
+        return ", or a Coulomb coefficient of 0 or more" if kind == "literal_error" else ", or be 'none' or 'infinite'"
+    if location == ("body", "inertia"):
         return ", or three positive moments [Ixx, Iyy, Izz]"
     return ""
 

@@ -116,7 +116,8 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _starts_above_the_floor(self) -> Self:
         if self.floor is not None and self.clearance < -1e-9 * self.body.size:
-            raise ValueError(f"the body starts {-self.clearance:.3g} m below the floor; raise start.position")
+            start = list(self.start.position)
+            raise ValueError(f"start.position: got {start}; there the body is {-self.clearance:.3g} m below the floor; raise it")
         return self
 
     @property

@@ -136,7 +136,8 @@ def test_interpreted_python_gives_the_same_bits():
         "h = np.array([.1, .2, .3]); p = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * h\n"
         "b = r.Body(1.0, r.solid_box_inertia(1.0, h), p)\n"
         "s = np.array([0, .5, 0, .1, .2, .3, .9, .4, -1, .2, 3, 2, 1]); s[3:7] /= np.linalg.norm(s[3:7])\n"
-        "rows = [r.simulate(s, b, r.World(np.array([0, -9.8, 0]), r.Floor(.5, k, .01), (.1, .2)), 1e-3, 900) for k in (False, True)]\n"
+        "worlds = [r.World(np.array([0, -9.8, 0]), r.Floor(.5, k, .01), (.1, .2)) for k in (False, True)]\n"
+        "rows = [r.simulate(s, b, world, 1e-3, 900) for world in worlds]\n"
         "sys.stdout.write(np.array(rows).tobytes().hex())\n"
     )
     outputs = [

@@ -88,11 +88,11 @@ orientations = (
 def test_invariants(inertia, spin, start):
     """Angular momentum in space and energy stay to 1e-12, at the start to the last digits."""
     assume(np.linalg.norm(spin) > 1e-3)
-    I = np.diag(inertia)
+    tensor = np.diag(inertia)
     w0 = rotate(start, spin)
-    orientation, w = free_rotor(I, start, w0)(np.linspace(0, 50, 101))
-    L = rotate(orientation, unrotate(orientation, w) @ I)
-    L0 = rotate(start, I @ spin)
+    orientation, w = free_rotor(tensor, start, w0)(np.linspace(0, 50, 101))
+    L = rotate(orientation, unrotate(orientation, w) @ tensor)
+    L0 = rotate(start, tensor @ spin)
     np.testing.assert_allclose(L, np.broadcast_to(L0, L.shape), rtol=0, atol=1e-12 * np.linalg.norm(L0))
     energy = np.sum(L * w, axis=1)
     np.testing.assert_allclose(energy, energy[0], rtol=1e-12)
@@ -106,12 +106,12 @@ def test_it_can_be_continued_from_any_time(inertia, spin, start, pause):
     assume(np.linalg.norm(spin) > 1e-2)
     # Near the separatrix a rounding of the restart grows exponentially; that is the body's doing, not the formula's.
     ordered = np.argsort(inertia)
-    I = np.diag(inertia)
-    beyond = abs((I @ spin) @ (I @ spin) - 2 * 0.5 * spin @ I @ spin * inertia[ordered[1]])
-    assume(beyond > 0.05 * (I @ spin) @ (I @ spin))
-    first = free_rotor(I, start, rotate(start, spin))
+    tensor = np.diag(inertia)
+    beyond = abs((tensor @ spin) @ (tensor @ spin) - 2 * 0.5 * spin @ tensor @ spin * inertia[ordered[1]])
+    assume(beyond > 0.05 * (tensor @ spin) @ (tensor @ spin))
+    first = free_rotor(tensor, start, rotate(start, spin))
     q, w = first(np.array([pause, pause + 3.0]))
-    again, _ = free_rotor(I, q[0], w[0])(np.array([3.0]))
+    again, _ = free_rotor(tensor, q[0], w[0])(np.array([3.0]))
     assert angle_between_orientations(again[0], q[1]) <= 1e-10
 
 

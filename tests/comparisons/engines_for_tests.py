@@ -1,0 +1,107 @@
+"""Engines made for tests: the exact motion, sampled, and the same with one fault each."""
+
+import numpy as np
+
+from comparisons import Diverged, Engine, Simulation
+from scenarios import truth_for
+from scenarios.rotations import multiply
+
+
+class ExactSimulation(Simulation):
+    """Samples the truth."""
+
+    def __init__(self, scene, dt, distort=None):
+        self._truth, self._dt, self._step, self._distort = truth_for(scene), dt, 0, distort
+        self.settings = {"made": "for tests"}
+
+    def advance(self, steps):
+        self._step += steps
+
+    def state(self):
+        exact = self._truth([min(self._step * self._dt, self._truth.horizon)]).states[0]
+        if self._distort is None or self._step == 0:
+            return exact
+        return self._distort(exact, self._step * self._dt)
+
+
+class Exact(Engine):
+    """No error at all."""
+
+    name = "exact"
+    order = float("inf")
+    distort = None
+
+    def prepare(self, scene, dt):
+        return ExactSimulation(scene, dt, type(self).distort)
+
+
+def engine_with(name, distort):
+    """The exact engine, with each state after the start passed through `distort(state, time)`."""
+    return type("Distorted", (Exact,), {"name": name, "distort": staticmethod(distort), "__doc__": name})()
+
+
+def nan_after_half_a_second(state, time):
+    return state * np.nan if time > 0.5 else state
+
+
+def turned_by(angle):
+    """An attitude that is wrong by a fixed angle."""
+
+    def distort(state, time):
+        state = state.copy()
+        state[3:7] = multiply(np.array([np.sin(angle / 2), 0, 0, np.cos(angle / 2)]), state[3:7])
+        return state
+
+    return distort
+
+
+class Crashing(Exact):
+    """Raises on the way."""
+
+    name = "crashing"
+
+    def prepare(self, scene, dt):
+        raise RuntimeError("no such thing as a floor")
+
+
+class GivingUp(Exact):
+    """Says that it diverged."""
+
+    name = "giving-up"
+
+    def prepare(self, scene, dt):
+        raise Diverged("step 3: a number beyond 1e10")
+
+
+class Declining(Exact):
+    """Will not."""
+
+    name = "declining"
+
+    def declines(self, scene):
+        return "I do not bounce"
+
+
+class HeavyInertia(Exact):
+    """Simulates another body than it was given, and says so when asked."""
+
+    name = "heavy-inertia"
+
+    def prepare(self, scene, dt):
+        from comparisons import AsBuilt
+
+        simulation = ExactSimulation(scene, dt)
+        body = scene.body
+        simulation.as_built = lambda: AsBuilt(body.mass, body.inertia_tensor * (1 + 1e-13), scene.acceleration)
+        return simulation
+
+
+class WrongStart(Exact):
+    """Starts one part in 1e13 too high."""
+
+    name = "wrong-start"
+
+    def prepare(self, scene, dt):
+        state = scene.initial_state
+        state[1] *= 1 + 1e-13
+        return ExactSimulation(scene.starting_at(state), dt)

@@ -1,0 +1,173 @@
+"""Every engine on every scene: built as meant, uniform, repeatable, and leaving nothing behind."""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+import scenarios
+from comparisons import EngineMissing, engine, engine_names, simulate
+from comparisons.building import assert_built_as_meant
+from scenarios import DropspinError, UnknownName
+
+ENGINES = ["document", "mujoco", "mujoco[integrator=rk4]", "mujoco[integrator=implicitfast]", "pybullet"]
+CASES = list(product(ENGINES, scenarios.names()))
+
+
+@pytest.mark.parametrize(("name", "scene_name"), CASES)
+def test_contract(name, scene_name):
+    """State, mass, inertia and gravity to 8 ulp; shapes; finite; advance and record take the same steps, bit for bit."""
+    chosen, scene = engine(name), scenarios.load(scene_name)
+    refusal = chosen.declines(scene)
+    if refusal is not None:
+        assert name == "mujoco[integrator=rk4]"
+        assert scene.floor is not None
+        return
+    dt = 2e-3
+    with chosen.prepare(scene, dt) as simulation:
+        assert_built_as_meant(chosen, scene, simulation)
+        assert simulation.as_built() is not None
+        rows = simulation.record(60, every=3)
+        assert rows.shape == (21, 13)
+        assert np.isfinite(rows).all()
+        np.testing.assert_array_equal(rows[-1], simulation.state())
+    with chosen.prepare(scene, dt) as simulation:
+        one_by_one = [simulation.state()]
+        for _ in range(20):
+            simulation.advance(3)
+            one_by_one.append(simulation.state())
+    np.testing.assert_array_equal(rows, one_by_one)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_no_state_is_left_in_the_process(name):
+    """A, B, A: a scene gives the same bits whatever ran before it, and while another simulation is open."""
+    a, b = scenarios.load("spin-asymmetric"), scenarios.load("spin-dzhanibekov")
+    if engine(name).declines(scenarios.load("drop-ball")) is None:
+        a, b = scenarios.load("drop-box-corner"), scenarios.load("drop-ball")
+    first = simulate(a, name, 2e-3)
+    with engine(name).prepare(b, 1e-3) as other:
+        other.advance(100)
+        second = simulate(a, name, 2e-3)
+    np.testing.assert_array_equal(first.states, second.states)
+    np.testing.assert_array_equal(simulate(a, name, 2e-3).states, first.states)
+
+
+def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
+    """MuJoCo logs its warnings to a file unless told otherwise; a diverging run must say so instead."""
+    from comparisons import Diverged
+
+    monkeypatch.chdir(tmp_path)
+    wild = {
+        "duration": 10.0,
+        "body": {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0},
+        "start": {"angular_velocity": [300.0, 1000.0, 200.0]},
+    }
+    with pytest.raises(Diverged, match=r"BADQVEL|BADQACC|BADQPOS"):
+        simulate(scenarios.load(wild), "mujoco", 5e-3)
+    assert list(tmp_path.iterdir()) == []
+
+
+def rotation_energy(name, steps=500):
+    """E/E₀ of MuJoCo's own free-body test after 5 s: half extents .1 .2 .3, 1 kg, ω₀ = (1, 2, 3), dt .01."""
+    from scenarios.mechanics import kinetic_energy
+
+    scene = scenarios.load(
+        {
+            "duration": steps * 0.01,
+            "body": {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0},
+            "start": {"angular_velocity": [1.0, 2.0, 3.0]},
+        }
+    )
+    energies = kinetic_energy(scene, simulate(scene, name, 0.01))
+    return energies[-1] / energies[0]
+
+
+def test_published_free_body_energies():
+    """Euler 1.0868946 in any version; RK4 1 - 2e-10; implicitfast .9260 from MuJoCo 3.11 on."""
+    assert rotation_energy("mujoco") == pytest.approx(1.0868946, abs=5e-8)
+    assert rotation_energy("mujoco[integrator=rk4]") == pytest.approx(1.0, abs=1e-9)
+    import mujoco
+
+    if tuple(map(int, mujoco.__version__.split(".")[:2])) >= (3, 11):
+        assert rotation_energy("mujoco[integrator=implicitfast]") == pytest.approx(0.9260, abs=5e-5)
+    assert rotation_energy("pybullet") == pytest.approx(0.9260, abs=5e-4)  # the same discretisation
+
+
+# Velocity ratio of a ball dropped from 1 m, at 1/60, 1/240, 1/1000 and 1/4000 s: v+ = e v- at any step.
+@pytest.mark.parametrize("name", ["mujoco", "pybullet"])
+@pytest.mark.parametrize(("restitution", "dt"), list(product([0.0, 0.3, 0.5, 0.8, 0.95], [1 / 60, 1 / 240, 1 / 1000, 1 / 4000])))
+def test_restitution_of_calibrated_engines(name, restitution, dt):
+    """Within 1e-4 at every step (measured: MuJoCo 4e-6 at 1/60 s, its impedance; PyBullet 1e-16)."""
+    from comparisons import measure
+
+    scene = scenarios.load("drop-ball")
+    scene = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": restitution}), "duration": 1.0})
+    assert abs(measure(scene, simulate(scene, name, dt))["restitution_error"]) <= 1e-4
+
+
+def box_in_flight():
+    return {
+        "duration": 1.0,
+        "body": {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 2.0},
+        "start": {"velocity": [3.0, 2.0, 1.0], "angular_velocity": [0.0, 0.5, 0.0]},
+        "damping": {"linear": 0.7, "angular": 1.3},
+    }
+
+
+@pytest.mark.parametrize(("name", "tolerance"), [("document", 1e-12), ("pybullet", 1e-12), ("mujoco", 1e-3)])
+def test_damping_decays_exponentially(name, tolerance):
+    """v(1 s) = v₀ exp(-rate); MuJoCo damps implicitly, hence to first order in dt = 1 ms (measured 2.5e-4, 8e-4)."""
+    motion = simulate(scenarios.load(box_in_flight()), name, 1e-3)
+    np.testing.assert_allclose(motion.velocity[-1], np.array([3, 2, 1]) * math.exp(-0.7), rtol=tolerance)
+    np.testing.assert_allclose(motion.angular_velocity[-1], [0, 0.5 * math.exp(-1.3), 0], rtol=tolerance, atol=1e-15)
+
+
+def test_inertia_off_the_axes():
+    """MuJoCo takes a skew tensor and reads back the same; PyBullet says that it cannot."""
+    skew = {"shape": "vertices", "points": [[0, 0, 0], [1, 0.2, 0], [0.1, 1, 0], [0, 0.3, 1]], "mass": 2.0}
+    scene = scenarios.load({"duration": 1.0, "body": skew, "start": {"angular_velocity": [1, 2, 3]}})
+    assert "principal axes" in engine("pybullet").declines(scene)
+    exact = scenarios.truth_for(scene)([1.0])
+    motion = simulate(scene, "mujoco[integrator=rk4]", 1e-3)
+    np.testing.assert_allclose(motion.angular_velocity[-1], exact.angular_velocity[0], rtol=0, atol=1e-11)
+
+
+def test_engines_say_what_they_cannot():
+    """Coulomb friction, a rest speed, vertices on a floor: declined with a reason, and simulate says so."""
+    ball = scenarios.load("drop-ball")
+    coulomb = ball.model_copy(update={"floor": ball.floor.model_copy(update={"friction": 0.3})})
+    slow = ball.model_copy(update={"floor": ball.floor.model_copy(update={"rest_speed": 0.1})})
+    assert "Coulomb" in engine("document").declines(coulomb)
+    assert "friction" in engine("mujoco").declines(coulomb)
+    assert engine("pybullet").declines(coulomb) is None
+    assert "rest_speed" in engine("mujoco").declines(slow)
+    assert engine("pybullet").declines(slow) is None
+    with pytest.raises(DropspinError, match="document declines drop-ball: the note has no law"):
+        simulate(coulomb, "document", 1e-3)
+
+
+def test_names_with_options():
+    """The canonical form sorts options and leaves defaults out; slips are named."""
+    assert engine("mujoco[integrator=euler]").label == "mujoco"
+    assert engine(" mujoco[ integrator = rk4 ]").label == "mujoco[integrator=rk4]"
+    assert engine_names() == ["document", "mujoco", "pybullet"]
+    with pytest.raises(UnknownName, match=r"engine 'mujco' is unknown\. Did you mean 'mujoco'"):
+        engine("mujco")
+    with pytest.raises(UnknownName, match=r"option of engine 'mujoco' 'integrater' is unknown\. Did you mean 'integrator'"):
+        engine("mujoco[integrater=rk4]")
+    with pytest.raises(UnknownName, match=r"value of integrator for engine 'mujoco' 'rk5' is unknown\. Did you mean 'rk4'"):
+        engine("mujoco[integrator=rk5]")
+    for bad in ("mujoco[rk4]", "mujoco[integrator=rk4", "", "a b"):
+        with pytest.raises(DropspinError):
+            engine(bad)
+
+
+def test_missing_engine_says_how_to_install_it(monkeypatch):
+    """No pybullet: a sentence, not a traceback."""
+    from comparisons.engines import registry
+
+    monkeypatch.setattr(registry, "find_spec", lambda package: None)
+    with pytest.raises(EngineMissing, match=r"pybullet is not installed: pip install pybullet \(it has wheels"):
+        engine("pybullet")

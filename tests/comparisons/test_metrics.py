@@ -1,0 +1,154 @@
+"""Metrics on motions made up for the purpose: nothing for the truth itself, and exactly what was planted otherwise."""
+
+import numpy as np
+import pytest
+
+import scenarios
+from comparisons import METRICS, measure
+from comparisons.comparison import Comparison, Unresolved
+from scenarios import Trajectory, truth_for
+from scenarios.rotations import about, multiply
+
+DT = 1e-3
+
+
+def exact_motion(name, dt=DT, **changes):
+    scene = scenarios.load(name)
+    motion = truth_for(scene)(dt * np.arange(scene.steps(dt) + 1))
+    return scene, Trajectory(**{field: changes.get(field, getattr(motion, field)) for field in motion.__dataclass_fields__})
+
+
+@pytest.mark.parametrize("name", scenarios.names())
+def test_the_truth_has_no_error(name):
+    """Every metric of the truth itself is 0, to 1e-12 of its scale; restitution to the speed that one step adds."""
+    scene, motion = exact_motion(name)
+    for metric, value in measure(scene, motion).items():
+        # Sampled rows are up to a step away from the impact: g dt / u.
+        allowed = 2.5 * 9.8 * DT / 4 if metric == "restitution_error" else 1e-12
+        assert abs(value) <= allowed, (metric, value)
+
+
+def test_every_metric_is_used_by_the_catalogue():
+    """A metric that no scene has is not tested by the line above."""
+    used = set()
+    for name in scenarios.names():
+        used |= set(measure(*exact_motion(name)))
+    assert used == set(METRICS)
+
+
+@pytest.mark.parametrize("planted", [1e-12, 1e-6, 0.1])
+def test_planted_attitude(planted):
+    """A constant error of attitude is measured as itself, whatever the sign of the quaternion."""
+    scene, motion = exact_motion("spin-asymmetric")
+    turned = multiply(about(np.array([0.0, 0.6, 0.8]), np.array(planted))[None], motion.orientation)
+    for sign in (1, -1):
+        found = measure(scene, exact_motion("spin-asymmetric", orientation=sign * turned)[1])
+        assert found["orientation_error"] == pytest.approx(planted, rel=1e-3, abs=2e-15)
+
+
+def test_planted_position_energy_and_momentum():
+    """1e-9 m aside; 1e-6 more spin makes 1e-6 more L and 2e-6 more energy, with its sign."""
+    scene, motion = exact_motion("spin-asymmetric")
+    aside = exact_motion("spin-asymmetric", position=motion.position + np.array([0, 0, 1e-9]))[1]
+    assert measure(scene, aside)["position_error"] == pytest.approx(1e-9, rel=1e-6)
+    for sign in (1, -1):
+        faster = exact_motion("spin-asymmetric", angular_velocity=motion.angular_velocity * (1 + sign * 1e-6))[1]
+        found = measure(scene, faster)
+        assert found["angular_momentum_error"] == pytest.approx(1e-6, rel=1e-5)
+        assert found["angular_momentum_direction_error"] <= 1e-12
+        assert found["energy_error"] == pytest.approx(sign * 2e-6, rel=1e-5)
+
+
+def test_planted_direction_of_momentum():
+    """ω turned by 1e-7 about an axis square to L turns L by as much, for a ball."""
+    scene = scenarios.load(
+        {
+            "duration": 1.0,
+            "body": {"shape": "sphere", "radius": 1.0, "mass": 1.0},
+            "start": {"angular_velocity": [0.0, 3.0, 0.0]},
+        }
+    )
+    motion = truth_for(scene)(DT * np.arange(1001))
+    w = motion.angular_velocity @ np.array([[1, 0, 0], [1e-7, 1, 0], [0, 0, 1]])
+    turned = Trajectory(motion.t, motion.position, motion.orientation, motion.velocity, w)
+    assert measure(scene, turned)["angular_momentum_direction_error"] == pytest.approx(1e-7, rel=1e-6)
+
+
+def test_planted_restitution():
+    """A ball that bounces as with e = 0.51: bounce height e'² - e², restitution error 0.01, both positive."""
+    scene = scenarios.load("drop-ball")
+    lively = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": 0.51})})
+    motion = truth_for(lively)(DT * np.arange(scene.steps(DT) + 1))
+    found = measure(scene, motion)
+    assert found["bounce_height_error"] == pytest.approx(0.51**2 - 0.25, rel=1e-9)
+    assert found["restitution_error"] == pytest.approx(0.01, abs=2.5e-3)
+    assert found["energy_error"] == pytest.approx(0.51**2 - 0.25, rel=1e-9)
+
+
+def test_a_body_that_does_not_bounce_fails_where_the_truth_bounces():
+    """No flight of its own is needed to be found wanting."""
+    scene = scenarios.load("drop-ball")
+    dead = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": 0.0})})
+    found = measure(scene, truth_for(dead)(DT * np.arange(1501)))
+    assert found["bounce_height_error"] == pytest.approx(-0.25, rel=1e-9)
+    assert found["energy_error"] == pytest.approx(-0.25, rel=1e-9)
+    assert found["restitution_error"] == pytest.approx(-0.5, abs=2.5e-3)
+
+
+def test_a_body_that_falls_through_fails():
+    """No impact at all: restitution is not a number, depth is what it is, and the energy looks fine before the impact only."""
+    scene, _ = exact_motion("drop-ball")
+    t = DT * np.arange(1501)
+    free = scene.model_copy(update={"floor": None})
+    found = measure(scene, truth_for(free)(t))
+    assert np.isnan(found["restitution_error"])
+    assert found["penetration"] == pytest.approx(9.8 * 1.5**2 / 2 - 1.0, rel=1e-9)
+    assert found["energy_error"] == pytest.approx(1.0, rel=1e-9)  # when the truth has come to rest
+
+
+def test_staggered_velocity():
+    """Semi-implicit Euler's free fall: synchronised energy to 1e-13, raw energy off by -M g² h t/2 over M g H."""
+    scene = scenarios.load("drop-ball").model_copy(update={"floor": None, "duration": 0.4})
+    h, n = 1e-3, np.arange(401)
+    states = np.zeros((401, 13))
+    states[:, 1] = 1.1 - 9.8 * h**2 * n * (n + 1) / 2
+    states[:, 6] = 1.0
+    states[:, 8] = -9.8 * h * n
+    found = measure(scene, Trajectory.from_states(h * n, states, velocity_lag=h / 2))
+    scale = 0.5 * (9.8 * 0.4) ** 2
+    assert abs(found["energy_error"]) <= 1e-13
+    assert found["energy_error_raw"] == pytest.approx(-(9.8**2) * h * 0.4 / 2 / scale, rel=1e-9)
+
+
+def test_energy_gain_is_the_largest_rise():
+    """Down by 20 %, then up by 5 %, then down: the gain is 5 %, the drift is the end's."""
+    scene, motion = exact_motion("spin-principal")
+    factor = np.interp(motion.t, [0, 3, 6, 10], [1.0, 0.8, 0.85, 0.7])
+    found = measure(scene, exact_motion("spin-principal", angular_velocity=motion.angular_velocity * np.sqrt(factor)[:, None])[1])
+    assert found["energy_gain"] == pytest.approx(0.05, rel=1e-6)
+    assert found["energy_drift"] == pytest.approx(-0.3, rel=1e-9)
+
+
+def test_sideways_push_on_a_smooth_floor():
+    """1e-10 of horizontal momentum is seen."""
+    scene, motion = exact_motion("drop-ball")
+    pushed = motion.velocity + np.outer(motion.t > 0.45, [1e-10, 0, 0])
+    found = measure(scene, exact_motion("drop-ball", velocity=pushed)[1])
+    assert found["horizontal_momentum_error"] == pytest.approx(1e-10 / np.sqrt(2 * 9.8), rel=1e-9)
+
+
+def test_one_nan_is_seen():
+    """Wherever it is."""
+    _, motion = exact_motion("drop-ball")
+    assert motion.first_bad_row is None
+    position = motion.position.copy()
+    position[700, 2] = np.nan
+    assert exact_motion("drop-ball", position=position)[1].first_bad_row == 700
+
+
+def test_too_coarse_a_step_is_said_to_be():
+    """Two rows of flight say nothing about an apex."""
+    scene, motion = exact_motion("drop-ball", dt=0.1)
+    case = Comparison.with_truth(scene, motion, truth_for(scene))
+    with pytest.raises(Unresolved, match=r"steps of 0\.1 s"):
+        METRICS["bounce_height_error"].value([case])

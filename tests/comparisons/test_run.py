@@ -1,0 +1,224 @@
+"""The main job: bad engines cost their own row, known faults are seen, and the figures are the ones theory predicts."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import comparisons
+import scenarios
+from comparisons.results import COLUMNS, KEY
+from scenarios import DropspinError, SceneError
+
+sys.path.insert(0, str(Path(__file__).parent))
+import engines_for_tests as made
+
+BALL = scenarios.load("drop-ball")
+
+
+@pytest.fixture(scope="module")
+def core():
+    """The core catalogue through the three engines at the default steps: what `dropspin run` does."""
+    return comparisons.run([scenarios.load(name) for name in scenarios.names()], ["document", "mujoco", "pybullet"])
+
+
+def value(results, scene, engine, metric, dt=1e-3):
+    frame = results.frame
+    own = frame[(frame["kind"] != "agreement") & (frame["scene"] == scene) & (frame["engine"] == engine)]
+    [found] = own[(own["metric"] == metric) & np.isclose(own["dt"], dt)]["value"]
+    return found
+
+
+def test_the_shipped_catalogue_passes(core):
+    """No expectation fails, nothing breaks down, the exit code is 0, and most rows are judged."""
+    failed = core.frame[core.frame["verdict"].isin(["failed", "crashed", "diverged", "declined", "no_truth"])]
+    assert failed.empty, failed.to_string()
+    assert core.exit_code() == 0
+    assert (core.frame["verdict"] == "passed").sum() > 200
+
+
+def test_table(core):
+    """The columns are the documented ones, with no missing or double key."""
+    assert list(core.frame.columns) == list(COLUMNS)
+    assert not core.frame.duplicated(KEY).any()
+    assert (core.frame["steps"] > 0).all()
+    own = core.frame[core.frame["kind"] != "agreement"]
+    assert (own["time_per_step"] > 0).all()
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.9])
+@pytest.mark.parametrize("dt", [4e-3, 2e-3, 1e-3])
+def test_mean_apex_bias_has_the_predicted_sign_and_size(core, restitution, dt):
+    """Over 32 start phases: -(1 - e)/2 u dt for the calibrated engines, +(2e - 1)(1 + e)/2 u dt for the note.
+
+    32 equally spaced phases average the depth at detection, anything from 0 to u dt, to a 64th of it; (1 - e²) of that enters.
+    """
+    e, u = restitution, math.sqrt(2 * 9.8)
+    scene = "drop-ball" if e == 0.5 else "drop-ball-lively"
+    resolution = ((1 - e**2) / 64 + 3 * dt) * u * dt  # and terms of second order
+    assert value(core, scene, "mujoco", "bounce_height_error", dt) == pytest.approx(-(1 - e) / 2 * u * dt, abs=resolution)
+    assert value(core, scene, "pybullet", "bounce_height_error", dt) == pytest.approx(-(1 - e) / 2 * u * dt, abs=resolution)
+    note = (2 * e - 1) * (1 + e) / 2 * u * dt
+    assert value(core, scene, "document", "bounce_height_error", dt) == pytest.approx(note, abs=resolution)
+
+
+def test_note_adds_a_step_of_gravity_to_its_restitution(core):
+    """+ e g dt / u, to second order."""
+    for dt in (4e-3, 2e-3, 1e-3):
+        predicted = 0.5 * 9.8 * dt / math.sqrt(2 * 9.8)
+        assert value(core, "drop-ball", "document", "restitution_error", dt) == pytest.approx(predicted, rel=3 * dt + 1e-3)
+
+
+def test_note_s_direction_of_momentum_is_a_plateau(core):
+    """Twice the angle between ω and L at every step, to 1e-4; MuJoCo's halves with the step."""
+    scene = scenarios.load("spin-asymmetric")
+    w = np.array(scene.start.angular_velocity)
+    L = scene.body.inertia_tensor @ w
+    swing = 2 * math.atan2(np.linalg.norm(np.cross(w, L)), w @ L)
+    for dt in (4e-3, 2e-3, 1e-3):
+        assert value(core, "spin-asymmetric", "document", "angular_momentum_direction_error", dt) == pytest.approx(
+            swing, rel=1e-4
+        )
+    coarse, fine = (value(core, "spin-asymmetric", "mujoco", "angular_momentum_direction_error", dt) for dt in (4e-3, 1e-3))
+    assert coarse / fine == pytest.approx(4, rel=0.02)
+
+
+def test_rk4_is_at_rounding():
+    """MuJoCo's RK4 keeps the direction of L to 1e-9 (measured 2e-14)."""
+    found = comparisons.run([scenarios.load("spin-asymmetric")], ["mujoco[integrator=rk4]"], [1e-3])
+    assert value(found, "spin-asymmetric", "mujoco[integrator=rk4]", "angular_momentum_direction_error") <= 1e-9
+
+
+def test_note_pushes_sideways_on_a_smooth_floor(core):
+    """Eq 11 keeps the tangential velocity, so its impulse is not normal; MuJoCo and PyBullet push straight up."""
+    assert value(core, "drop-box-corner", "document", "horizontal_momentum_error") > 0.2
+    for engine in ("mujoco", "pybullet"):
+        assert value(core, "drop-box-corner", engine, "horizontal_momentum_error") <= 1e-12
+
+
+def test_trajectories_are_what_simulate_gives(core):
+    """The run's own arrays, bit for bit."""
+    for engine in core.engines:
+        again = comparisons.simulate(scenarios.load("drop-box-corner"), engine, 2e-3)
+        kept = core.trajectories["drop-box-corner", engine, 2e-3]
+        np.testing.assert_array_equal(kept.states, again.states)
+        np.testing.assert_array_equal(kept.t, again.t)
+        assert kept.velocity_lag == again.velocity_lag == 1e-3
+
+
+def test_engines_are_held_against_each_other(core):
+    """Each pair once, by energy, apex and angular momentum; MuJoCo and PyBullet bounce alike."""
+    pairs = core.frame[core.frame["kind"] == "agreement"]
+    assert set(zip(pairs["engine"], pairs["truth"], strict=True)) == {
+        ("document", "mujoco"), ("document", "pybullet"), ("mujoco", "pybullet"),
+    }  # fmt: skip
+    assert set(pairs["metric"]) == {"energy_error", "bounce_height_error", "angular_momentum_error"}
+    alike = pairs[(pairs["scene"] == "drop-ball") & (pairs["engine"] == "mujoco") & (pairs["metric"] == "bounce_height_error")]
+    assert alike["value"].abs().max() < 1e-5
+
+
+def test_an_exact_engine_passes_everywhere():
+    """A stranger without any error fails no expectation."""
+    found = comparisons.run([scenarios.load(name) for name in scenarios.names()], [made.Exact()], [1e-3])
+    failed = found.frame[found.frame["verdict"] == "failed"]
+    assert failed.empty, failed.to_string()
+
+
+@pytest.mark.parametrize(
+    ("engine", "verdict", "reason", "code"),
+    [
+        (made.Crashing(), "crashed", "RuntimeError: no such thing as a floor", 3),
+        (made.GivingUp(), "diverged", "step 3: a number beyond 1e10", 3),
+        (made.Declining(), "declined", "I do not bounce", 0),
+        (made.engine_with("nan", made.nan_after_half_a_second), "diverged", "the state is not finite at t = 0.50", 3),
+        (made.HeavyInertia(), "crashed", "BuiltDifferently: inertia is", 3),
+        (made.WrongStart(), "crashed", "BuiltDifferently: position at the start is", 3),
+    ],
+    ids=lambda case: getattr(case, "label", ""),
+)
+def test_a_bad_engine_costs_its_own_rows(engine, verdict, reason, code):
+    """The reason is told, and the engine beside it is measured as ever."""
+    found = comparisons.run([BALL], [engine, "pybullet"], [4e-3])
+    [row] = found.frame[found.frame["engine"] == engine.label].to_dict("records")
+    assert row["verdict"] == verdict
+    assert row["reason"].startswith(reason)
+    assert found.exit_code() == code
+    assert found.frame[found.frame["engine"] == "pybullet"]["value"].notna().all()
+
+
+# The fault, the scene that must notice and one metric that must fail; each distortion acts on the exact motion.
+FAULTS = {
+    "1 % more speed after the first bounce": (
+        "drop-ball", "bounce_height_error",
+        lambda s, t: np.concatenate([s[:8], [s[8] * (1.01 if t > 0.46 else 1.0)], s[9:]]),
+    ),
+    "restitution vanishes": (
+        "drop-ball", "restitution_error",
+        lambda s, t: np.concatenate([[0, 0.1, 0], s[3:7], np.zeros(6)]) if t > 0.452 else s,
+    ),
+    "swapped components of the quaternion": (
+        "spin-asymmetric", "orientation_error", lambda s, t: s[[0, 1, 2, 4, 3, 5, 6, 7, 8, 9, 10, 11, 12]],
+    ),
+    "wxyz for xyzw": ("spin-asymmetric", "orientation_error", lambda s, t: s[[0, 1, 2, 6, 3, 4, 5, 7, 8, 9, 10, 11, 12]]),
+    "attitude 2 degrees off": ("spin-asymmetric", "orientation_error", made.turned_by(math.radians(2))),
+    "sideways push": ("drop-box-corner", "horizontal_momentum_error", lambda s, t: s + 1e-9 * np.eye(13)[7]),
+    "1 % less spin": (
+        "spin-dzhanibekov", "angular_momentum_error", lambda s, t: np.concatenate([s[:10], 0.99 * s[10:]]),
+    ),
+    "frozen attitude": ("spin-principal", "orientation_error", lambda s, t: np.concatenate([s[:3], [0, 0, 0, 1], s[7:]])),
+    "sinks a centimetre": ("drop-box-flat", "penetration", lambda s, t: s - 0.01 * np.eye(13)[1]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_are_caught(fault):
+    """Each fault, planted in an exact engine, fails the metric it is about."""
+    scene, metric, distort = FAULTS[fault]
+    engine = made.engine_with("planted", distort)
+    found = comparisons.run([scenarios.load(scene)], [engine], [1e-3])
+    failed = found.frame[found.frame["verdict"] == "failed"]
+    assert metric in set(failed["metric"]), found.frame[["metric", "value", "verdict"]].to_string()
+    assert found.exit_code() == 1
+
+
+def test_missing_engine(monkeypatch):
+    """Its rows say how to install it; the rest runs; it fails the run only if it was named."""
+    from comparisons.engines import registry
+
+    found_before = registry.find_spec
+    monkeypatch.setattr(registry, "find_spec", lambda package: None if package == "pybullet" else found_before(package))
+    found = comparisons.run([BALL], ["document", "pybullet"], [4e-3])
+    [row] = found.frame[found.frame["engine"] == "pybullet"].to_dict("records")
+    assert row["verdict"] == "missing"
+    assert "pip install pybullet" in row["reason"]
+    assert found.exit_code() == 0
+    assert found.exit_code(frozenset({"pybullet"})) == 3
+
+
+def test_a_scene_without_truth():
+    """It is measured by what is conserved, says so, and engines are still held against each other."""
+    scene = BALL.model_copy(update={"floor": BALL.floor.model_copy(update={"friction": "infinite"})})
+    scene = scene.starting_at(np.array([0, 1.1, 0, 0, 0, 0, 1, 1.0, 0, 0, 0, 0, 5.0]))
+    found = comparisons.run([scene.model_copy(update={"expect": ()})], ["document", "pybullet"], [2e-3])
+    own = found.frame[found.frame["kind"] != "agreement"]
+    assert set(own["verdict"]) == {"measured", "no_truth"}
+    assert set(own[own["verdict"] == "measured"]["metric"]) == {"energy_drift", "energy_gain", "penetration"}
+
+
+def test_what_is_asked_is_checked():
+    """Before anything runs: steps, names, expectations."""
+    for dt in (0.0, -1e-3, math.nan, math.inf, 1.0):
+        with pytest.raises(DropspinError, match="dt: got .* s; scene 'drop-ball' lasts 1.5 s"):
+            comparisons.run([BALL], ["document"], [dt])
+    with pytest.raises(DropspinError, match="two scenes have the same name"):
+        comparisons.run([BALL, BALL], ["document"])
+    with pytest.raises(DropspinError, match="an engine is named twice"):
+        comparisons.run([BALL], ["mujoco", "mujoco[integrator=euler]"])
+    typo = scenarios.load(
+        BALL.model_dump(exclude_none=True, exclude={"expect"})
+        | {"expect": [{"metric": "energy_eror", "below": 1, "reason": "typo"}]}
+    )
+    with pytest.raises(SceneError, match=r"expect\[0\]\.metric: got 'energy_eror'.*Did you mean 'energy_error'"):
+        comparisons.run([typo], ["document"])

@@ -1,0 +1,208 @@
+"""The run folder and what stands in it."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import comparisons
+import reports
+import scenarios
+from comparisons.store import restore
+from scenarios import DropspinError
+
+NASTY = "<script>alert(1)</script>$x_{"
+
+
+@pytest.fixture(scope="module")
+def results():
+    """Two catalogue scenes and one with a hostile name and text, two engines, two steps."""
+    content = scenarios.load("spin-principal").model_dump(exclude_none=True, exclude={"expect"})
+    hostile = scenarios.load(content | {"name": NASTY, "summary": "<img src=x onerror=alert(2)>", "source": "[bold]&"})
+    scenes = [scenarios.load("drop-ball"), scenarios.load("drop-box-corner"), hostile]
+    return comparisons.run(scenes, ["document", "mujoco"], [4e-3, 2e-3])
+
+
+@pytest.fixture(scope="module")
+def folder(results, tmp_path_factory):
+    """The run, written."""
+    return reports.write(results, tmp_path_factory.mktemp("out") / "run").parent
+
+
+class Page(HTMLParser):
+    """Tags, ids, links and balance of a page."""
+
+    VOID = frozenset({"meta", "link", "br", "img", "hr", "input"})
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.ids, self.references, self.open = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        if tag not in self.VOID:
+            self.open.append(tag)
+        for name, value in attributes:
+            if name == "id":
+                self.ids.append(value)
+            if name in ("href", "src", "xlink:href"):
+                self.references.append(value)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        if tag not in self.VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_folder_holds_everything(results, folder):
+    """The documented files, and none that are not."""
+    found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    expected = {"run.json", "results.parquet", "results.csv", "report.html", "report.md"}
+    assert expected <= found
+    others = found - expected
+    assert all(re.fullmatch(r"plots/\d\d-(time|convergence)\.svg|trajectories/[\w.=-]+\.npz", name) for name in others), others
+    assert len([name for name in others if name.endswith(".npz")]) == 3 * 2 * 2
+    assert sum(name.startswith("plots/") for name in others) == 6
+
+
+def test_page_is_whole_and_offline(folder):
+    """Balanced tags, unique ids, links that lead somewhere inside, nothing from elsewhere, under 3 MB."""
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    assert len(page.ids) == len(set(page.ids))
+    assert page.references
+    for reference in page.references:
+        assert reference.startswith("#")
+        assert reference[1:] in page.ids
+    assert not re.search(r"url\((?!#)", text)
+    assert not re.search(r"@import|<script|<link", text)
+    assert len(text) < 3_000_000
+    assert page.tags.count("svg") == 6
+
+
+def test_names_with_markup_are_inert(folder):
+    """Shown as they are, run as nothing; in the Markdown no table is broken."""
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in text
+    assert "<img" not in text
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;$x_{" in text
+    markdown = (folder / "report.md").read_text(encoding="utf-8")
+    assert "<script" not in markdown
+
+
+def test_page_says_the_verdict_first(results, folder):
+    """The sentence before any table, one chip for each scene and engine, the colours of each engine."""
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    held = (results.frame["verdict"] == "passed").sum()
+    assert f"All {held} expectations hold." in text
+    assert text.index("expectations hold") < text.index("<table")
+    assert len(re.findall(r'class="chip (passed|measured)"', text)) == 6
+    assert "does not shrink with the step" in text
+
+
+def test_failures_come_first(tmp_path):
+    """With value, bound, reason."""
+    ball = scenarios.load("drop-ball")
+    harsh = ball.model_dump(exclude_none=True, exclude={"expect"}) | {
+        "expect": [{"metric": "bounce_height_error", "below": 1e-9, "reason": "too much to ask"}]
+    }
+    found = comparisons.run([scenarios.load(harsh)], ["mujoco"], [4e-3])
+    text = reports.write(found, tmp_path / "run").read_text(encoding="utf-8")
+    assert "1 of 1 expectations fail." in text
+    assert text.index("What failed") < text.index("Against the truth")
+    assert "too much to ask" in text
+    assert "± 1e-09" in text
+
+
+def test_data_comes_back_as_it_was(results, folder):
+    """Table, trajectories, scenes: equal to the bit."""
+    again = restore(folder)
+    pd.testing.assert_frame_equal(again.frame, results.frame)
+    assert set(again.trajectories) == set(results.trajectories)
+    for key, motion in results.trajectories.items():
+        np.testing.assert_array_equal(again.trajectories[key].states, motion.states)
+        assert again.trajectories[key].velocity_lag == motion.velocity_lag
+    assert [scene.digest for scene in again.scenes.values()] == [scene.digest for scene in results.scenes.values()]
+    assert again.engines == results.engines
+    csv = pd.read_csv(folder / "results.csv")
+    assert len(csv) == len(results.frame)
+    assert list(csv.columns) == list(results.frame.columns)
+
+
+def test_provenance(folder):
+    """Versions, machine, what was asked, settings of every engine in every scene at every step."""
+    content = json.loads((folder / "run.json").read_text())
+    stamped = content["provenance"]
+    assert stamped["asked"]["dts"] == [4e-3, 2e-3]
+    assert stamped["versions"]["mujoco"]
+    assert stamped["cpu"]
+    assert stamped["settings"]["mujoco"]["drop-ball dt=0.004"]["solref"] == [0.0, -1.5 / 4e-3]
+
+
+def test_an_earlier_run_is_replaced_and_nothing_else_is_touched(results, tmp_path):
+    """A run replaces a run; a folder of something else, or a file, is refused and stays whole."""
+    target = tmp_path / "run"
+    reports.write(results, target)
+    (target / "left-over").write_text("x")
+    reports.write(results, target)
+    assert not (target / "left-over").exists()
+    precious = tmp_path / "thesis"
+    precious.mkdir()
+    (precious / "chapter1.tex").write_text("x")
+    with pytest.raises(DropspinError, match="holds files that are no run of dropspin"):
+        reports.write(results, precious)
+    assert (precious / "chapter1.tex").read_text() == "x"
+    with pytest.raises(DropspinError, match="is a file; choose a folder"):
+        reports.write(results, precious / "chapter1.tex")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run", "thesis"]
+
+
+def test_a_write_that_fails_leaves_the_old_run(results, tmp_path, monkeypatch):
+    """Killed half-way, the old folder stands and no temporary one is left."""
+    import reports.folder as writing
+
+    target = tmp_path / "run"
+    reports.write(results, target)
+    before = (target / "report.html").read_bytes()
+
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(writing, "html_report", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        reports.write(results, target)
+    assert (target / "report.html").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_folder_that_is_no_run(tmp_path):
+    """One line that says what to give."""
+    with pytest.raises(DropspinError, match="not the folder of a run"):
+        restore(tmp_path)
+
+
+def test_plots_are_the_same_every_time(results):
+    """A report that changes without reason does not review."""
+    from reports.html import svg_plots
+
+    assert dict(svg_plots(results)) == dict(svg_plots(results))
+
+
+def test_terminal_table(results, capsys):
+    """Readable in 80 columns: no number is cut, markup is text."""
+    from rich.console import Console
+
+    reports.print_table(results, Console(width=80, no_color=True))
+    text = capsys.readouterr().out
+    assert "…" not in text
+    assert NASTY in text
+    assert "expectations hold." in text
+    assert max(map(len, text.splitlines())) <= 80

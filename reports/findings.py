@@ -49,6 +49,8 @@ def failures(results: Results) -> pd.DataFrame:
 
 def plateaus(results: Results) -> dict[str, list[str]]:
     """For each engine the scenes in which an error against the truth does not shrink with the step."""
+    if results.frame["dt"].nunique() < 2:
+        return {engine: [] for engine in results.engines}
     truth = results.frame[(results.frame["kind"] == "truth") & results.frame["value"].notna()]
     found: dict[str, list[str]] = {}
     for engine in results.engines:

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from comparisons import METRICS, Results
 from reports import numbers
 from reports.colours import engine_colours
-from reports.findings import counts, failures, finding_sentences, verdict_sentence, worst_verdicts
+from reports.findings import NEGLIGIBLE, counts, failures, finding_sentences, plateaus, verdict_sentence, worst_verdicts
 from reports.plots import convergence_figure, time_figure
 from reports.svg import svg
 from scenarios import Scenario, truth_for
@@ -64,6 +64,8 @@ def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
         "engines": results.engines,
         "colours": engine_colours(results.engines),
         "matrix": {name: {engine: worst.get((name, engine), "missing") for engine in results.engines} for name in results.scenes},
+        "stuck": plateaus(results),
+        "negligible": NEGLIGIBLE,
         "failures": [_row(row) for row in failures(results).itertuples()],
         "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,

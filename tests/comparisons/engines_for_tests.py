@@ -18,10 +18,19 @@ class ExactSimulation(Simulation):
         self._step += steps
 
     def state(self):
-        exact = self._truth([min(self._step * self._dt, self._truth.horizon)]).states[0]
-        if self._distort is None or self._step == 0:
+        return self._states(np.array([self._step]))[0]
+
+    def record(self, steps, every=1):
+        rows = self._states(self._step + every * np.arange(1 + steps // every))
+        self._step += steps
+        return rows
+
+    def _states(self, steps):
+        times = np.minimum(steps * self._dt, self._truth.horizon)
+        exact = self._truth(times).states
+        if self._distort is None:
             return exact
-        return self._distort(exact, self._step * self._dt)
+        return np.array([self._distort(row, time) if time > 0 else row for row, time in zip(exact, times, strict=True)])
 
 
 class Exact(Engine):
@@ -105,3 +114,13 @@ class WrongStart(Exact):
         state = scene.initial_state
         state[1] *= 1 + 1e-13
         return ExactSimulation(scene.starting_at(state), dt)
+
+
+class TooLively(Exact):
+    """Bounces with 1 % more restitution than it was told."""
+
+    name = "too-lively"
+
+    def prepare(self, scene, dt):
+        floor = scene.floor.model_copy(update={"restitution": 1.01 * scene.floor.restitution})
+        return ExactSimulation(scene.model_copy(update={"floor": floor}), dt)

@@ -12,8 +12,6 @@ from scenarios.mechanics import angular_momentum, energy, kinetic_energy, lowest
 
 long_enough = arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1)
 quaternions = long_enough.map(lambda q: q / np.linalg.norm(q))
-    arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1).map(lambda q: q / np.linalg.norm(q))
-)
 vectors = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
 
 

@@ -28,10 +28,10 @@ ROUNDING = 1e-17
 CONVERGENCE = (
     "energy_error",
     "bounce_height_error",
-    "restitution_error",
+    "horizontal_momentum_error",
     "angular_momentum_direction_error",
     "orientation_error",
-    "horizontal_momentum_error",
+    "restitution_error",
     "position_error",
 )
 

@@ -95,9 +95,7 @@ def run(
             for first, second in combinations(attempts, 2):
                 rows += _agreement_rows(scene, dt, first, second, phases)
     asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)}
-    return Results(
-        as_frame(rows), {scene.name: scene for scene in scenes}, tuple(labels), trajectories, provenance(asked, settings)
-    )
+    return Results(as_frame(rows), {scene.name: scene for scene in scenes}, tuple(labels), trajectories, provenance(asked, settings))
 
 
 def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:

@@ -22,9 +22,7 @@ def save(results: Results, folder: Path) -> None:
         path = f"trajectories/{number:03d}-{_file_name(scene)}-{_file_name(engine)}-{dt:g}.npz"
         np.savez_compressed(folder / path, allow_pickle=False, **{name: getattr(motion, name) for name in ARRAYS})
         files[path] = {"scene": scene, "engine": engine, "dt": dt}
-    scenes = {
-        name: scene.model_dump(mode="json", exclude={"name"}, exclude_defaults=True) for name, scene in results.scenes.items()
-    }
+    scenes = {name: scene.model_dump(mode="json", exclude={"name"}, exclude_defaults=True) for name, scene in results.scenes.items()}
     digests = {name: scene.digest for name, scene in results.scenes.items()}
     content = {
         "provenance": results.provenance,

@@ -9,9 +9,7 @@ from scenarios import Scenario, SceneError
 from scenarios.errors import did_you_mean
 from scenarios.model import Expectation
 
-Verdict = Literal[
-    "passed", "failed", "measured", "limited", "diverged", "crashed", "timed_out", "declined", "missing", "no_truth"
-]
+Verdict = Literal["passed", "failed", "measured", "limited", "diverged", "crashed", "timed_out", "declined", "missing", "no_truth"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 FAILURES = frozenset({"failed"})
 BREAKDOWNS = frozenset({"diverged", "crashed", "timed_out"})

@@ -3,13 +3,16 @@
 It knows no scene and no engine. README.md beside this file is the ledger: equation, function, test.
 """
 
-from reference_impl.contact import Floor
+from reference_impl.body import Body, Floor, World
 from reference_impl.inertia import solid_box_inertia, solid_sphere_inertia, total_mass, vertex_inertia
-from reference_impl.simulate import Body, World, simulate, step
+from reference_impl.methods import Methods
+from reference_impl.simulate import UnsolvedContact, simulate, step
 
 __all__ = [
     "Body",
     "Floor",
+    "Methods",
+    "UnsolvedContact",
     "World",
     "simulate",
     "solid_box_inertia",

@@ -17,9 +17,31 @@ def product(a, b):
 
 
 @compiled
+def conjugate(q):
+    """The rotation the other way round."""
+    return Quat(-q.x, -q.y, -q.z, q.w)
+
+
+@compiled
 def normalise(q):
     """Eq 3: back to unit length."""
     return q / math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+
+
+@compiled
+def from_matrix(m):
+    """The unit quaternion of a rotation matrix, by its largest component (S. W. Shepperd, J. Guidance and Control 1, 1978)."""
+    trace = m.row1.x + m.row2.y + m.row3.z
+    largest = max(trace, m.row1.x, m.row2.y, m.row3.z)
+    if largest == trace:
+        q = Quat(m.row3.y - m.row2.z, m.row1.z - m.row3.x, m.row2.x - m.row1.y, 1.0 + trace)
+    elif largest == m.row1.x:
+        q = Quat(1.0 + 2.0 * m.row1.x - trace, m.row2.x + m.row1.y, m.row1.z + m.row3.x, m.row3.y - m.row2.z)
+    elif largest == m.row2.y:
+        q = Quat(m.row2.x + m.row1.y, 1.0 + 2.0 * m.row2.y - trace, m.row3.y + m.row2.z, m.row1.z - m.row3.x)
+    else:
+        q = Quat(m.row1.z + m.row3.x, m.row3.y + m.row2.z, 1.0 + 2.0 * m.row3.z - trace, m.row2.x - m.row1.y)
+    return normalise(q)
 
 
 @compiled

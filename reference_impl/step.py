@@ -1,16 +1,16 @@
 """One time step: the note's Algorithm 1, line by line.
 
-A part that is None (no gravity, no forces, no damping, no floor) is left out of the compiled step altogether.
+A part that is None (no gravity, no forces, no damping, no floor, no rotation, no correction) is left out of the compiled step.
 """
 
-from reference_impl.contact import handle_collision
-from reference_impl.quaternion import normalise, product, rotation_matrix
-from reference_impl.vectors import Quat, Vec3, compiled, cross, row, transpose
+from reference_impl.quaternion import rotation_matrix
+from reference_impl.vectors import Vec3, compiled, cross, row, transpose
 
 
 @compiled
-def advance(x, q, v, w, dt, body, gravity, forces, damping, floor):
-    """The state (x, q, v, ω) one step of dt later."""
+def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, turn, collide, law, correct):
+    """The state (x, q, v, ω) one step of dt later, and whether the contact was solved."""
+    solved = True
     if gravity is not None:
         v = v + dt * gravity
     if forces is not None:
@@ -19,10 +19,13 @@ def advance(x, q, v, w, dt, body, gravity, forces, damping, floor):
         v = damping.linear * v
         w = damping.angular * w
     if floor is not None:
-        v, w = handle_collision(q, v, w, x.y, body, floor)
+        v, w, solved = collide(x, q, v, w, body, floor, law)
     x = x + dt * v  # eq 1: with the new velocity
-    q = normalise(q + 0.5 * dt * product(Quat(w.x, w.y, w.z, 0.0), q))  # eq 6
-    return x, q, v, w
+    if turn is not None:
+        q, w = turn(q, w, dt, body)  # eq 6, or one of its improvements
+    if correct is not None:
+        x = correct(x, q, body)
+    return x, q, v, w, solved
 
 
 @compiled
@@ -32,9 +35,8 @@ def apply_forces(q, v, w, dt, body, forces):
     force = Vec3(0.0, 0.0, 0.0)
     torque = Vec3(0.0, 0.0, 0.0)
     for i in range(body.points.shape[0]):
-        p = row(body.points, i)
         f = row(forces, i)
         force = force + f
-        torque = torque + cross(R @ p, f)  # eq 9
+        torque = torque + cross(R @ row(body.points, i), f)  # eq 9
     I_inverse = R @ body.inverse_inertia @ transpose(R)  # eq 7
     return v + dt * (force / body.mass), w + dt * (I_inverse @ torque)

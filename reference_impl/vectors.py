@@ -9,11 +9,11 @@ import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba import njit, types
-from numba.extending import overload
+from numba import types
+from numba.extending import overload, register_jitable
 
-compiled = njit(nogil=True, error_model="numpy")
-"""Compiles a function of kernel values. IEEE rules (1/0 is inf), no reassociation, and Python's lock is let go."""
+compiled = register_jitable
+"""Marks a function of kernel values: plain Python when called from Python, compiled into any kernel that calls it."""
 
 
 def _add3(a: "Vec3", b: "Vec3") -> "Vec3":
@@ -46,6 +46,10 @@ def _scale4(scale: float, a: "Quat") -> "Quat":
 
 def _divide4(a: "Quat", scale: float) -> "Quat":
     return Quat(a.x / scale, a.y / scale, a.z / scale, a.w / scale)
+
+
+def _add_matrix(a: "Mat3", b: "Mat3") -> "Mat3":
+    return Mat3(a.row1 + b.row1, a.row2 + b.row2, a.row3 + b.row3)
 
 
 def _subtract_matrix(a: "Mat3", b: "Mat3") -> "Mat3":
@@ -112,6 +116,9 @@ class Mat3(NamedTuple):
     row1: Vec3
     row2: Vec3
     row3: Vec3
+
+    def __add__(self, other):
+        return _add_matrix(self, other)
 
     def __sub__(self, other):
         return _subtract_matrix(self, other)
@@ -189,6 +196,7 @@ for _symbol, _source, *_kinds in (
     (operator.add, _add4, Quat, Quat),
     (operator.mul, _scale4, float, Quat),
     (operator.truediv, _divide4, Quat, float),
+    (operator.add, _add_matrix, Mat3, Mat3),
     (operator.sub, _subtract_matrix, Mat3, Mat3),
     (operator.mul, _scale_matrix, float, Mat3),
     (operator.matmul, _apply, Mat3, Vec3),

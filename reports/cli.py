@@ -161,9 +161,7 @@ def _scene_rows() -> list[dict[str, str]]:
     for name in names():
         scene = _load(name)
         truth = truth_for(scene)
-        rows.append(
-            {"scene": name, "truth": truth.name if truth else "", "tags": ", ".join(scene.tags), "summary": scene.summary}
-        )
+        rows.append({"scene": name, "truth": truth.name if truth else "", "tags": ", ".join(scene.tags), "summary": scene.summary})
     return rows
 
 
@@ -186,8 +184,7 @@ def _metric_rows() -> list[dict[str, str]]:
     from comparisons import METRICS
 
     return [
-        {"metric": metric.name, "unit": metric.unit, "needs": metric.needs, "definition": metric.definition}
-        for metric in METRICS.values()
+        {"metric": metric.name, "unit": metric.unit, "needs": metric.needs, "definition": metric.definition} for metric in METRICS.values()
     ]
 
 

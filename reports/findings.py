@@ -58,9 +58,7 @@ def plateaus(results: Results) -> dict[str, list[str]]:
         if mine.empty:
             found[engine] = []
             continue
-        sizes = mine.assign(value=mine["value"].abs()).pivot_table(
-            index=["scene", "metric"], columns="dt", values="value", sort=False
-        )
+        sizes = mine.assign(value=mine["value"].abs()).pivot_table(index=["scene", "metric"], columns="dt", values="value", sort=False)
         finest, coarsest = sizes[mine["dt"].min()], sizes[mine["dt"].max()]
         stuck = finest[(finest > NEGLIGIBLE) & (coarsest < PLATEAU * finest)]
         found[engine] = [str(scene) for scene in stuck.index.unique("scene")]

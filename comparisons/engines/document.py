@@ -1,28 +1,59 @@
 """The engine `document`: the note, literally."""
 
-from typing import Any
+import math
+from dataclasses import asdict
+from typing import ClassVar
 
 import numpy as np
 
 import reference_impl
 from comparisons.engines.base import Array, AsBuilt, Engine, Simulation, version
-from scenarios import Scenario
+from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+from scenarios import DropspinError, Scenario
 from scenarios.body import Body, Box, Sphere, Vertices
+
+ORDERS = {"gyroscopic": 1.0, "implicit-gyroscopic": 1.0, "midpoint": 2.0, "rk4": 4.0, "symmetric-top": 4.0, "exact": math.inf}
 
 
 class Document(Engine):
-    """Algorithms 1 and 2 of the note."""
+    """Algorithms 1 and 2 of the note; each option puts another method in place of one of its parts."""
 
     name = "document"
+    choices: ClassVar = {
+        "rotation": tuple(ROTATIONS),
+        "law": tuple(LAWS),
+        "contact": tuple(CONTACTS),
+        "correction": tuple(CORRECTIONS),
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        try:
+            self.methods  # noqa: B018  # refuses what does not go together
+        except ValueError as error:
+            raise DropspinError(f"engine {self.label!r}: {error}.") from None
+
+    @property
+    def methods(self) -> reference_impl.Methods:
+        """The chosen leaves."""
+        return reference_impl.Methods(**{name: self.option(name) for name in self.choices})
+
+    @property
+    def order(self) -> float | None:  # type: ignore[override]  # the claim depends on the option
+        """Order of the rotation; the note's own makes no claim. Translation under gravity is of first order with all of them."""
+        return ORDERS.get(self.option("rotation"))
 
     def declines(self, scene: Scenario) -> str | None:
-        """The note knows no friction between none and infinite."""
-        if scene.floor is not None and not isinstance(scene.floor.friction, str):
-            return f"the note has no law for a Coulomb coefficient ({scene.floor.friction:g}); friction is 'none' or 'infinite'"
+        """Most laws know no friction between none and infinite."""
+        law = self.option("law")
+        if scene.floor is not None and not isinstance(scene.floor.friction, str) and law not in ("normal", "coulomb"):
+            return f"law={law} has no Coulomb coefficient ({scene.floor.friction:g}); friction is 'none' or 'infinite', or use law=coulomb"
+        if scene.floor is not None and law == "normal" and scene.floor.friction != "none":
+            return "law=normal has no friction; the scene's floor has"
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DocumentSimulation(scene, dt)
+        return DocumentSimulation(scene, dt, self.methods)
 
 
 class DocumentSimulation(Simulation):
@@ -30,21 +61,22 @@ class DocumentSimulation(Simulation):
 
     staggered = True
 
-    def __init__(self, scene: Scenario, dt: float) -> None:
+    def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
+        self._methods = methods
         self._body = _body(scene.body)
         self._world = _world(scene)
         self._dt = dt
         self._state = scene.initial_state
-        self.settings = {"integrator": "semi-implicit Euler (Algorithm 1)", "numba": version("numba")} | _floor_settings(scene)
+        self.settings = {"numba": version("numba"), **asdict(methods)}
 
     def advance(self, steps: int) -> None:
-        self._state = reference_impl.simulate(self._state, self._body, self._world, self._dt, steps, max(steps, 1))[-1]
+        self._state = reference_impl.simulate(self._state, self._body, self._world, self._dt, steps, max(steps, 1), self._methods)[-1]
 
     def state(self) -> Array:
         return self._state.copy()
 
     def record(self, steps: int, every: int = 1) -> Array:
-        rows = reference_impl.simulate(self._state, self._body, self._world, self._dt, steps - steps % every, every)
+        rows = reference_impl.simulate(self._state, self._body, self._world, self._dt, steps, every, self._methods)
         self._state = rows[-1].copy()
         return rows
 
@@ -76,15 +108,10 @@ def _world(scene: Scenario) -> reference_impl.World:
     floor = scene.floor
     return reference_impl.World(
         gravity=None if scene.gravity is None else scene.acceleration,
-        floor=None if floor is None else reference_impl.Floor(floor.restitution, floor.friction == "infinite", floor.rest_speed),
+        floor=None if floor is None else reference_impl.Floor(floor.restitution, _coefficient(floor.friction), floor.rest_speed),
         damping=None if scene.damping is None else (scene.damping.linear, scene.damping.angular),
     )
 
 
-def _floor_settings(scene: Scenario) -> dict[str, Any]:
-    if scene.floor is None:
-        return {}
-    return {
-        "impulse": "eq 17 (sticking)" if scene.floor.friction == "infinite" else "eq 15 (frictionless)",
-        "contact": "mean point",
-    }
+def _coefficient(friction: str | float) -> float:
+    return {"none": 0.0, "infinite": math.inf}[friction] if isinstance(friction, str) else friction

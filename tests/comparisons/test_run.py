@@ -78,9 +78,7 @@ def test_note_s_direction_of_momentum_is_a_plateau(core):
     L = scene.body.inertia_tensor @ w
     swing = 2 * math.atan2(np.linalg.norm(np.cross(w, L)), w @ L)
     for dt in (4e-3, 2e-3, 1e-3):
-        assert value(core, "spin-asymmetric", "document", "angular_momentum_direction_error", dt) == pytest.approx(
-            swing, rel=1e-4
-        )
+        assert value(core, "spin-asymmetric", "document", "angular_momentum_direction_error", dt) == pytest.approx(swing, rel=1e-4)
     coarse, fine = (value(core, "spin-asymmetric", "mujoco", "angular_momentum_direction_error", dt) for dt in (4e-3, 1e-3))
     assert coarse / fine == pytest.approx(4, rel=0.02)
 
@@ -220,8 +218,7 @@ def test_what_is_asked_is_checked():
     with pytest.raises(DropspinError, match="an engine is named twice"):
         comparisons.run([BALL], ["mujoco", "mujoco[integrator=euler]"])
     typo = scenarios.load(
-        BALL.model_dump(exclude_none=True, exclude={"expect"})
-        | {"expect": [{"metric": "energy_eror", "below": 1, "reason": "typo"}]}
+        BALL.model_dump(exclude_none=True, exclude={"expect"}) | {"expect": [{"metric": "energy_eror", "below": 1, "reason": "typo"}]}
     )
     with pytest.raises(SceneError, match=r"expect\[0\]\.metric: got 'energy_eror'.*Did you mean 'energy_error'"):
         comparisons.run([typo], ["document"])

@@ -45,7 +45,7 @@ def test_fifty_steps_through_contacts(seed, sticking):
     rest_speed = 0.3 if seed % 3 == 0 else 0.0
     rates = (0.4, 0.9) if seed % 2 == 0 else None
     dt = 1 / 240
-    world = World(GRAVITY, Floor(0.6, sticking, rest_speed), rates)
+    world = World(GRAVITY, Floor(0.6, np.inf if sticking else 0.0, rest_speed), rates)
     c = np.exp(-dt * np.array(rates or (0.0, 0.0)))
 
     found = reference_impl.simulate(state, body, world, dt, STEPS)
@@ -70,7 +70,7 @@ def test_several_vertices_at_once():
     body = Body(2.0, reference_impl.solid_box_inertia(2.0, half), points)
     state = np.array([0, 0.2 - 1e-3, 0, 0, 0, 0, 1, 0.3, -2.0, 0.1, 0, 0, 0], dtype=float)
 
-    after = reference_impl.step(state, body, World(GRAVITY, Floor(0.5, False, 0.0)), 1e-3)
+    after = reference_impl.step(state, body, World(GRAVITY, Floor(0.5, 0.0)), 1e-3)
 
     expected = update(state, 2.0, body.inertia, points, 1e-3, GRAVITY, 1.0, 1.0, 0.5, False, 0.0)
     np.testing.assert_allclose(after, expected, rtol=0, atol=1e-15)

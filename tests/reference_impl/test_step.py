@@ -97,7 +97,7 @@ def test_a_part_that_is_none_does_what_a_part_of_no_effect_does():
     """No gravity, no damping, no floor: the same bits as with zero gravity, no decay and a floor out of reach."""
     start = state(x=(0, 50, 0), v=(1, -2, 3), w=(1, 2, 3))
     without = reference_impl.simulate(start, BODY, World(), 1e-3, 200)
-    with_all = reference_impl.simulate(start, BODY, World(np.zeros(3), Floor(0.5, True, 0.0), (0.0, 0.0)), 1e-3, 200)
+    with_all = reference_impl.simulate(start, BODY, World(np.zeros(3), Floor(0.5, np.inf), (0.0, 0.0)), 1e-3, 200)
     np.testing.assert_array_equal(without, with_all)
 
 
@@ -105,8 +105,8 @@ def test_ball_bounces_at_its_support_point():
     """A ball is one vertex at -R N; it turns only if it is gripped while it slides."""
     ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
     start = state(x=(0, 0.1 - 1e-4, 0), v=(2, -3, 0), w=(0, 0, 5))
-    smooth = reference_impl.step(start, ball, World(floor=Floor(0.8, False, 0.0)), 1e-4)
-    rough = reference_impl.step(start, ball, World(floor=Floor(0.8, True, 0.0)), 1e-4)
+    smooth = reference_impl.step(start, ball, World(floor=Floor(0.8, 0.0)), 1e-4)
+    rough = reference_impl.step(start, ball, World(floor=Floor(0.8, np.inf)), 1e-4)
     assert smooth[8] == pytest.approx(2.4, rel=1e-14)
     assert rough[8] == pytest.approx(2.4, rel=1e-14)
     # Sticking, solid ball: v_x⁺ = v_x - (2/7)(v_x + R ω_z), and then no slip.
@@ -118,13 +118,13 @@ def test_flat_body_at_rest_sinks_by_one_step_of_gravity():
     """Known fault: at restitution 0 a flat box rests g h² deep, to 1 % (no position correction)."""
     h = 1 / 60
     flat = state(x=(0, 0.2, 0))
-    rows = reference_impl.simulate(flat, BODY, World(G, Floor(0.0, True, 0.0)), h, 600)
+    rows = reference_impl.simulate(flat, BODY, World(G, Floor(0.0, np.inf)), h, 600)
     assert 0.2 - rows[-1, 1] == pytest.approx(9.8 * h**2, rel=1e-12)
 
 
 def test_every_kth_row_is_the_kth_row():
     """Recording less changes nothing that is recorded."""
-    start, world = state(x=(0, 0.4, 0), v=(1, 0, 0), w=(3, 2, 1)), World(G, Floor(0.5, True, 0.0))
+    start, world = state(x=(0, 0.4, 0), v=(1, 0, 0), w=(3, 2, 1)), World(G, Floor(0.5, np.inf))
     all_rows = reference_impl.simulate(start, BODY, world, 1e-3, 1000)
     np.testing.assert_array_equal(reference_impl.simulate(start, BODY, world, 1e-3, 1000, every=7), all_rows[::7])
 
@@ -136,7 +136,7 @@ def test_interpreted_python_gives_the_same_bits():
         "h = np.array([.1, .2, .3]); p = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * h\n"
         "b = r.Body(1.0, r.solid_box_inertia(1.0, h), p)\n"
         "s = np.array([0, .5, 0, .1, .2, .3, .9, .4, -1, .2, 3, 2, 1]); s[3:7] /= np.linalg.norm(s[3:7])\n"
-        "worlds = [r.World(np.array([0, -9.8, 0]), r.Floor(.5, k, .01), (.1, .2)) for k in (False, True)]\n"
+        "worlds = [r.World(np.array([0, -9.8, 0]), r.Floor(.5, k, .01), (.1, .2)) for k in (0.0, np.inf)]\n"
         "rows = [r.simulate(s, b, world, 1e-3, 900) for world in worlds]\n"
         "sys.stdout.write(np.array(rows).tobytes().hex())\n"
     )

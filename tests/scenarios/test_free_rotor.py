@@ -79,9 +79,7 @@ def test_known_periods():
 
 moments = arrays(float, 3, elements=st.floats(0.2, 1.0)).map(lambda parts: parts.sum() - parts + 0.0)
 spins = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
-orientations = (
-    arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1).map(lambda q: q / np.linalg.norm(q))
-)
+orientations = arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1).map(lambda q: q / np.linalg.norm(q))
 
 
 @given(moments, spins, orientations)

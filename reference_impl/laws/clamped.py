@@ -1,0 +1,24 @@
+"""`law=clamped`: sticking as in eq 17, with the largest restitution up to µ that adds no energy.
+
+Kinetic energy is u·K⁻¹u/2 of the contact velocity u plus a part that no impulse changes; after eq 17 it is µ² u_n² (K⁻¹)_nn / 2.
+Without friction it is the normal law, because eq 15 can add energy even at µ = 0.
+Source: follows from eq 12 and 15; A. Chatterjee & A. Ruina, J. Applied Mechanics 65 (1998), for the bound.
+"""
+
+import math
+
+from reference_impl.contacts.mean import N
+from reference_impl.laws import normal
+from reference_impl.vectors import compiled, dot, solve
+
+
+@compiled
+def impulse(K, u, mu, friction):
+    """The impulse j = K⁻¹ (-u - µ' u_n N) with µ' = min(µ, √(u·K⁻¹u / (u_n² N·K⁻¹N)))."""
+    if friction == 0.0:
+        return normal.impulse(K, u, mu, friction)
+    v_normal = dot(u, N)
+    before = dot(u, solve(K, u))
+    at_one = v_normal * v_normal * dot(N, solve(K, N))
+    most = math.sqrt(max(before, 0.0) / at_one) if at_one > 0.0 else 0.0
+    return solve(K, -u - min(mu, most) * v_normal * N)

@@ -1,0 +1,20 @@
+"""`law=note`: eq 15 without friction, eq 17 where the floor sticks.
+
+Eq 15 keeps the tangential velocity of the contact, so its impulse is not normal: it pushes sideways, and it can add energy, by up
+to a factor of 7 at restitution 1. Eq 17 can add energy at restitution above .66 (a solid box), and can pull.
+Source: H. Wang, Rigid Body Dynamics, eq 11 to 17.
+"""
+
+from reference_impl.contacts.mean import N
+from reference_impl.vectors import compiled, dot, solve
+
+
+@compiled
+def impulse(K, u, mu, friction):
+    """The impulse j that takes the contact velocity u to the prescribed one: K j = change."""
+    v_normal = dot(u, N)
+    if friction > 0.0:
+        change = -u - mu * v_normal * N  # eq 17
+    else:
+        change = -(1.0 + mu) * v_normal * N  # eq 11
+    return solve(K, change)

@@ -1,0 +1,1 @@
+"""How a body turns: `rotation=…`, each a `turn(q, w, dt, body)`."""

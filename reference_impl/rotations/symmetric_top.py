@@ -1,0 +1,57 @@
+"""`rotation=symmetric-top`: the body as a symmetric top and a turn about one axis, each exact, composed to fourth order.
+
+    T = (m₁² + m₂²)/2I₁ + m₃²/2I₃   +   m₂²/2 (1/I₂ - 1/I₁)
+
+Order 4: Strang's splitting, five times, with Suzuki's steps. Keeps L in space to rounding; energy oscillates and does not drift. Sound up
+to |ω| dt of about 1.6. The axes are ordered so that I₁ and I₂ are the closest: for a symmetric body it is exact.
+Source: S. Reich, Physica D 76 (1994), and A. Dullweber, B. Leimkuhler & R. McLachlan, J. Chem. Phys. 107 (1997), for splitting the free
+body; M. Suzuki, Phys. Lett. A 146 (1990), for the composition.
+"""
+
+import math
+
+from reference_impl.quaternion import conjugate, normalise, product, rotation_matrix
+from reference_impl.vectors import Quat, Vec3, compiled, dot, transpose
+
+OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+INNER = 1.0 - 4.0 * OUTER
+
+
+@compiled
+def turn(q, w, dt, body):
+    """Orientation and angular velocity (q, ω) after dt."""
+    q = product(q, body.axes)  # work along the principal axes
+    spin = transpose(rotation_matrix(q)) @ w
+    I = body.moments  # noqa: E741  # the field's letter
+    m = Vec3(I.x * spin.x, I.y * spin.y, I.z * spin.z)
+    for part in range(5):
+        h = (INNER if part == 2 else OUTER) * dt
+        q, m = _about_second(q, m, 0.5 * h, I)
+        q, m = _symmetric_top(q, m, h, I)
+        q, m = _about_second(q, m, 0.5 * h, I)
+    q = normalise(q)
+    w = rotation_matrix(q) @ Vec3(m.x / I.x, m.y / I.y, m.z / I.z)
+    return product(q, conjugate(body.axes)), w
+
+
+@compiled
+def _about_second(q, m, h, I):  # noqa: E741
+    """The flow of m₂²/2 (1/I₂ - 1/I₁): a turn about the second axis."""
+    angle = h * m.y * (1.0 / I.y - 1.0 / I.x)
+    c, s = math.cos(angle), math.sin(angle)
+    half = 0.5 * angle
+    return product(q, Quat(0.0, math.sin(half), 0.0, math.cos(half))), Vec3(c * m.x - s * m.z, m.y, s * m.x + c * m.z)
+
+
+@compiled
+def _symmetric_top(q, m, h, I):  # noqa: E741
+    """The flow of the symmetric top: a turn about L by h |L|/I₁, then one about its own axis."""
+    length = math.sqrt(dot(m, m))
+    half = 0.5 * h * length / I.x
+    # sin(half)/length, which is h/(2 I₁) where the body is at rest
+    share = math.sin(half) / length if length > 0.0 else 0.0
+    angle = h * m.z * (1.0 / I.z - 1.0 / I.x)
+    c, s = math.cos(angle), math.sin(angle)
+    about_momentum = Quat(share * m.x, share * m.y, share * m.z, math.cos(half))
+    about_axis = Quat(0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle))
+    return product(product(q, about_momentum), about_axis), Vec3(c * m.x + s * m.y, -s * m.x + c * m.y, m.z)

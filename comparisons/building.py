@@ -1,5 +1,7 @@
 """Every engine must simulate the same body: what was built is read back and held against the scene."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,7 @@ from comparisons.engines.base import Engine, Simulation
 from scenarios import Scenario
 
 ULPS = 8
+UNIT = 1e-5  # how far a quaternion's length may be from 1; single precision drifts by 1e-7
 
 
 class BuiltDifferently(Exception):
@@ -30,6 +33,21 @@ def assert_built_as_meant(engine: Engine, scene: Scenario, simulation: Simulatio
         _assert_equal(engine, "mass", np.array([built.mass]), np.array([scene.body.mass]))
         _assert_equal(engine, "inertia", built.inertia, scene.body.inertia_tensor)
         _assert_equal(engine, "gravity", built.gravity, scene.acceleration)
+
+
+def sound_record(states: Any, rows: int) -> NDArray[np.float64]:
+    """An engine's record as float64, if it is one: the asked number of states, unit quaternions wherever they are finite."""
+    if np.iscomplexobj(states):
+        raise BuiltDifferently("the record is of complex numbers")
+    record = np.asarray(states, dtype=float)
+    if record.shape != (rows, 13):
+        raise BuiltDifferently(f"the record has shape {record.shape}; {rows} states of 13 numbers were asked for, ({rows}, 13)")
+    lengths = np.linalg.norm(record[:, 3:7], axis=1)
+    off = np.abs(lengths - 1.0) > UNIT
+    if off.any():
+        row = int(np.argmax(off))
+        raise BuiltDifferently(f"the quaternion of row {row} has length {lengths[row]:.6g}; an orientation has length 1")
+    return record
 
 
 def _assert_equal(engine: Engine, what: str, found: NDArray[np.float64], meant: NDArray[np.float64]) -> None:

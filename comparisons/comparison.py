@@ -82,22 +82,28 @@ class Comparison:
             before = 0.0 if number == 0 else 0.25 * max(end - start, start - edges[number - 1])
             after = 0.0 if number == len(self.impacts) else 0.25 * (end - start)
             held = rows[(times >= start + before) & (times <= end - after)]
-            if end - start >= SHORTEST_FLIGHT * self.dt and len(held):
+            if number == 0 or (end - start >= SHORTEST_FLIGHT * self.dt and len(held)):
                 inner.append(held)
-        if not inner:
-            raise Unresolved(f"no flight lasts {SHORTEST_FLIGHT} steps of {self.dt:g} s")
         return inner
 
     @cached_property
     def energy_scale(self) -> float:
         """The energy the scene plays with [J]: M g H down to the floor or the start's kinetic energy, whichever is larger.
 
-        Without a floor it is the reference's largest kinetic energy.
+        Without a floor it is the reference's largest kinetic energy; for a body that lies still, M g times its size.
+
+        Raises:
+            Unresolved: There is no energy at all.
         """
+        weight = self.scene.body.mass * float(np.linalg.norm(self.scene.acceleration))
         if self.scene.floor is None and self.reference is not None:
-            return float(kinetic_energy(self.scene, self.reference).max())
-        fall = self.scene.body.mass * float(np.linalg.norm(self.scene.acceleration)) * self.scene.clearance
-        return max(fall, float(kinetic_energy(self.scene, self.motion[:1])[0]))
+            scale = float(kinetic_energy(self.scene, self.reference).max())
+        else:
+            scale = max(weight * self.scene.clearance, float(kinetic_energy(self.scene, self.motion[:1])[0]))
+        scale = scale or weight * self.scene.body.size  # a body that lies still
+        if scale == 0.0:
+            raise Unresolved("nothing moves and nothing pulls: there is no energy to measure by")
+        return scale
 
     @cached_property
     def first_contact(self) -> tuple[int, int] | None:

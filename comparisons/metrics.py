@@ -97,6 +97,10 @@ def _has_impact(scene: Scenario, truth: Truth | None) -> bool:
     return truth is not None and len(truth.events) > 0 and scene.clearance > 0.0
 
 
+def _has_apex(scene: Scenario, truth: Truth | None) -> bool:
+    return _has_impact(scene, truth) and bool(scene.acceleration[1] < 0.0)
+
+
 def _has_floor(scene: Scenario, truth: Truth | None) -> bool:
     return scene.floor is not None
 
@@ -139,7 +143,7 @@ def energy_gain(case: Comparison) -> float:
     return float(np.max(over_time - np.minimum.accumulate(over_time))) / case.energy_scale
 
 
-@_metric("1", "truth", "a truth with an impact", _has_impact, signed=True, agreement=True)
+@_metric("1", "truth", "a truth with an impact, gravity downwards", _has_apex, signed=True, agreement=True)
 def bounce_height_error(case: Comparison) -> float:
     """Apex of the centre of mass after the first impact minus the truth's, over the height of the drop."""
     if len(case.flights) < 2:
@@ -153,11 +157,16 @@ def bounce_height_error(case: Comparison) -> float:
 def restitution_error(case: Comparison) -> float:
     """Separation over approach speed of the contact point in the first impact, native rows, minus the restitution."""
     assert case.scene.floor is not None
+    if not case.impacts or case.impacts[0] > case.motion.t[-1] - 3.0 * case.dt:
+        raise Unresolved("the impact falls into the last three steps")
     if case.first_contact is None:
         return float("nan")  # it should have hit the floor
     before, after = case.first_contact
     approach, separation = (case.normal_velocity_of_contact(row, contact_row=before) for row in (before, after))
-    return -separation / approach - case.scene.floor.restitution
+    if not approach < 0.0:
+        return float("nan")  # what changed its velocity was no impact
+    meant = 0.0 if -approach < case.scene.floor.rest_speed else case.scene.floor.restitution
+    return -separation / approach - meant
 
 
 @_metric("1", "truth", "a truth with spin", _spins, agreement=True)
@@ -189,7 +198,7 @@ def position_error(case: Comparison) -> float:
     return float(np.max(np.linalg.norm(case.compared.position - case.exact.position, axis=1)))
 
 
-@_metric("rad", "truth", "a truth with spin", _spins)
+@_metric("rad", "truth", "a truth", _has_truth)
 def orientation_error(case: Comparison) -> float:
     """Largest angle of the rotation that takes the truth's attitude to the engine's."""
     return float(np.max(angle_between_orientations(case.compared.orientation, case.exact.orientation)))
@@ -204,7 +213,7 @@ def penetration(case: Comparison) -> float:
 def _apex(scene: Scenario, motion: Trajectory) -> Array:
     """The height to which a body in flight rises, or has risen [m], from each of its states alike."""
     v = motion.velocity[:, 1]
-    return v * v / (2.0 * np.linalg.norm(scene.acceleration)) + motion.position[:, 1] - motion.velocity_lag * v
+    return v * v / (-2.0 * scene.acceleration[1]) + motion.position[:, 1] - motion.velocity_lag * v
 
 
 def _largest_of_each_flight(values: Array, case: Comparison) -> Array:

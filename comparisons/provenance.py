@@ -12,8 +12,8 @@ from typing import Any
 STAMPED = ("dropspin", "numpy", "numba", "scipy", "mujoco", "pybullet")
 
 
-def provenance(asked: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What `run.json` holds besides the scenes themselves."""
+def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Where and when a run starts, and what it was asked for."""
     return {
         "asked": dict(asked),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -23,7 +23,6 @@ def provenance(asked: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[st
         "cpu": processor(),
         "cores": os.cpu_count(),
         "commit": _commit(),
-        "settings": dict(settings),
     }
 
 

@@ -8,22 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.building import assert_built_as_meant
+from comparisons.building import assert_built_as_meant, sound_record
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Diverged, Engine, EngineMissing
 from comparisons.engines.registry import engine as engine_named
-from comparisons.metrics import Metric, metrics_for
+from comparisons.metrics import METRICS, Metric, metrics_for
 from comparisons.phases import start_phases
 from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
-from comparisons.verdicts import assert_metrics_exist, judge
+from comparisons.verdicts import assert_expectations_can_be_judged, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
 DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
 TIMED_REPEATS = 3
 LEAST_STEPS = 4
+MOST_STEPS = 2_000_000  # of one run; 32 start phases of that many are what a machine's memory holds
 
-Progress = Callable[[str], None]
+Progress = Callable[[str, str, float], None]
 Row = dict[str, Any]
 
 
@@ -44,13 +45,13 @@ def simulate(scene: Scenario, engine: str | Engine, dt: float, every: int = 1) -
         Diverged: The engine gave up.
     """
     chosen = engine_named(engine) if isinstance(engine, str) else engine
-    _assert_step_fits(scene, dt)
+    assert_step_fits(scene, dt)
     refusal = chosen.declines(scene)
     if refusal is not None:
         raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
     with chosen.prepare(scene, dt) as simulation:
         assert_built_as_meant(chosen, scene, simulation)
-        states = simulation.record(scene.steps(dt), every)
+        states = sound_record(simulation.record(scene.steps(dt), every), 1 + scene.steps(dt) // every)
         lag = 0.5 * dt if simulation.staggered else 0.0
     return Trajectory.from_states(dt * every * np.arange(len(states), dtype=float), states, lag)
 
@@ -59,7 +60,7 @@ def run(
     scenes: Sequence[Scenario],
     engines: Sequence[str | Engine],
     dts: Sequence[float] = DEFAULT_DTS,
-    progress: Progress = lambda done: None,
+    progress: Progress = lambda scene, engine, dt: None,
 ) -> Results:
     """Run every scene through every engine at every step, measure, and judge.
 
@@ -67,16 +68,19 @@ def run(
         scenes: The scenes; their names must differ.
         engines: Engines, or names with options. One that is not installed is `missing` in the results, and the rest runs.
         dts: Time steps [s].
-        progress: Called with a short text after each of len(scenes) * len(engines) * len(dts) pieces of work.
+        progress: Called with scene, engine and step after each of len(scenes) * len(engines) * len(dts) pieces of work.
 
     Raises:
         DropspinError: Something was asked for that cannot be: an unknown engine, a step that is no step, equal names.
     """
-    _assert_sensible(scenes, dts)
     contestants = [_contestant(name) for name in engines]
     labels = [contestant.label for contestant in contestants]
+    _assert_sensible(scenes, dts, labels)
     if len(set(labels)) < len(labels):
         raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
+    asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)}
+    stamp = provenance(asked)
+    stamp = provenance({"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)})
     rows: list[Row] = []
     trajectories: dict[TrajectoryKey, Trajectory] = {}
     settings: dict[str, dict[str, Any]] = {}
@@ -91,11 +95,11 @@ def run(
                     settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
                 rows += _truth_rows(scene, dt, attempt, phases)
                 attempts.append(attempt)
-                progress(f"{scene.name} {contestant.label} dt={dt:g}")
+                progress(scene.name, contestant.label, dt)
             for first, second in combinations(attempts, 2):
                 rows += _agreement_rows(scene, dt, first, second, phases)
-    asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)}
-    return Results(as_frame(rows), {scene.name: scene for scene in scenes}, tuple(labels), trajectories, provenance(asked, settings))
+    by_name = {scene.name: scene for scene in scenes}
+    return Results(as_frame(rows), by_name, tuple(labels), trajectories, stamp | {"settings": settings})
 
 
 def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:
@@ -197,16 +201,17 @@ def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: lis
     """A metric's mean over the start phases, judged."""
     try:
         value = metric.value(cases)
+        unresolved = ""
     except Unresolved as error:
-        return {"verdict": "measured", "cause": "unresolved", "reason": str(error)}
+        value, unresolved = float("nan"), str(error)
     judgement = judge(scene, label, dt, metric, value)
-    return {
-        "value": value,
-        "lower": judgement.lower,
-        "upper": judgement.upper,
-        "verdict": judgement.verdict,
-        "reason": judgement.reason,
-    }
+    reason = "; ".join(filter(None, [unresolved, judgement.reason]))
+    # What should be a number and is none is a failure, expected or not; what the step cannot resolve fails only what was expected.
+    verdict = "failed" if np.isnan(value) and not unresolved else judgement.verdict
+    if verdict == "failed" and not reason:
+        reason = "not a number: what is measured here never happened"
+    cause = "unresolved" if unresolved else ""
+    return {"value": value, "lower": judgement.lower, "upper": judgement.upper, "verdict": verdict, "cause": cause, "reason": reason}
 
 
 def _agreement_rows(
@@ -215,16 +220,14 @@ def _agreement_rows(
     """How far two engines are apart, by the metrics that mean something between engines."""
     if first.verdict or second.verdict or any(m.first_bad_row is not None for m in first.phases + second.phases):
         return []
-    cases = []
-    for (phase, truth), one, other in zip(phases, first.phases, second.phases, strict=True):
-        impacts = () if truth is None else tuple(event.time for event in truth.events)
-        until = len(one) if truth is None else int(np.sum(one.t <= truth.horizon * (1.0 + 1e-9)))
-        cases.append(Comparison(phase, one, other[:until], impacts))
+    cases = [
+        _side_by_side(phase, truth, one, other) for (phase, truth), one, other in zip(phases, first.phases, second.phases, strict=True)
+    ]
     shared: Row = {"scene": scene.name, "engine": first.label, "dt": dt, "kind": "agreement", "truth": second.label}
     shared["steps"] = scene.steps(dt)
     rows = []
-    for metric in metrics_for(scene, phases[0][1]):
-        if not metric.agreement:
+    for metric in METRICS.values():
+        if not (metric.agreement and metric.applies(scene, phases[0][1] or _as_truth(second.phases[0]))):
             continue
         try:
             found: Row = {"value": metric.value(cases)}
@@ -234,6 +237,21 @@ def _agreement_rows(
     return rows
 
 
+def _side_by_side(scene: Scenario, truth: Truth | None, one: Trajectory, other: Trajectory) -> Comparison:
+    """Two engines' motions as far as they can be compared: to the truth's horizon, else to the first contact of either."""
+    if truth is not None:
+        until = int(np.sum(one.t <= truth.horizon * (1.0 + 1e-9)))
+        return Comparison(scene, one, other[:until], tuple(event.time for event in truth.events))
+    contacts = [Comparison(scene, motion).first_contact for motion in (one, other)]
+    until = min([len(one), *(contact[0] + 1 for contact in contacts if contact is not None)])
+    return Comparison(scene, one[: max(until, 2)], other[: max(until, 2)])
+
+
+def _as_truth(motion: Trajectory) -> Truth:
+    """An engine's motion in the place of a truth, to ask which metrics have something to compare."""
+    return Truth("engine", "", lambda t: motion.states[: len(t)])
+
+
 def _value_or_nan(metric: Metric, case: Comparison) -> float:
     try:
         return metric.value([case])
@@ -241,19 +259,22 @@ def _value_or_nan(metric: Metric, case: Comparison) -> float:
         return float("nan")
 
 
-def _assert_sensible(scenes: Sequence[Scenario], dts: Sequence[float]) -> None:
+def _assert_sensible(scenes: Sequence[Scenario], dts: Sequence[float], labels: Sequence[str]) -> None:
     names = [scene.name for scene in scenes]
     if len(set(names)) < len(names):
         raise DropspinError(f"two scenes have the same name ({', '.join(names)}); a scene's name is its file's, rename one.")
+    if len(set(dts)) < len(dts):
+        raise DropspinError(f"dt: a step is named twice ({', '.join(f'{dt:g}' for dt in dts)}); name each once.")
     for scene in scenes:
-        assert_metrics_exist(scene)
+        assert_expectations_can_be_judged(scene, truth_for(scene), labels)
         for dt in dts:
-            _assert_step_fits(scene, dt)
+            assert_step_fits(scene, dt)
 
 
-def _assert_step_fits(scene: Scenario, dt: float) -> None:
-    if not (np.isfinite(dt) and dt > 0.0 and scene.steps(dt) >= LEAST_STEPS):
+def assert_step_fits(scene: Scenario, dt: float) -> None:
+    """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s]."""
+    if not (np.isfinite(dt) and dt > 0.0 and LEAST_STEPS <= scene.duration / dt + 1e-9 <= MOST_STEPS):
         raise DropspinError(
-            f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be above 0 "
-            f"and at most {scene.duration / LEAST_STEPS:g} s."
+            f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be "
+            f"at least {scene.duration / MOST_STEPS:g} s and at most {scene.duration / LEAST_STEPS:g} s."
         )

@@ -1,11 +1,14 @@
 """From a value and a scene's expectations to a bound and a verdict."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from comparisons.engines.base import EngineMissing
+from comparisons.engines.registry import BUILT_IN, engine
 from comparisons.metrics import METRICS, Metric
-from scenarios import Scenario, SceneError
+from scenarios import Scenario, SceneError, Truth
 from scenarios.errors import did_you_mean
 from scenarios.model import Expectation
 
@@ -25,17 +28,39 @@ class Judgement:
     reason: str
 
 
-def assert_metrics_exist(scene: Scenario) -> None:
-    """Raise `SceneError` if an expectation names a metric that does not exist."""
+def assert_expectations_can_be_judged(scene: Scenario, truth: Truth | None, engines: Iterable[str]) -> None:
+    """Raise `SceneError` if an expectation would never be judged: no such metric, not for this scene, no such engine."""
+    known_engines = {*BUILT_IN, *(label.split("[")[0] for label in engines)}
     for number, expectation in enumerate(scene.expect):
+        where = f"{scene.origin or scene.name}: expect[{number}]"
         if expectation.metric not in METRICS:
             raise SceneError(
-                f"{scene.name}: expect[{number}].metric: got {expectation.metric!r}; no such metric."
+                f"{where}.metric: got {expectation.metric!r}; no such metric."
                 f"{did_you_mean(expectation.metric, METRICS)} Known: {', '.join(METRICS)}."
             )
+        metric = METRICS[expectation.metric]
+        if not metric.applies(scene, truth):
+            raise SceneError(f"{where}.metric: got {metric.name!r}; it needs {metric.needs}, which this scene has not.")
+        base = (expectation.engine or "document").split("[")[0]
+        if base not in known_engines and ":" not in base:
+            raise SceneError(
+                f"{where}.engine: got {expectation.engine!r}; no such engine.{did_you_mean(base, known_engines)} "
+                f"Known: {', '.join(sorted(known_engines))}."
+            )
+        if expectation.engine and base in BUILT_IN:
+            canonical = _canonical(expectation.engine)
+            if canonical != expectation.engine:
+                raise SceneError(f"{where}.engine: got {expectation.engine!r}; write it as {canonical!r}, as the results do.")
 
 
-def judge(scene: Scenario, engine: str, dt: float, metric: Metric, value: float) -> Judgement:
+def _canonical(engine_name: str) -> str:
+    try:
+        return engine(engine_name).label
+    except EngineMissing:
+        return engine_name  # nothing to compare it with here
+
+
+def judge(scene: Scenario, label: str, dt: float, metric: Metric, value: float) -> Judgement:
     """Hold one value against what the scene expects of this engine at this step.
 
     The most narrowly named expectations count: for an engine at a step, else for an engine, else for a step, else for all.
@@ -45,7 +70,7 @@ def judge(scene: Scenario, engine: str, dt: float, metric: Metric, value: float)
         expectation
         for expectation in scene.expect
         if expectation.metric == metric.name
-        and expectation.engine in (None, engine)
+        and expectation.engine in (None, label)
         and (expectation.dt is None or any(math.isclose(step, dt, rel_tol=1e-9) for step in expectation.dt))
     ]
     if not matching:

@@ -1,5 +1,7 @@
 """Mass and inertia: the note's eq 2 and 8, and the solids that engines build from a shape."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,8 +23,8 @@ def vertex_inertia(points: NDArray[np.float64], masses: NDArray[np.float64]) -> 
     Returns:
         Inertia about the centre of mass [kg m²], shape (3, 3).
     """
-    squares = np.sum(masses * np.sum(points * points, axis=1))
-    return squares * np.eye(3) - (points.T * masses) @ points
+    products = np.array([[math.fsum(masses * a * b) for b in points.T] for a in points.T])  # Σ mᵢ pᵢpᵢᵀ, summed exactly
+    return np.trace(products) * np.eye(3) - products
 
 
 def solid_box_inertia(mass: float, half_extents: NDArray[np.float64]) -> NDArray[np.float64]:

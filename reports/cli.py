@@ -1,7 +1,12 @@
 """The command line."""
 
+import io
 import json
+import math
+import os
+import signal
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -16,25 +21,45 @@ if TYPE_CHECKING:
 
 CORE_ENGINES = ("document", "mujoco", "pybullet")
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+OWN_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor the user's mistake
 
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
 
 
 def main() -> None:
     """Run the command line; every expected mistake ends in one line and exit code 2."""
-    from scenarios import DropspinError
-
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that lacks a sign gets a question mark, not a traceback
+    # Like Ctrl-C, so that nothing unfinished is left behind.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        sys.exit(dropspin(standalone_mode=False))
-    except click.ClickException as error:
-        error.show()
-        sys.exit(2)
-    except DropspinError as error:
-        click.echo(f"dropspin: {error}", err=True)
-        sys.exit(2)
+        sys.exit(_run())
     except (click.Abort, KeyboardInterrupt):
         click.echo("dropspin: interrupted; nothing was written.", err=True)
         sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # the reader has gone; Python would flush into the void at exit
+        sys.exit(INTERRUPTED)
+    except OSError as error:
+        click.echo(f"dropspin: {error}", err=True)
+        sys.exit(2)
+    except Exception:
+        click.echo("dropspin: an error of dropspin's own; please report what follows.", err=True)
+        traceback.print_exc()
+        sys.exit(OWN_ERROR)
+
+
+def _run() -> int:
+    from scenarios import DropspinError
+
+    try:
+        return dropspin(standalone_mode=False) or 0
+    except click.ClickException as error:
+        error.show()
+    except DropspinError as error:
+        click.echo(f"dropspin: {error}", err=True)
+    return 2
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -80,21 +105,26 @@ def run(scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...
     """
     import comparisons
     import reports
-    from reports.folder import assert_replaceable
+    from reports.folder import fill, run_folder
 
-    assert_replaceable(output)
     loaded = [_load(name) for name in scenes] if scenes else _core_catalogue()
     chosen = engines or CORE_ENGINES
     steps = dts or comparisons.DEFAULT_DTS
-    with _progress(len(loaded) * len(chosen) * len(steps)) as progress:
-        results = comparisons.run(loaded, chosen, steps, progress)
-    with _status("writing the report"):
-        path = reports.write(results, output)
+    with run_folder(output) as folder:
+        with _progress(len(loaded) * len(chosen) * len(steps)) as progress:
+            results = comparisons.run(loaded, chosen, steps, progress)
+        if not json_output:
+            reports.print_table(results)
+        with _status("writing the report"):
+            fill(results, folder)
     if json_output:
-        click.echo(results.frame.to_json(orient="records", indent=1))
+        rows = [
+            {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in row.items()}
+            for row in results.frame.to_dict("records")
+        ]
+        click.echo(json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        reports.print_table(results)
-        click.echo(f"Report: {path}")
+        click.echo(f"Report: {os.path.join(output, 'report.html')}")
     named = frozenset(name.strip() for name in engines)
     return results.exit_code(named)
 
@@ -189,11 +219,13 @@ def _metric_rows() -> list[dict[str, str]]:
 
 
 def _description(scene: "Scenario") -> list[dict[str, str]]:
+    from comparisons.verdicts import assert_expectations_can_be_judged
     from reports.html import left_out, modelled
     from reports.numbers import bound
     from scenarios import truth_for
 
     truth = truth_for(scene)
+    assert_expectations_can_be_judged(scene, truth, [])
     start = scene.start
     facts = {
         "scene": scene.name,
@@ -221,7 +253,9 @@ def _description(scene: "Scenario") -> list[dict[str, str]]:
 def _built(scene: "Scenario", engine_name: str, dt: float) -> list[dict[str, str]]:
     from comparisons import engine
     from comparisons.building import assert_built_as_meant
+    from comparisons.run import assert_step_fits
 
+    assert_step_fits(scene, dt)
     chosen = engine(engine_name)
     refusal = chosen.declines(scene)
     if refusal is not None:
@@ -257,7 +291,7 @@ def _print_rows(rows: list[dict[str, str]], json_output: bool) -> None:
 
 
 @contextmanager
-def _progress(total: int) -> "Iterator[Callable[[str], None]]":
+def _progress(total: int) -> "Iterator[Callable[[str, str, float], None]]":
     """A bar on a terminal; elsewhere one line a scene. All of it on the standard error."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -266,8 +300,7 @@ def _progress(total: int) -> "Iterator[Callable[[str], None]]":
     if not console.is_terminal:
         seen: set[str] = set()
 
-        def line(done: str) -> None:
-            scene = done.split(" ", 1)[0]
+        def line(scene: str, engine: str, dt: float) -> None:
             if scene not in seen:
                 seen.add(scene)
                 click.echo(f"running {scene}", err=True)
@@ -276,10 +309,10 @@ def _progress(total: int) -> "Iterator[Callable[[str], None]]":
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("compiling the note's method", total=total)
+        task = bar.add_task("starting", total=total)
 
-        def advance(done: str) -> None:
-            bar.update(task, advance=1, description=done)
+        def advance(scene: str, engine: str, dt: float) -> None:
+            bar.update(task, advance=1, description=f"{scene} {engine} {dt:g} s")
 
         yield advance
 

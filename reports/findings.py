@@ -1,5 +1,6 @@
 """What a run found, in words and counts; the one place that reports agree on."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +9,9 @@ import pandas as pd
 from comparisons import Results
 from comparisons.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 
-PLATEAU = 1.5
-"""An error that shrinks by less than this over the whole range of steps does not shrink with the step."""
+LEAST_STEPS = 3
+SMALLEST_RANGE = 3.99
+"""Fewer steps than three, or a range of less than four, say nothing about how errors shrink."""
 NEGLIGIBLE = 1e-4
 """Errors below this (of the scene's scale, in m or in rad) are not worth a sentence."""
 
@@ -49,20 +51,27 @@ def failures(results: Results) -> pd.DataFrame:
 
 def plateaus(results: Results) -> dict[str, list[str]]:
     """For each engine the scenes in which an error against the truth does not shrink with the step."""
-    if results.frame["dt"].nunique() < 2:
-        return {engine: [] for engine in results.engines}
-    truth = results.frame[(results.frame["kind"] == "truth") & results.frame["value"].notna()]
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[str]] = {engine: [] for engine in results.engines}
+    truth = results.frame[(results.frame["kind"] == "truth") & (results.frame["metric"] != "energy_error_raw")]
     for engine in results.engines:
         mine = truth[truth["engine"] == engine]
-        if mine.empty:
-            found[engine] = []
+        table = mine.pivot_table(index=["scene", "metric"], columns="dt", values="value", sort=True, dropna=False)
+        dts = [float(dt) for dt in sorted(mine["dt"].unique())]
+        if not _says_something(dts):
             continue
-        sizes = mine.assign(value=mine["value"].abs()).pivot_table(index=["scene", "metric"], columns="dt", values="value", sort=False)
-        finest, coarsest = sizes[mine["dt"].min()], sizes[mine["dt"].max()]
-        stuck = finest[(finest > NEGLIGIBLE) & (coarsest < PLATEAU * finest)]
-        found[engine] = [str(scene) for scene in stuck.index.unique("scene")]
+        errors = table.to_numpy()
+        # An error that changes its sign, or is not known at every step, shows no trend.
+        steady = np.abs(np.sign(errors).sum(axis=1)) == len(dts)
+        finest, coarsest = np.abs(errors[:, 0]), np.abs(errors[:, -1])
+        # Halfway, on a logarithmic scale, between no order and first order.
+        stuck = steady & (finest > NEGLIGIBLE) & (coarsest < np.sqrt(dts[-1] / dts[0]) * finest)
+        concerned = set(table.index[stuck].get_level_values("scene"))
+        found[engine] = [scene for scene in results.scenes if scene in concerned]
     return found
+
+
+def _says_something(dts: Sequence[float]) -> bool:
+    return len(dts) >= LEAST_STEPS and max(dts) / min(dts) >= SMALLEST_RANGE
 
 
 def verdict_sentence(results: Results) -> str:
@@ -70,11 +79,14 @@ def verdict_sentence(results: Results) -> str:
     tally = counts(results)
     judged = tally.passed + tally.failed
     if tally.broken:
-        return f"{tally.broken} engine runs broke down; of {judged} expectations {tally.failed} fail."
+        judgement = f"; of {judged} expectations {tally.failed} fail" if judged else ""
+        return f"{tally.broken} {'run' if tally.broken == 1 else 'runs'} of an engine broke down{judgement}."
     if tally.failed:
         return f"{tally.failed} of {judged} expectations fail."
     if judged == 0:
-        return "No expectations were set; everything was measured."
+        set_at_all = any(scene.expect for scene in results.scenes.values())
+        none = "No expectation is for these engines at these steps" if set_at_all else "No expectations were set"
+        return f"{none}; everything was measured."
     return f"All {judged} expectations hold."
 
 
@@ -84,7 +96,7 @@ def finding_sentences(results: Results) -> list[str]:
     sentences = []
     missing = results.frame[results.frame["verdict"] == "missing"].drop_duplicates("engine")
     sentences += [f"{row.reason}" for row in missing.itertuples()]
-    if len(steps) < 2:
+    if not _says_something(list(steps)):
         return sentences
     found = plateaus(results)
     ran = results.frame[results.frame["kind"] == "truth"].groupby("engine")["scene"].nunique()
@@ -97,5 +109,5 @@ def finding_sentences(results: Results) -> list[str]:
             )
         elif total:
             where = f"in all {total} scenes " if total > 1 else ""
-            sentences.append(f"{engine}: {where}every error above {NEGLIGIBLE:g} shrinks with the step.")
+            sentences.append(f"{engine}: {where}no error above {NEGLIGIBLE:g} stays as the step shrinks.")
     return sentences

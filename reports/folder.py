@@ -1,13 +1,19 @@
 """A run's folder, written whole or not at all."""
 
+import json
+import os
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from comparisons import Results
 from comparisons.store import save
 from reports.html import html_report, markdown_report, svg_plots
 from scenarios import DropspinError
+
+OURS = frozenset({"run.json", "results.parquet", "results.csv", "report.html", "report.md", "plots", "trajectories"})
 
 
 def write(results: Results, folder: str | Path) -> Path:
@@ -23,36 +29,84 @@ def write(results: Results, folder: str | Path) -> Path:
     Raises:
         DropspinError: The folder holds something that is not a run, or cannot be written.
     """
-    target = Path(folder)
-    assert_replaceable(target)
+    with run_folder(folder) as unfinished:
+        fill(results, unfinished)
+    return Path(folder) / "report.html"
+
+
+def fill(results: Results, folder: Path) -> None:
+    """Write everything of a run into an empty folder."""
+    save(results, folder)
+    results.frame.to_csv(folder / "results.csv", index=False)
+    (folder / "plots").mkdir()
+    plots = dict(svg_plots(results))
+    for name, text in plots.items():
+        (folder / "plots" / f"{name}.svg").write_text(text, encoding="utf-8")
+    (folder / "report.html").write_text(html_report(results, plots), encoding="utf-8")
+    (folder / "report.md").write_text(markdown_report(results), encoding="utf-8")
+
+
+@contextmanager
+def run_folder(folder: str | Path) -> Iterator[Path]:
+    """An empty folder beside the one asked for, which it replaces when the block ends well; else nothing is left of it.
+
+    Raises:
+        DropspinError: On entering, if the folder holds something else or cannot be written.
+    """
+    target = Path(os.path.realpath(folder))
+    made = []
     try:
+        _assert_replaceable(folder, target)
+        made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    except OSError as error:
-        raise DropspinError(f"{target}: cannot be written: {error.strerror}; choose another folder with -o.") from None
-    try:
+        unfinished = Path(tempfile.mkdtemp(prefix=f".{target.name[:100]}-unfinished-", dir=target.parent))
         unfinished.chmod(0o755)
-        save(results, unfinished)
-        results.frame.to_csv(unfinished / "results.csv", index=False)
-        (unfinished / "plots").mkdir()
-        plots = dict(svg_plots(results))
-        for name, text in plots.items():
-            (unfinished / "plots" / f"{name}.svg").write_text(text, encoding="utf-8")
-        (unfinished / "report.html").write_text(html_report(results, plots), encoding="utf-8")
-        (unfinished / "report.md").write_text(markdown_report(results), encoding="utf-8")
-        if target.exists():
-            shutil.rmtree(target)
+    except OSError as error:
+        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o.") from None
+    try:
+        yield unfinished
+        _assert_replaceable(folder, target)
+        _swap(unfinished, target)
+    except OSError as error:
+        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; the folder is as it was.") from error
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        for parent in made:
+            with suppress(OSError):  # it holds the run, or somebody else's
+                parent.rmdir()
+
+
+def _swap(unfinished: Path, target: Path) -> None:
+    """Put the new folder in the place of the old one, if there is one; if that fails the old one goes back."""
+    if not target.exists():
+        unfinished.rename(target)
+        return
+    old = unfinished.with_name(unfinished.name.replace("-unfinished-", "-old-"))
+    target.rename(old)
+    try:
         unfinished.rename(target)
     except BaseException:
-        shutil.rmtree(unfinished, ignore_errors=True)
+        old.rename(target)
         raise
-    return target / "report.html"
+    shutil.rmtree(old, ignore_errors=True)
 
 
-def assert_replaceable(folder: str | Path) -> None:
+def _assert_replaceable(given: str | Path, target: Path) -> None:
     """Raise `DropspinError` if writing a run there would destroy something else."""
-    target = Path(folder)
-    if target.is_dir() and any(target.iterdir()) and not (target / "run.json").is_file():
-        raise DropspinError(f"{target}: holds files that are no run of dropspin; choose an empty or new folder with -o.")
-    if target.exists() and not target.is_dir():
-        raise DropspinError(f"{target}: is a file; choose a folder with -o.")
+    if not target.exists():
+        return
+    if not target.is_dir():
+        raise DropspinError(f"{given}: is a file; choose a folder with -o.")
+    if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
+        raise DropspinError(f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it with -o.")
+    strangers = sorted(path.name for path in target.iterdir() if path.name not in OURS)
+    if strangers or (any(target.iterdir()) and not _is_run(target)):
+        example = f", {strangers[0]!r} for one" if strangers else ""
+        raise DropspinError(f"{given}: holds files that are no run of dropspin{example}; choose an empty or new folder with -o.")
+
+
+def _is_run(folder: Path) -> bool:
+    try:
+        return "provenance" in json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, TypeError):
+        return False

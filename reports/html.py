@@ -1,5 +1,6 @@
 """The report: one HTML file that needs no network."""
 
+import re
 from collections.abc import Iterator
 from functools import cache
 from typing import Any
@@ -21,12 +22,13 @@ from scenarios import Scenario, truth_for
 def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("reports"),
-        autoescape=select_autoescape(default=True),
+        autoescape=select_autoescape(enabled_extensions=("html",), disabled_extensions=("md",), default=True),
+        keep_trailing_newline=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"written": numbers.written, "word": numbers.word}
+    environment.filters |= {"written": numbers.written, "word": numbers.word, "cell": _markdown_cell}
     environment.globals |= {"bound": numbers.bound, "marks": numbers.MARKS}
     return environment
 
@@ -53,6 +55,11 @@ def svg_plots(results: Results) -> Iterator[tuple[str, str]]:
         figure = convergence_figure(results, scene)
         if figure is not None:
             yield f"{number:02d}-convergence", svg(figure, f"s{number:02d}-convergence")
+
+
+def _markdown_cell(text: str) -> str:
+    """Text that stays within its cell of a Markdown table and means nothing else there."""
+    return re.sub(r"([\\|`*_\[\]<>#])", r"\\\1", " ".join(str(text).split()))
 
 
 def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """The run on a terminal: scene by scene, engines side by side."""
 
 import math
+import shlex
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -68,5 +69,6 @@ def _print_failures(results: Results, out: Console) -> None:
     for row in failures(results).to_dict("records"):
         if row["metric"]:
             told = f"{row['metric']} is {written(row['value'])}, expected {bound(row['lower'], row['upper'])}: {row['reason']}"
-            again = f"dropspin run {row['scene']} -e '{row['engine']}' --dt {row['dt']:g}"
+            scene = results.scenes[row["scene"]]
+            again = shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", row["engine"], "--dt", repr(row["dt"])])
             out.print(Text(f"✗ {row['scene']} · {row['engine']} · {row['dt']:g} s: {told}. Again: {again}", style="red"))

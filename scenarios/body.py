@@ -1,5 +1,6 @@
 """The `[body]` table: what falls or spins, and the mass, inertia and vertices that follow from it."""
 
+import math
 from functools import cached_property
 from itertools import product
 from typing import Annotated, Any, Literal, Self
@@ -156,7 +157,8 @@ class Vertices(_Body):
         if isinstance(self.inertia, tuple):
             return np.diag(self.inertia)
         masses = self._point_masses if self.inertia == "vertices" else np.ones(len(self.points))
-        spread = np.einsum("i,ij,ik->jk", masses, self.vertices, self.vertices)
+        # Summed exactly: ten thousand roundings would look like another body to whoever compares to the last digits.
+        spread = np.array([[math.fsum(masses * a * b) for b in self.vertices.T] for a in self.vertices.T])
         return np.trace(spread) * np.eye(3) - spread
 
     @cached_property

@@ -1,5 +1,6 @@
 """From a name, a path or a mapping to a `Scenario`; bad input gets one line that says what is wrong and what is allowed."""
 
+import os
 import re
 import tomllib
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ FEATURES: dict[str, type[BaseModel]] = {
     "ensemble": Ensemble,
     "expect": Expectation,
 }
+INTERNAL = frozenset({"name", "origin"})
 SHAPES: dict[str, type[BaseModel]] = {"sphere": Sphere, "box": Box, "vertices": Vertices}
 
 
@@ -40,16 +42,19 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         name = scene.get("name", "scene")
         return _validate(str(name), f"scene {name!r}", {key: value for key, value in scene.items() if key != "name"})
     path = _find(scene)
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
     return _validate(path.stem, str(scene), _read(path, str(scene)))
 
 
 def _find(scene: str | Path) -> Path:
     text = str(scene)
-    if isinstance(scene, str) and (CATALOGUE / f"{text}.toml").is_file() and re.fullmatch(r"[a-z0-9-]+", text):
+    if isinstance(scene, str) and re.fullmatch(r"[a-z0-9-]{1,100}", text) and (CATALOGUE / f"{text}.toml").is_file():
         return CATALOGUE / f"{text}.toml"
     path = Path(scene)
-    looks_like_a_path = path.suffix == ".toml" or path.parent != Path() or path.exists()
-    if looks_like_a_path:
+    if path.suffix == ".toml" or path.parent != Path() or os.path.exists(path):
         return path
     raise SceneError(
         f"scene {text!r} is not in the catalogue and no file of that name exists."
@@ -58,13 +63,14 @@ def _find(scene: str | Path) -> Path:
 
 
 def _read(path: Path, given: str) -> dict[str, Any]:
-    if path.is_dir():
-        raise SceneError(f"{given}: is a directory; a scene is one TOML file.")
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise SceneError(f"{given}: {path.stat().st_size:,} bytes; a scene file has at most {LARGEST_FILE:,}.")
-        text = path.read_bytes().decode("utf-8")
-        return tomllib.loads(text)
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            raise SceneError(f"{given}: more than {LARGEST_FILE:,} bytes; no scene is that long.")
+        return tomllib.loads(content.decode("utf-8"))
+    except IsADirectoryError:
+        raise SceneError(f"{given}: is a directory; a scene is one TOML file.") from None
     except OSError as error:
         raise SceneError(f"{given}: {error.strerror}; give the path of a readable .toml file.") from None
     except UnicodeDecodeError as error:
@@ -76,10 +82,10 @@ def _read(path: Path, given: str) -> dict[str, Any]:
 
 
 def _validate(name: str, where: str, content: dict[str, Any]) -> Scenario:
-    if "name" in content:
-        raise SceneError(f"{where}: name: got {_shown(content['name'])}; a scene's name is its file's, the key is not allowed.")
+    for key in INTERNAL & content.keys():
+        raise SceneError(f"{where}: {key}: got {_shown(content[key])}; a scene's name is its file's, the key is not allowed.")
     try:
-        return Scenario.model_validate({"name": name, **content})
+        return Scenario.model_validate({"name": name, "origin": where, **content})
     except ValidationError as error:
         problems = error.errors(include_url=False)
         # A key that takes a word or something else is reported once for each; the word is beside the point for a number.
@@ -145,7 +151,7 @@ def _keys_allowed(location: tuple[Any, ...]) -> list[str]:
             keys = set().union(*(shape.model_fields for shape in SHAPES.values()))
             return sorted(keys)
         table = FEATURES[location[0]]
-    return [key for key in table.model_fields if key != "name"]
+    return [key for key in table.model_fields if key not in INTERNAL]
 
 
 def _shown(value: Any) -> str:

@@ -97,10 +97,11 @@ class Expectation(Table):
 class Scenario(Table):
     """One scene.
 
-    `name` is the file's, without its ending; everything else is the file's content (units: SI).
+    `name` is the file's, without its ending, and `origin` what was asked for to load it; everything else is the file's content (units: SI).
     """
 
     name: str
+    origin: Annotated[str, Field(exclude=True)] = ""
     summary: str = ""
     source: str = ""
     tags: tuple[str, ...] = ()
@@ -112,6 +113,13 @@ class Scenario(Table):
     damping: Damping | None = None
     ensemble: Ensemble | None = None
     expect: tuple[Expectation, ...] = ()
+
+    @model_validator(mode="after")
+    def _has_an_inertia(self) -> Self:
+        tensor = self.body.inertia_tensor
+        if not (np.isfinite(tensor).all() and np.linalg.eigvalsh(tensor)[0] > 0.0):
+            raise ValueError(f"body: its inertia is {tensor.tolist()} kg m², beyond what numbers can hold; scale the scene's units")
+        return self
 
     @model_validator(mode="after")
     def _starts_above_the_floor(self) -> Self:

@@ -102,8 +102,6 @@ class Engine:
     """What the engine's state carries: numpy.float64 or numpy.float32."""
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Each option's values, the default first."""
-    package: ClassVar[str] = ""
-    """The distribution that must be installed, if any."""
 
     options: Mapping[str, str] = field(default_factory=dict)
 

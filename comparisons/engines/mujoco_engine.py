@@ -34,7 +34,6 @@ class MuJoCo(Engine):
 
     name = "mujoco"
     choices: ClassVar = {"integrator": tuple(INTEGRATORS)}
-    package = "mujoco"
 
     @property
     def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
@@ -43,12 +42,16 @@ class MuJoCo(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         """What calibration cannot map."""
-        floor = scene.floor
+        body, floor = scene.body, scene.floor
+        if min(body.mass, *np.linalg.eigvalsh(body.inertia_tensor)) < mujoco.mjMINVAL:
+            return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
+        if scene.damping is not None and not _is_diagonal(body.inertia_tensor):
+            return "MuJoCo damps along the body's own axes; these are not principal axes"
         if floor is None:
             return None
         if self.option("integrator") == "rk4":
             return "RK4 has no restitution in one step: all its stages see the contact's damper; use integrator=euler on a floor"
-        if not isinstance(scene.body, (Sphere, Box)):
+        if not isinstance(body, (Sphere, Box)):
             return "only spheres and boxes are mapped onto a floor"
         if not isinstance(floor.friction, str):
             return "MuJoCo's convex friction cone adds normal velocity where a contact slips; friction is 'none' or 'infinite'"
@@ -148,12 +151,18 @@ def _specification(scene: Scenario, dt: float, integrator: str) -> Any:
 
 def _principal(inertia: Array) -> tuple[Array, Array]:
     """Principal moments and the quaternion [w, x, y, z] of their axes; the identity where the tensor is diagonal."""
-    if np.count_nonzero(inertia - np.diag(np.diag(inertia))) == 0:
+    if _is_diagonal(inertia):
         return np.diag(inertia), np.array([1.0, 0.0, 0.0, 0.0])
     from scipy.spatial.transform import Rotation
 
     moments, axes = np.linalg.eigh(inertia)
+    # A flat body's largest moment is the sum of the others, which MuJoCo does not let rounding exceed.
+    moments[2] = min(moments[2], np.nextafter(moments[0] + moments[1], 0.0))
     return moments, Rotation.from_matrix(axes * np.linalg.det(axes)).as_quat(scalar_first=True)
+
+
+def _is_diagonal(inertia: Array) -> bool:
+    return np.count_nonzero(inertia - np.diag(np.diag(inertia))) == 0
 
 
 def _add_contact(spec: Any, body: Any, scene: Scenario, dt: float) -> None:

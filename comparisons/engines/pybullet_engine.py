@@ -26,7 +26,6 @@ class PyBullet(Engine):
 
     name = "pybullet"
     order = 1.0
-    package = "pybullet"
 
     def declines(self, scene: Scenario) -> str | None:
         """What calibration cannot map."""
@@ -36,6 +35,9 @@ class PyBullet(Engine):
         floor = scene.floor
         if floor is None:
             return None
+        travel = np.linalg.norm(scene.start.position) + np.linalg.norm(scene.start.velocity) * scene.duration
+        if isinstance(scene.body, Box) and travel + scene.body.size > FLOOR_HALF_SIZE:
+            return f"the floor is a box of {2 * FLOOR_HALF_SIZE:g} m, and the body may leave it"
         if not isinstance(scene.body, (Sphere, Box)):
             return "only spheres and boxes are mapped onto a floor"
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:

@@ -3,18 +3,30 @@
 import re
 from importlib import import_module
 from importlib.util import find_spec
+from typing import NamedTuple
 
 from comparisons.engines.base import Engine, EngineMissing
 from scenarios.errors import DropspinError, UnknownName
 
+
+class _Home(NamedTuple):
+    """Where an engine's adapter is, and what it needs installed."""
+
+    module: str
+    adapter: str
+    package: str = ""
+    how_to_install: str = ""
+
+
 BUILT_IN = {
-    "document": "comparisons.engines.document:Document",
-    "mujoco": "comparisons.engines.mujoco_engine:MuJoCo",
-    "pybullet": "comparisons.engines.pybullet_engine:PyBullet",
-}
-INSTALL_HINTS = {
-    "mujoco": "pip install mujoco",
-    "pybullet": "pip install pybullet (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)",
+    "document": _Home("comparisons.engines.document", "Document"),
+    "mujoco": _Home("comparisons.engines.mujoco_engine", "MuJoCo", "mujoco", "pip install mujoco"),
+    "pybullet": _Home(
+        "comparisons.engines.pybullet_engine",
+        "PyBullet",
+        "pybullet",
+        "pip install pybullet (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)",
+    ),
 }
 
 
@@ -36,10 +48,11 @@ def engine(name: str) -> Engine:
     base, listed = match.group(1), match.group(2) or ""
     if base not in BUILT_IN:
         raise UnknownName("engine", base, BUILT_IN)
-    module, kind = BUILT_IN[base].split(":")
-    created: Engine = getattr(import_module(module), kind)(_options(name, listed))
-    if created.package and find_spec(created.package) is None:
-        raise EngineMissing(f"{created.label} is not installed: {INSTALL_HINTS[created.package]}.")
+    home = BUILT_IN[base]
+    # Before the adapter, which imports its engine.
+    if home.package and find_spec(home.package) is None:
+        raise EngineMissing(f"{base} is not installed: {home.how_to_install}.")
+    created: Engine = getattr(import_module(home.module), home.adapter)(_options(name, listed))
     return created
 
 

@@ -20,10 +20,12 @@ from scenarios.body import Sphere
 from scenarios.model import Floor, Scenario
 from scenarios.rotations import rotate
 from scenarios.truths.flight import flight_states
-from scenarios.truths.truth import Impact, States, Truth
+from scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 
+TOUCHING = 1e-9  # of the body's size: how near to the floor counts as on it, as in the scene's own check
+MOST_BOUNCES = 100_000
 SHORTEST_FLIGHT = 1e-12
 """Flights shorter than this share of the first fall count as rest: their apexes are below 1e-24 of the drop's."""
 
@@ -35,9 +37,13 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
     g = -float(scene.acceleration[1])
     start = scene.initial_state
     upward = float(start[8])
-    u0 = math.sqrt(upward**2 + 2.0 * g * max(scene.clearance, 0.0))
+    # A hair above the floor is on it; else a ball at rest would be said to bounce a nanometre high for ever.
+    clearance = scene.clearance if scene.clearance > TOUCHING * scene.body.size else 0.0
+    u0 = math.sqrt(upward**2 + 2.0 * g * clearance)
     t0 = (upward + u0) / g
     leaving = _leaving_speeds(u0, g, scene.floor, scene.duration - t0)
+    if leaving is None:
+        return None
     starts = np.concatenate([[0.0, t0], t0 + np.cumsum(2.0 / g * leaving)])
     # Starts of flight 0 (the fall), of each flight after an impact, and of rest.
     speeds = np.concatenate([[upward], leaving, [0.0]])
@@ -55,34 +61,36 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
         rows[:, 8] = speed - pull * since
         return rows
 
-    events = tuple(
-        _impact(float(time), states, floor_height, float(speed))
-        for time, speed in zip(starts[1:], speeds[1:], strict=True)
-        if time <= scene.duration
-    )
+    times = starts[1:][starts[1:] <= scene.duration]
+    before, after = states(times), states(times)
+    before[:, 1] = after[:, 1] = floor_height
+    after[:, 8] = speeds[1 : len(times) + 1]
+    events = tuple(Impact(float(time), *pair) for time, *pair in zip(times, before, after, strict=True))
     statement = "bounce ladder h_k = e^(2k) H with impact times by geometric sums (Newton's restitution)"
     return Truth("bounce-ladder", statement, states, events, scene.duration)
 
 
-def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array:
-    """Speeds after the impacts that are followed by a flight, until the end of the scene or until rest."""
-    speeds = []
-    speed, time = u0, 0.0
-    while time <= remaining and speed >= floor.rest_speed:
-        speed *= floor.restitution
-        if speed <= SHORTEST_FLIGHT * u0:
-            break
-        speeds.append(speed)
-        time += 2.0 * speed / g
-    return np.array(speeds)
-
-
-def _impact(time: float, states: States, floor_height: float, leaving: float) -> Impact:
-    before = states(np.array([time]))[0]
-    before[1] = floor_height
-    after = before.copy()
-    after[8] = leaving
-    return Impact(time, before, after)
+def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array | None:
+    """Speeds after the impacts that are followed by a flight, until the end of the scene or until rest; None if too many."""
+    e = floor.restitution
+    if remaining < 0.0 or u0 < floor.rest_speed or e * u0 <= 0.0:
+        return np.empty(0)
+    first = 2.0 * e * u0 / g
+    if e == 1.0:
+        flights = remaining / first + 1.0
+    else:
+        # Flights k = 1, 2, … last first e^(k-1); those to come after the end, or too slow to count, are not needed.
+        share = 1.0 - remaining * (1.0 - e) / first
+        flights = math.log(share) / math.log(e) + 1.0 if share > 0.0 else math.inf
+        flights = min(flights, math.log(SHORTEST_FLIGHT) / math.log(e))
+        if floor.rest_speed > 0.0:
+            flights = min(flights, math.log(floor.rest_speed / u0) / math.log(e) + 1.0)
+    if flights > MOST_BOUNCES:
+        return None
+    speeds: Array = u0 * e ** np.arange(1.0, math.ceil(flights) + 1.0)
+    # The last flight is the one before an impact slower than rest_speed.
+    bounces = np.concatenate([[u0], speeds[:-1]]) >= floor.rest_speed
+    return speeds[bounces & (speeds > SHORTEST_FLIGHT * u0)]
 
 
 def _falls_straight_down(scene: Scenario) -> bool:

@@ -11,12 +11,12 @@ Valid for: one corner alone touches, no damping, from the start to the second im
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from scenarios.body import Sphere
 from scenarios.mechanics import lowest_height
 from scenarios.model import Floor, Scenario
-from scenarios.rotations import rotate
+from scenarios.rotations import rotate, unrotate
 from scenarios.trajectory import Trajectory
 from scenarios.truths.flight import flight_states
 from scenarios.truths.truth import Impact, States, Truth
@@ -24,8 +24,15 @@ from scenarios.truths.truth import Impact, States, Truth
 Array = NDArray[np.float64]
 
 UP = np.array([0.0, 1.0, 0.0])
-SCAN = 4000  # samples of the height in search of an impact, before its root is found
+CHUNK = 4000  # samples of the height at a time, in search of an impact
+FINEST_ANGLE = 0.02  # rad between two samples: a corner moves by less than 1e-4 of the body's size off a straight line
+MOST_CHUNKS = 1000
 ONE_CORNER = 1e-6  # of the body's size: how far above the corner that touches the next one must be
+TOUCHING = 1e-9  # of the body's size: how near to the floor counts as on it, as in the scene's own check
+
+
+class TooLong(Exception):
+    """So many turns before the impact that it is not looked for."""
 
 
 def corner_impact(scene: Scenario) -> Truth | None:
@@ -36,19 +43,22 @@ def corner_impact(scene: Scenario) -> Truth | None:
     if not isinstance(floor.friction, str):
         return None
     inertia, g = scene.body.inertia_tensor, scene.acceleration
-    falling = flight_states(scene.initial_state, inertia, g)
-    time = _next_impact(scene, falling, 0.0, scene.duration)
-    if time is None:
-        return Truth("flight", "free flight that ends above the floor", falling, horizon=scene.duration)
-    before = falling(np.array([time]))[0]
-    corner = _single_corner(scene, before)
-    if corner is None:
+    start = scene.initial_state
+    falling = flight_states(start, inertia, g)
+    try:
+        time = _next_impact(scene, start, falling, scene.duration)
+        if time is None:
+            return Truth("flight", "free flight that ends above the floor", falling, horizon=scene.duration)
+        before = falling(np.array([time]))[0]
+        corner = _single_corner(scene, before)
+        if corner is None:
+            return None
+        after = before.copy()
+        after[7:13] = velocities_after(before, corner, scene.body.mass, inertia, floor)
+        leaving = flight_states(after, inertia, g)
+        second = _next_impact(scene, after, leaving, scene.duration - time)
+    except TooLong:
         return None
-    after = before.copy()
-    after[7:13] = velocities_after(before, corner, scene.body.mass, inertia, floor)
-    leaving = flight_states(after, inertia, g)
-    # The corner itself leaves at zero height; look for the next impact once it is clear.
-    second = _next_impact(scene, leaving, 1e-3 * time, scene.duration - time)
     horizon = scene.duration if second is None else time + second
 
     def states(t: Array) -> Array:
@@ -79,20 +89,51 @@ def velocities_after(state: Array, corner: Array, mass: float, inertia: Array, f
     return np.concatenate([v + impulse / mass, w + inverse @ np.cross(corner, impulse)])
 
 
-def _next_impact(scene: Scenario, states: States, start: float, end: float) -> float | None:
+def _next_impact(scene: Scenario, start: Array, states: States, duration: float) -> float | None:
+    """When the lowest point next comes down through the floor, from a state at or above it; None if not within `duration`."""
+
     def height(t: Array) -> Array:
         return lowest_height(scene, Trajectory.from_states(t, states(t)))
 
-    if end <= start:
-        return None
-    t = np.linspace(start, end, SCAN)
-    below = np.flatnonzero(height(t) < 0.0)
-    if len(below) == 0:
-        return None
-    if below[0] == 0:
-        return start
-    bracket = t[below[0] - 1], t[below[0]]
-    return float(brentq(lambda s: float(height(np.array([s]))[0]), *bracket, xtol=1e-15, rtol=8.9e-16))
+    def at(t: float) -> float:
+        return float(height(np.array([t]))[0])
+
+    on_floor = TOUCHING * scene.body.size
+    if at(0.0) <= on_floor and _descends(scene, start):
+        return 0.0
+    left = at(0.0) > on_floor  # a body that stands on the floor must leave it before it can come down again
+    step = min(duration / CHUNK, FINEST_ANGLE / max(_fastest_spin(scene, start), 1e-300))
+    for chunk in range(MOST_CHUNKS):
+        t = np.minimum((chunk * CHUNK + np.arange(CHUNK + 2)) * step, duration)
+        h = height(t)
+        for n in range(len(t) - 1):
+            left = left or h[n] > on_floor
+            dips = n > 0 and h[n] < min(h[n - 1], h[n + 1]) and h[n] < FINEST_ANGLE**2 * scene.body.size
+            if left and h[n + 1] < 0.0 <= h[n]:
+                return float(brentq(at, t[n], t[n + 1], xtol=1e-15, rtol=8.9e-16))
+            if left and dips:
+                lowest = minimize_scalar(at, bounds=(t[n - 1], t[n + 1]), method="bounded", options={"xatol": 1e-12})
+                if lowest.fun < -on_floor:
+                    return float(brentq(at, t[n - 1], lowest.x, xtol=1e-15, rtol=8.9e-16))
+        if t[-1] >= duration:
+            return None
+    raise TooLong
+
+
+def _descends(scene: Scenario, state: Array) -> bool:
+    offsets = rotate(state[3:7], scene.body.vertices)
+    lowest = offsets[np.argmin(offsets[:, 1])]
+    speed = state[8] + np.cross(state[10:13], lowest)[1]
+    if speed == 0.0:
+        return bool(scene.acceleration[1] <= 0.0)
+    return bool(speed < 1e-12 * np.linalg.norm(state[7:10]))
+
+
+def _fastest_spin(scene: Scenario, state: Array) -> float:
+    """No free motion from this state spins faster: |ω| <= |L| over the least moment [rad/s]."""
+    inertia = scene.body.inertia_tensor
+    momentum = inertia @ unrotate(state[3:7], state[10:13])
+    return float(np.linalg.norm(momentum) / np.linalg.eigvalsh(inertia)[0])
 
 
 def _single_corner(scene: Scenario, state: Array) -> Array | None:

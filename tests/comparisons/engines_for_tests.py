@@ -124,3 +124,26 @@ class TooLively(Exact):
     def prepare(self, scene, dt):
         floor = scene.floor.model_copy(update={"restitution": 1.01 * scene.floor.restitution})
         return ExactSimulation(scene.model_copy(update={"floor": floor}), dt)
+
+
+class FrozenSimulation(Simulation):
+    """Says the start for ever."""
+
+    def __init__(self, scene):
+        self._start = scene.initial_state
+        self.settings = {}
+
+    def advance(self, steps):
+        pass
+
+    def state(self):
+        return self._start.copy()
+
+
+class Frozen(Engine):
+    """Never moves."""
+
+    name = "frozen"
+
+    def prepare(self, scene, dt):
+        return FrozenSimulation(scene)

@@ -1,6 +1,8 @@
 """The main job: bad engines cost their own row, known faults are seen, and the figures are the ones theory predicts."""
 
 import math
+import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -184,18 +186,23 @@ def test_one_per_cent_more_restitution_is_caught():
     assert {"bounce_height_error", "energy_error"} <= set(failed["metric"])
 
 
-def test_missing_engine(monkeypatch):
-    """Its rows say how to install it; the rest runs; it fails the run only if it was named."""
-    from comparisons.engines import registry
-
-    found_before = registry.find_spec
-    monkeypatch.setattr(registry, "find_spec", lambda package: None if package == "pybullet" else found_before(package))
-    found = comparisons.run([BALL], ["document", "pybullet"], [4e-3])
-    [row] = found.frame[found.frame["engine"] == "pybullet"].to_dict("records")
-    assert row["verdict"] == "missing"
-    assert "pip install pybullet" in row["reason"]
-    assert found.exit_code() == 0
-    assert found.exit_code(frozenset({"pybullet"})) == 3
+@pytest.mark.parametrize("package", ["mujoco", "pybullet"])
+def test_missing_engine(package):
+    """Not importable at all: its rows say how to install it, the rest runs, and it fails the run only if it was named."""
+    program = (
+        f"import sys; sys.modules[{package!r}] = None\n"
+        "import comparisons, scenarios\n"
+        f"found = comparisons.run([scenarios.load('drop-ball')], ['document', {package!r}], [4e-3])\n"
+        f"[row] = found.frame[found.frame['engine'] == {package!r}].to_dict('records')\n"
+        "print(row['verdict'], row['reason'])\n"
+        f"print(found.exit_code(), found.exit_code(frozenset({{{package!r}}})))\n"
+        "print((found.frame['engine'] == 'document').sum())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    first, codes, rows = done.stdout.splitlines()
+    assert first.startswith(f"missing {package} is not installed: pip install {package}")
+    assert codes == "0 3"
+    assert int(rows) > 5
 
 
 def test_a_scene_without_truth():
@@ -206,6 +213,108 @@ def test_a_scene_without_truth():
     own = found.frame[found.frame["kind"] != "agreement"]
     assert set(own["verdict"]) == {"measured", "no_truth"}
     assert set(own[own["verdict"] == "measured"]["metric"]) == {"energy_drift", "energy_gain", "penetration"}
+    pairs = found.frame[found.frame["kind"] == "agreement"]
+    assert set(pairs["metric"]) == {"energy_error", "angular_momentum_error"}
+    assert (pairs["value"].abs() < 1e-12).all()  # up to the first contact both fall freely
+
+
+class Short(made.Exact):
+    """Stops after five rows."""
+
+    name = "short"
+
+    def prepare(self, scene, dt):
+        simulation = made.ExactSimulation(scene, dt)
+        simulation.record = lambda steps, every=1: made.ExactSimulation(scene, dt).record(4)
+        return simulation
+
+
+class Narrow(made.Exact):
+    """Forgets a column."""
+
+    name = "narrow"
+
+    def prepare(self, scene, dt):
+        simulation = made.ExactSimulation(scene, dt)
+        whole = simulation.record
+        simulation.record = lambda steps, every=1: whole(steps, every)[:, :12]
+        return simulation
+
+
+@pytest.mark.parametrize(
+    ("engine", "reason"),
+    [
+        (Short(), r"the record has shape \(5, 13\); 2501 states"),
+        (Narrow(), r"the record has shape \(2501, 12\)"),
+        (made.engine_with("zero-q", lambda s, t: np.concatenate([s[:3], np.zeros(4), s[7:]])), "has length 0; an orientation has length 1"),
+        (made.engine_with("long-q", lambda s, t: np.concatenate([s[:3], 1.05 * s[3:7], s[7:]])), "has length 1.05"),
+        (made.engine_with("complex", lambda s, t: s + 0j), "complex numbers"),
+    ],
+    ids=lambda case: getattr(case, "label", ""),
+)
+def test_records_that_are_none(engine, reason):
+    """Too few rows, too few columns, no orientation: told, and nothing passes."""
+    found = comparisons.run([scenarios.load("spin-principal")], [engine], [4e-3])
+    [row] = found.frame.to_dict("records")
+    assert row["verdict"] == "crashed"
+    assert re.search(reason, row["reason"])
+
+
+@pytest.mark.parametrize("dt", [4e-3, 2e-3, 1e-3])
+@pytest.mark.parametrize("scene", ["drop-ball", "drop-ball-lively", "drop-box-flat", "drop-box-corner", "drop-box-sticking"])
+def test_falling_through_the_floor_fails_at_every_step(scene, dt):
+    """An engine that knows no floor."""
+
+    class NoFloor(made.Exact):
+        name = "no-floor"
+
+        def prepare(self, scene, dt):
+            return made.ExactSimulation(scene.model_copy(update={"floor": None}), dt)
+
+    found = comparisons.run([scenarios.load(scene)], [NoFloor()], [dt])
+    failed = set(found.frame[found.frame["verdict"] == "failed"]["metric"])
+    assert failed & {"penetration", "bounce_height_error"}
+    assert "restitution_error" in failed
+    assert found.exit_code() == 1
+
+
+@pytest.mark.parametrize("engine", [made.Frozen(), "document", "pybullet", "mujoco"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"start": {"position": [0, 0.1, 0]}},
+        {"start": {"position": [0, 0.5, 0]}, "gravity": None},
+        {"start": {}, "gravity": None, "floor": None},
+        {"start": {"position": [0, 0.1, 0]}, "floor": {"restitution": 1.0, "friction": "none"}},
+    ],
+    ids=["at rest on the floor", "hovering", "at rest in space", "at rest on an elastic floor"],
+)
+def test_scenes_in_which_nothing_happens(engine, change):
+    """Nothing to measure by is no reason to break down; what is measured is nothing."""
+    content = {key: value for key, value in (BALL.model_dump(exclude_none=True, exclude={"expect"}) | change).items() if value is not None}
+    found = comparisons.run([scenarios.load(content)], [engine], [1e-2])
+    assert set(found.frame["verdict"]) <= {"measured", "no_truth"}, found.frame.to_string()
+    if not (engine == "document" and change.get("floor") and change["floor"]["restitution"] == 1.0):  # which gains energy, as known
+        assert (found.frame["value"].dropna().abs() < 1e-2).all()
+
+
+def test_an_engine_that_never_moves_is_found_wanting():
+    """It has no impact to measure restitution by: that fails, and costs nobody else."""
+    found = comparisons.run([BALL], [made.Frozen(), "pybullet"], [4e-3])
+    [row] = found.frame[(found.frame["engine"] == "frozen") & (found.frame["metric"] == "restitution_error")].to_dict("records")
+    assert (row["verdict"], row["reason"]) == ("failed", "not a number: what is measured here never happened")
+    assert found.frame[found.frame["engine"] == "pybullet"]["value"].notna().all()
+
+
+def test_restitution_near_the_end_and_below_the_rest_speed():
+    """An impact in the last steps is not judged; below rest_speed the floor's restitution is 0, and right engines are right."""
+    ends = BALL.model_copy(update={"duration": 0.4525, "expect": ()})
+    found = comparisons.run([ends], [made.Exact()], [1e-3])
+    [row] = found.frame[found.frame["metric"] == "restitution_error"].to_dict("records")
+    assert (row["verdict"], row["cause"]) == ("measured", "unresolved")
+    dead = BALL.model_copy(update={"floor": BALL.floor.model_copy(update={"rest_speed": 10.0}), "expect": ()})
+    found = comparisons.run([dead], ["document", "pybullet"], [1e-3])
+    assert (found.frame[found.frame["metric"] == "restitution_error"]["value"].abs() <= 1e-12).all()
 
 
 def test_what_is_asked_is_checked():

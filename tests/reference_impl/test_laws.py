@@ -1,5 +1,7 @@
 """The contact laws: how much energy they can add, what they keep, what several vertices make of them."""
 
+import warnings
+
 import numpy as np
 import pytest
 from numba import njit
@@ -182,7 +184,7 @@ def test_mean_contact_leaves_vertices_approaching():
     assert left / several > 0.2
 
 
-@pytest.mark.parametrize(("law", "friction"), [("normal", 0.0), ("coulomb", 0.4), ("coulomb", STICKS)])
+@pytest.mark.parametrize(("law", "friction"), [("normal", 0.0), ("coulomb", 0.4), ("coulomb", 1.0)])
 def test_sequential_leaves_none(law, friction):
     """No submerged vertex approaches faster than 1e-9 m/s, and no energy is added at restitution 0."""
     methods = Methods(law=law, contact="sequential")
@@ -193,6 +195,24 @@ def test_sequential_leaves_none(law, friction):
         tensor = R @ body.inertia @ R.T
         energies = [0.5 * s[7:10] @ s[7:10] + 0.5 * s[10:13] @ tensor @ s[10:13] for s in (state, after)]
         assert energies[1] <= energies[0] * (1 + 1e-9)
+
+
+def test_sequential_says_when_it_did_not_settle():
+    """Infinite friction at several vertices need not have a solution: each of these steps settles, or says that it did not."""
+    from reference_impl import UnsolvedContact
+
+    methods, unsettled = Methods(law="coulomb", contact="sequential"), 0
+    for body, state in random_contacts(200):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            after = reference_impl.step(state, body, World(floor=Floor(0.0, STICKS)), 1e-9, methods=methods)
+        if caught:
+            unsettled += 1
+            assert caught[0].category is UnsolvedContact
+            assert "not solved in 1 of 1 steps" in str(caught[0].message)
+        else:
+            assert approach_left_over(state, after, body) <= 1e-9
+    assert 0 < unsettled < 10
 
 
 def test_sequential_falls_flat_as_one():

@@ -1,6 +1,9 @@
 """The command line as its users meet it: in a process of its own."""
 
+import csv
 import json
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -62,7 +65,14 @@ def test_a_scene_of_ones_own(tmp_path):
         (["run", "drop-ball", "--dt", "nan"], "dt: got nan s"),
         (["run", "drop-ball", "--dt", "fast"], "'fast' is not a valid float"),
         (["run", "drop-ball", "--out", "x"], "No such option"),
-        (["run", "drop-ball", "-o", "."], "holds files that are no run"),
+        (["run", "drop-ball", "-o", "."], "the working directory, or a mount point, cannot be replaced"),
+        (["run", "drop-ball", "-o", "precious"], "precious: is a file; choose a folder"),
+        (["run", "drop-ball", "-o", "precious/x"], "precious/x: cannot be written"),
+        (["run", "drop-ball", "--dt", "1e-310"], "dt: got 1e-310 s"),
+        (["run", "drop-ball", "--dt", "0.01", "--dt", "0.01"], "a step is named twice"),
+        (["run", "x" * 300], "is not in the catalogue"),
+        (["show", "drop-ball", "-e", "mujoco", "--dt", "nan"], "dt: got nan s"),
+        (["show", "drop-ball", "-e", "mujoco", "--dt", "0"], "dt: got 0.0 s"),
         (["frobnicate"], "No such command"),
         (["show", "drop-bal"], "Did you mean 'drop-ball'?"),
         (["show", "drop-ball", "-e", "x"], "engine 'x' is unknown"),
@@ -121,8 +131,76 @@ def test_doctor(tmp_path):
 
 
 def test_json_of_a_run(tmp_path):
-    """The rows and nothing else on the standard output."""
-    done = dropspin("run", "spin-principal", "-e", "document", "--dt", "0.004", "--json", cwd=tmp_path)
-    rows = json.loads(done.stdout)
-    assert {row["engine"] for row in rows} == {"document"}
+    """The rows and nothing else on the standard output, to the last digit; no number is null."""
+    done = dropspin("run", "spin-principal", "-e", "pybullet", "--dt", "0.004", "--json", cwd=tmp_path)
+    rows = json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    with (tmp_path / "out/run/results.csv").open(newline="") as file:
+        for row, kept in zip(rows, csv.DictReader(file), strict=True):
+            assert row["metric"] == kept["metric"]
+            assert row["value"] == float(kept["value"])
+            assert (row["upper"] is None) == (kept["upper"] == "")
+    assert any(0 < abs(row["value"]) < 1e-11 for row in rows)
     assert "running spin-principal" in done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+def test_terminals_without_utf_8(encoding, tmp_path):
+    """A question mark for a sign that is not there; never a traceback, never another exit code."""
+    environment = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+    for arguments in (["run", "spin-principal", "-e", "mujoco", "--dt", "0.01"], ["show", "drop-ball"], ["list", "metrics"]):
+        done = subprocess.run([DROPSPIN, *arguments], cwd=tmp_path, env=environment, capture_output=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr.decode(encoding)
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_runs_leave_nothing(how, tmp_path):
+    """Ctrl-C, or a CI server that has waited long enough: exit code 130, no folder, no traceback."""
+    process = subprocess.Popen([DROPSPIN, "run"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert "running" in process.stderr.readline()
+    process.send_signal(how)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_output_that_cannot_be_written_to(tmp_path):
+    """A full device: one line and exit code 2, not 1."""
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([DROPSPIN, "list"], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "No space left" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("expectation", "message"),
+    [
+        ('metric = "energy_eror"\nbelow = 1', "Did you mean 'energy_error'?"),
+        ('metric = "horizontal_momentum_error"\nbelow = 1', "it needs a frictionless floor"),
+        ('metric = "penetration"\nbelow = 1\nengine = "documnt"', "no such engine. Did you mean 'document'?"),
+        ('metric = "penetration"\nbelow = 1\nengine = "mujoco[integrator=euler]"', "write it as 'mujoco'"),
+    ],
+)
+def test_expectations_that_would_never_be_judged(expectation, message, tmp_path):
+    """A gate with a typo must not pass: refused by run and by show, with the file's name."""
+    (tmp_path / "gate.toml").write_text(SCENE + f'[[expect]]\n{expectation}\nreason = "why"\n')
+    for verb in (["run", "gate.toml", "--dt", "0.01"], ["show", "gate.toml"]):
+        done = dropspin(*verb, cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert "gate.toml: expect[0]" in done.stderr
+
+
+def test_nothing_judged_is_not_nothing_expected(tmp_path):
+    """Expectations for other steps are not said to be missing."""
+    done = dropspin("run", "spin-asymmetric", "-e", "mujoco[integrator=rk4]", "--dt", "0.01", cwd=tmp_path)
+    assert "No expectation is for these engines at these steps" in done.stdout
+
+
+def test_command_that_does_it_again(tmp_path):
+    """With the path as it was given, quoted, and all digits of the step."""
+    (tmp_path / "my scene.toml").write_text(SCENE + '[[expect]]\nmetric = "penetration"\nbelow = 1e-9\nreason = "stiff"\n')
+    done = dropspin("run", "my scene.toml", "-e", "mujoco", "--dt", "0.00123456789", cwd=tmp_path)
+    assert "dropspin run 'my scene.toml' -e mujoco --dt 0.00123456789" in done.stdout.replace("\n", " ")

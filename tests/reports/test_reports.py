@@ -95,7 +95,7 @@ def test_names_with_markup_are_inert(folder):
     assert "<img" not in text
     assert "&lt;script&gt;alert(1)&lt;/script&gt;$x_{" in text
     markdown = (folder / "report.md").read_text(encoding="utf-8")
-    assert "<script" not in markdown
+    assert not re.search(r"(?<!\\)<", markdown)
 
 
 def test_page_says_the_verdict_first(results, folder):
@@ -151,9 +151,8 @@ def test_an_earlier_run_is_replaced_and_nothing_else_is_touched(results, tmp_pat
     """A run replaces a run; a folder of something else, or a file, is refused and stays whole."""
     target = tmp_path / "run"
     reports.write(results, target)
-    (target / "left-over").write_text("x")
     reports.write(results, target)
-    assert not (target / "left-over").exists()
+    assert not [path for path in tmp_path.iterdir() if path.name != "run"]
     precious = tmp_path / "thesis"
     precious.mkdir()
     (precious / "chapter1.tex").write_text("x")
@@ -181,6 +180,108 @@ def test_a_write_that_fails_leaves_the_old_run(results, tmp_path, monkeypatch):
         reports.write(results, target)
     assert (target / "report.html").read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_what_is_not_ours_is_never_deleted(results, tmp_path, monkeypatch):
+    """A path that goes up again, a stranger's run.json, notes beside a run, the working directory: all stay whole."""
+    keep = tmp_path / "precious" / "keep"
+    keep.mkdir(parents=True)
+    (keep / "thesis.txt").write_text("x")
+    with pytest.raises(DropspinError, match=r"holds files that are no run"):
+        reports.write(results, tmp_path / "precious" / "new" / "..")
+    (keep / "run.json").write_text("{}")
+    with pytest.raises(DropspinError, match=r"'thesis\.txt' for one"):
+        reports.write(results, keep)
+    (keep / "thesis.txt").rename(tmp_path / "thesis.txt")
+    with pytest.raises(DropspinError, match=r"holds files that are no run"):
+        reports.write(results, keep)
+    run = tmp_path / "run"
+    reports.write(results, run)
+    (run / "my-notes.txt").write_text("x")
+    with pytest.raises(DropspinError, match=r"'my-notes\.txt' for one"):
+        reports.write(results, run)
+    (run / "my-notes.txt").unlink()
+    monkeypatch.chdir(run)
+    with pytest.raises(DropspinError, match="the working directory, or a mount point"):
+        reports.write(results, ".")
+    assert (keep / "run.json").read_text() == "{}"
+    assert (tmp_path / "thesis.txt").read_text() == "x"
+
+
+def test_a_link_leads_to_the_folder_that_is_replaced(results, tmp_path):
+    """Existing or dangling, the link stays a link."""
+    for name in ("there", "not-yet"):
+        (tmp_path / name).symlink_to(tmp_path / f"{name}-run")
+    (tmp_path / "there-run").mkdir()
+    for name in ("there", "not-yet"):
+        reports.write(results, tmp_path / name)
+        assert (tmp_path / name).is_symlink()
+        assert (tmp_path / f"{name}-run" / "report.html").is_file()
+
+
+@pytest.mark.parametrize("failing", [1, 2])
+def test_a_swap_that_fails_brings_the_old_run_back(results, tmp_path, monkeypatch, failing):
+    """Whichever of the two renames does not work, the old run is there afterwards and nothing else is."""
+    from pathlib import Path
+
+    target = tmp_path / "run"
+    reports.write(results, target)
+    before = (target / "results.csv").read_bytes()
+    rename, calls = Path.rename, []
+
+    def fails_once(self, to):
+        calls.append(to)
+        if len(calls) == failing:
+            raise OSError(16, "Device or resource busy")
+        return rename(self, to)
+
+    monkeypatch.setattr(Path, "rename", fails_once)
+    with pytest.raises(DropspinError, match="Device or resource busy; the folder is as it was"):
+        reports.write(results, target)
+    assert (target / "results.csv").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_markdown_cells_hold_anything(tmp_path):
+    """Bars, line breaks and stars in names and reasons stay within their cells."""
+    scene = scenarios.load("spin-principal").model_dump(exclude_none=True, exclude={"expect"}) | {
+        "name": "a|b`c`*d*",
+        "expect": [{"metric": "energy_error", "within": [1.0, 2.0], "reason": "has | pipe and\nnewline"}],
+    }
+    found = comparisons.run([scenarios.load(scene)], ["mujoco"], [4e-3])
+    markdown = (reports.write(found, tmp_path / "run").parent / "report.md").read_text(encoding="utf-8")
+    tables = [line for line in markdown.splitlines() if line.startswith("|")]
+    assert {len(re.findall(r"(?<!\\)\|", line)) for line in tables} == {3, 8}
+    assert markdown.endswith("\n")
+    assert "&#39;" not in markdown
+
+
+def made_up(values):
+    """Results with one metric of one engine at some steps."""
+    from comparisons.results import Results, as_frame
+
+    rows = [
+        {"scene": "drop-ball", "engine": "e", "dt": dt, "metric": "energy_error", "value": value, "kind": "truth", "verdict": "measured"}
+        for dt, value in values.items()
+    ]
+    return Results(as_frame(rows), {"drop-ball": scenarios.load("drop-ball")}, ("e",), {})
+
+
+def test_findings_say_only_what_the_figures_show():
+    """A plateau is called one; a falling error, two steps, a narrow range, a change of sign or a gap are not."""
+    from reports.findings import finding_sentences, plateaus
+
+    assert plateaus(made_up({4e-3: 0.11, 2e-3: 0.1, 1e-3: 0.1})) == {"e": ["drop-ball"]}
+    for values in (
+        {4e-3: 0.4, 2e-3: 0.2, 1e-3: 0.1},
+        {4e-3: 0.1, 1e-3: 0.1},
+        {2e-3: 0.1, 1.9e-3: 0.1, 1.8e-3: 0.1},
+        {4e-3: -0.1, 2e-3: 0.1, 1e-3: 0.1},
+        {4e-3: float("nan"), 2e-3: 0.1, 1e-3: 0.1},
+        {4e-3: 1e-6, 2e-3: 1e-6, 1e-3: 1e-6},
+    ):
+        assert plateaus(made_up(values)) == {"e": []}
+    assert finding_sentences(made_up({2e-3: 0.1, 1.9e-3: 0.1})) == []
 
 
 def test_folder_that_is_no_run(tmp_path):

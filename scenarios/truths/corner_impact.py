@@ -9,6 +9,8 @@ Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and o
 Valid for: one corner alone touches, no damping, from the start to the second impact, which ends it.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
@@ -103,21 +105,34 @@ def _next_impact(scene: Scenario, start: Array, states: States, duration: float)
         return 0.0
     left = at(0.0) > on_floor  # a body that stands on the floor must leave it before it can come down again
     step = min(duration / CHUNK, FINEST_ANGLE / max(_fastest_spin(scene, start), 1e-300))
-    for chunk in range(MOST_CHUNKS):
-        t = np.minimum((chunk * CHUNK + np.arange(CHUNK + 2)) * step, duration)
-        h = height(t)
-        for n in range(len(t) - 1):
-            left = left or h[n] > on_floor
-            dips = n > 0 and h[n] < min(h[n - 1], h[n + 1]) and h[n] < FINEST_ANGLE**2 * scene.body.size
-            if left and h[n + 1] < 0.0 <= h[n]:
-                return float(brentq(at, t[n], t[n + 1], xtol=1e-15, rtol=8.9e-16))
-            if left and dips:
-                lowest = minimize_scalar(at, bounds=(t[n - 1], t[n + 1]), method="bounded", options={"xatol": 1e-12})
-                if lowest.fun < -on_floor:
-                    return float(brentq(at, t[n - 1], lowest.x, xtol=1e-15, rtol=8.9e-16))
-        if t[-1] >= duration:
-            return None
-    raise TooLong
+    chunks = 0
+    for begin, end in _within_reach(scene, start, duration):
+        left = left or begin > 0.0
+        now = begin
+        while now < end:
+            t = np.minimum(now + np.arange(CHUNK + 2) * step, end)
+            h = height(t)
+            for n in range(len(t) - 1):
+                left = left or h[n] > on_floor
+                dips = n > 0 and h[n] < min(h[n - 1], h[n + 1]) and h[n] < FINEST_ANGLE**2 * scene.body.size
+                if left and h[n + 1] < 0.0 <= h[n]:
+                    return float(brentq(at, t[n], t[n + 1], xtol=1e-15, rtol=8.9e-16))
+                if left and dips:
+                    lowest = minimize_scalar(at, bounds=(t[n - 1], t[n + 1]), method="bounded", options={"xatol": 1e-12})
+                    if lowest.fun < -on_floor:
+                        return float(brentq(at, t[n - 1], lowest.x, xtol=1e-15, rtol=8.9e-16))
+            now, chunks = now + CHUNK * step, chunks + 1
+            if chunks > MOST_CHUNKS:
+                raise TooLong
+    return None
+
+
+def _within_reach(scene: Scenario, start: Array, duration: float) -> list[tuple[float, float]]:
+    """The times [s] at which the centre is so low that a corner may touch the floor: x_y(t) below the body's size."""
+    parabola = [0.5 * scene.acceleration[1], start[8], start[1] - scene.body.size]
+    crossings = sorted(float(root.real) for root in np.roots(parabola) if root.imag == 0.0 and 0.0 < root.real < duration)
+    edges = [0.0, *crossings, duration]
+    return [(begin, end) for begin, end in pairwise(edges) if np.polyval(parabola, 0.5 * (begin + end)) < 0.0]
 
 
 def _descends(scene: Scenario, state: Array) -> bool:

@@ -104,3 +104,16 @@ def test_times_outside_are_refused():
         truth_for(ball())([-0.1])
     with pytest.raises(ValueError, match="holds for 0 <= t <= 3 s"):
         truth_for(ball())([3.1])
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-17, 5e-11])
+def test_a_hair_above_the_floor_is_on_it(height):
+    """A ball laid down at restitution 1 lies; it does not bounce a nanometre high a billion times."""
+    truth = truth_for(ball(1.0, height, duration=1000.0))
+    assert truth is not None
+    np.testing.assert_allclose(truth([0.0, 1000.0]).position[:, 1], 0.1, rtol=0, atol=1e-10)
+
+
+def test_more_bounces_than_can_be_listed():
+    """There is no ladder of a million rungs: no truth, and no exhausted memory."""
+    assert truth_for(ball(1.0, 1e-6, duration=3600.0)) is None

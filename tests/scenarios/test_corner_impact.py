@@ -11,7 +11,9 @@ from scenarios import load, truth_for
 from scenarios.mechanics import angular_momentum, energy, lowest_height
 from scenarios.model import Floor
 from scenarios.rotations import rotate
+from scenarios.trajectory import Trajectory
 from scenarios.truths.corner_impact import velocities_after
+from scenarios.truths.flight import flight_states
 
 UP = np.array([0.0, 1.0, 0.0])
 vectors = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
@@ -122,3 +124,51 @@ def test_scenes_without_it():
     assert truth_for(load(edge)) is None
     assert truth_for(load(content | {"damping": {"linear": 0.1}})) is None
     assert truth_for(load(content | {"duration": 0.3})).events == ()
+
+
+def box_at(clearance, velocity):
+    """The published box, its corner this high above the floor."""
+    content = dropped_from_rest("none").model_dump(exclude_none=True)
+    scene = load(content)
+    content["start"] = content["start"] | {"position": [0.0, 1.5 - scene.clearance + clearance, 0.0], "velocity": [0.0, velocity, 0.0]}
+    return load(content | {"duration": 1.0})
+
+
+@pytest.mark.parametrize("clearance", [0.0, -1e-12, 1e-12, -5e-10])
+def test_a_corner_on_the_floor_that_goes_up_is_not_hit(clearance):
+    """Thrown up from the floor, or from a rounding below it: back after 2 v/g, not struck at once."""
+    [impact] = truth_for(box_at(clearance, 2.0)).events
+    assert impact.time == pytest.approx(2 * 2.0 / 9.8, abs=1e-9)
+
+
+def test_a_corner_on_the_floor_that_comes_down_is_hit_at_once():
+    """And the truth goes on after it."""
+    truth = truth_for(box_at(-1e-12, -1.0))
+    assert truth.events[0].time == 0.0
+    assert truth.horizon > 0.05
+
+
+@pytest.mark.parametrize("speed", [1.0, 30.0])
+def test_fast_spins_do_not_slip_between_samples(speed):
+    """A box that hovers, spins, and dips 20 µm below the floor once a turn is hit in its first turn, however long the scene."""
+
+    def spinning(height):
+        return load(
+            {
+                "duration": 300.0,
+                "body": {"shape": "box", "half_extents": [0.1, 0.1, 0.1], "mass": 1.0},
+                "start": {"position": [0, height, 0], "angular_velocity": [15 * speed, 5 * speed, 50 * speed]},
+                "floor": {"restitution": 0.5, "friction": "none"},
+            }
+        )
+
+    def heights(scene, until):
+        t = np.linspace(0, until, 200_001)
+        states = flight_states(scene.initial_state, scene.body.inertia_tensor, np.zeros(3))
+        return t, lowest_height(scene, Trajectory.from_states(t, states(t)))
+
+    turn = 2 * np.pi / np.linalg.norm([15 * speed, 5 * speed, 50 * speed])
+    scene = spinning(0.2 - heights(spinning(0.2), turn)[1].min() - 2e-5)
+    [impact] = truth_for(scene).events
+    t, h = heights(scene, turn)
+    assert impact.time == pytest.approx(t[np.argmax(h < 0)], abs=turn / 100_000)

@@ -80,15 +80,15 @@ def r_j(x, y, z, p):
         sx, sy, sz, sp = math.sqrt(x), math.sqrt(y), math.sqrt(z), math.sqrt(p)
         root = sx * sy + sy * sz + sz * sx
         d = (sp + sx) * (sp + sy) * (sp + sz)
-        total += fourth / d * r_c1(delta * fourth**3 / (d * d))
+        total += fourth / d * r_c1(delta * fourth * fourth * fourth / (d * d))
         x, y, z, p, mean = 0.25 * (x + root), 0.25 * (y + root), 0.25 * (z + root), 0.25 * (p + root), 0.25 * (mean + root)
         fourth *= 0.25
     X, Y, Z = (mean0 - x0) * fourth / mean, (mean0 - y0) * fourth / mean, (mean0 - z0) * fourth / mean
     P = -(X + Y + Z) / 2.0
     xyz = X * Y * Z
     e2 = X * Y + X * Z + Y * Z - 3.0 * P * P
-    e3 = xyz + 2.0 * e2 * P + 4.0 * P**3
-    e4 = (2.0 * xyz + e2 * P + 3.0 * P**3) * P
+    e3 = xyz + 2.0 * e2 * P + 4.0 * P * P * P
+    e4 = (2.0 * xyz + e2 * P + 3.0 * P * P * P) * P
     e5 = xyz * P * P
     series = 1.0 - 3.0 * e2 / 14.0 + e3 / 6.0 + 9.0 * e2 * e2 / 88.0 - 3.0 * e4 / 22.0 - 9.0 * e2 * e3 / 52.0 + 3.0 * e5 / 26.0
     return fourth * series / (mean * math.sqrt(mean)) + 6.0 * total

@@ -21,11 +21,11 @@ def impulse(K, u, mu, friction):
     if friction == 0.0:
         return normal.impulse(K, u, mu, friction)
     stick = note.impulse(K, u, mu, friction)
-    if math.hypot(stick.x, stick.z) <= friction * stick.y:
+    if math.sqrt(stick.x * stick.x + stick.z * stick.z) <= friction * stick.y:
         return stick
     v_normal = dot(u, N)
     sliding = u - v_normal * N
-    speed = math.hypot(sliding.x, sliding.z)
+    speed = math.sqrt(sliding.x * sliding.x + sliding.z * sliding.z)
     if speed == 0.0:
         return normal.impulse(K, u, mu, friction)
     direction = N - (friction / speed) * sliding

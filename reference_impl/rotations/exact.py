@@ -38,6 +38,12 @@ def turn(q, w, dt, body):
 
 
 @compiled
+def _square(x):
+    """x², by the product: powers round differently in Python and in compiled code."""
+    return x * x
+
+
+@compiled
 def _about(spin, dt):
     """The rotation by |ω| dt about ω."""
     speed = math.sqrt(dot(spin, spin))
@@ -55,7 +61,7 @@ def _axes(I, spin):  # noqa: E741
         middle, high = high, middle
     if I[low] > I[middle]:
         low, middle = middle, low
-    beyond = I[high] * (I[high] - I[middle]) * spin[high] ** 2 - I[low] * (I[middle] - I[low]) * spin[low] ** 2
+    beyond = I[high] * (I[high] - I[middle]) * _square(spin[high]) - I[low] * (I[middle] - I[low]) * _square(spin[low])
     return (low, middle, high) if beyond >= 0.0 else (high, middle, low)
 
 
@@ -77,9 +83,9 @@ def _component(vector, a, b, axis, sign):
 def _asymmetric_top(moments, spin, dt):
     """The rotation within dt, as a quaternion, and the spin after it, along a, b, c."""
     Ia, Ib, Ic = moments.x, moments.y, moments.z
-    to_c = Ia * (Ic - Ia) * spin.x**2 + Ib * (Ic - Ib) * spin.y**2  # 2 T Ic - L²
-    to_a = Ib * (Ib - Ia) * spin.y**2 + Ic * (Ic - Ia) * spin.z**2  # L² - 2 T Ia
-    to_b = Ic * (Ic - Ib) * spin.z**2 - Ia * (Ib - Ia) * spin.x**2  # L² - 2 T Ib
+    to_c = Ia * (Ic - Ia) * _square(spin.x) + Ib * (Ic - Ib) * _square(spin.y)  # 2 T Ic - L²
+    to_a = Ib * (Ib - Ia) * _square(spin.y) + Ic * (Ic - Ia) * _square(spin.z)  # L² - 2 T Ia
+    to_b = Ic * (Ic - Ib) * _square(spin.z) - Ia * (Ib - Ia) * _square(spin.x)  # L² - 2 T Ib
     A = math.sqrt(to_c / (Ia * (Ic - Ia)))
     C = math.copysign(math.sqrt(to_a / (Ic * (Ic - Ia))), spin.z)
     B = math.copysign(math.sqrt(to_c / (Ib * (Ic - Ib))), (Ic - Ib) * C)
@@ -88,7 +94,7 @@ def _asymmetric_top(moments, spin, dt):
     K = r_f(0.0, m1, 1.0)
     # The start's own sn and cn, of unit length together.
     cn0, sn0 = spin.x / A, spin.y / B
-    length = math.hypot(cn0, sn0)
+    length = math.sqrt(cn0 * cn0 + sn0 * sn0)
     cn0, sn0 = cn0 / length, sn0 / length
     dn0 = math.sqrt(m1 + (1.0 - m1) * cn0 * cn0)
     u0 = sn0 * r_f(cn0 * cn0, dn0 * dn0, 1.0)
@@ -103,7 +109,7 @@ def _asymmetric_top(moments, spin, dt):
     about_c = abs(ma) > abs(mc)
     Io, mo = (Ia, ma) if about_c else (Ic, mc)
     mp2 = (1.0 - m1) * mc * mc if about_c else ma * ma
-    L = math.hypot(ma, mc)
+    L = math.sqrt(ma * ma + mc * mc)
     n = -mp2 / (mo * mo)
     swing = L * mb * mb * (Io - Ib) / (Io * Ib * mo * mo * rate)
     phi = L / Io * dt + swing * (_integral(u, sn, cn, dn, n, m1, K) - _integral(u0, sn0, cn0, dn0, n, m1, K))
@@ -120,7 +126,7 @@ def _integral(u, sn, cn, dn, n, m1, K):
     """The integral of sn² / (1 - n sn²) from 0 to u."""
     half_turns = math.floor(u / (2.0 * K) + 0.5)
     sign = 1.0 if half_turns % 2.0 == 0.0 else -1.0
-    within = (sign * sn) ** 3 / 3.0 * r_j(cn * cn, dn * dn, 1.0, 1.0 - n * sn * sn)
+    within = sign * sn * sn * sn / 3.0 * r_j(cn * cn, dn * dn, 1.0, 1.0 - n * sn * sn)
     if half_turns == 0.0:
         return within
     return 2.0 * half_turns * r_j(0.0, m1, 1.0, 1.0 - n) / 3.0 + within

@@ -1,9 +1,5 @@
 """Algorithm 1 as a whole: what it conserves exactly, what it does wrong exactly, what it leaves out."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -127,31 +123,6 @@ def test_every_kth_row_is_the_kth_row():
     start, world = state(x=(0, 0.4, 0), v=(1, 0, 0), w=(3, 2, 1)), World(G, Floor(0.5, np.inf))
     all_rows = reference_impl.simulate(start, BODY, world, 1e-3, 1000)
     np.testing.assert_array_equal(reference_impl.simulate(start, BODY, world, 1e-3, 1000, every=7), all_rows[::7])
-
-
-def test_interpreted_python_gives_the_same_bits():
-    """The one source without the compiler, in a process of its own: equal to the last bit through contacts."""
-    program = (
-        "import numpy as np, reference_impl as r, sys\n"
-        "h = np.array([.1, .2, .3]); p = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * h\n"
-        "b = r.Body(1.0, r.solid_box_inertia(1.0, h), p)\n"
-        "s = np.array([0, .5, 0, .1, .2, .3, .9, .4, -1, .2, 3, 2, 1]); s[3:7] /= np.linalg.norm(s[3:7])\n"
-        "worlds = [r.World(np.array([0, -9.8, 0]), r.Floor(.5, k, .01), (.1, .2)) for k in (0.0, np.inf)]\n"
-        "rows = [r.simulate(s, b, world, 1e-3, 900) for world in worlds]\n"
-        "sys.stdout.write(np.array(rows).tobytes().hex())\n"
-    )
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for disabled in ("0", "1")
-    ]
-    assert outputs[0]
-    assert outputs[0] == outputs[1]
 
 
 def test_state_of_the_wrong_shape_is_refused():

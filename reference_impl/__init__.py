@@ -6,12 +6,13 @@ It knows no scene and no engine. README.md beside this file is the ledger: equat
 from reference_impl.body import Body, Floor, World
 from reference_impl.inertia import solid_box_inertia, solid_sphere_inertia, total_mass, vertex_inertia
 from reference_impl.methods import Methods
-from reference_impl.simulate import UnsolvedContact, simulate, step
+from reference_impl.simulate import Simulator, UnsolvedContact, simulate, step
 
 __all__ = [
     "Body",
     "Floor",
     "Methods",
+    "Simulator",
     "UnsolvedContact",
     "World",
     "simulate",

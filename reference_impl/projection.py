@@ -5,9 +5,9 @@ the contact. Lifting adds M g times the depth of potential energy.
 Source: the simplest of the stabilisations in J. Baumgarte, CMAME 1 (1972), and E. Catto, Iterative Dynamics (GDC 2005).
 """
 
-from reference_impl.contacts.mean import N, vertex
+from reference_impl.contacts.mean import N, along_normal, vertex
 from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import compiled, dot
+from reference_impl.vectors import compiled
 
 SLOP = 1e-7  # m
 
@@ -20,5 +20,5 @@ def lift(x, q, body):
     R = rotation_matrix(q)
     lowest = 0.0
     for i in range(body.points.shape[0]):
-        lowest = min(lowest, x.y + dot(vertex(R, body, i), N))
+        lowest = min(lowest, x.y + along_normal(vertex(R, body, i)))
     return x + max(-lowest - SLOP, 0.0) * N

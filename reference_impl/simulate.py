@@ -37,7 +37,7 @@ def step(state: ArrayLike, body: Body, world: World, dt: float, forces: ArrayLik
 
     Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithms 1 and 2.
     """
-    return _run(state, body, world, dt, 1, 1, forces, methods)[1]
+    return Simulator(body, world, dt, methods).run(state, 1, forces=forces)[1]
 
 
 def simulate(state: ArrayLike, body: Body, world: World, dt: float, steps: int, every: int = 1, methods: Methods | None = None) -> Array:
@@ -61,38 +61,41 @@ def simulate(state: ArrayLike, body: Body, world: World, dt: float, steps: int, 
     Warns:
         UnsolvedContact: `contact=sequential` reached its limit of sweeps; the text says in how many steps.
     """
-    return _run(state, body, world, dt, steps, every, None, methods)
+    return Simulator(body, world, dt, methods).run(state, steps, every)
 
 
-def _run(
-    state: ArrayLike,
-    body: Body,
-    world: World,
-    dt: float,
-    steps: int,
-    every: int,
-    forces: ArrayLike | None,
-    methods: Methods | None,
-) -> Array:
-    start = _numbers("state", state, (13,))
-    if not np.any(start[3:7]):
-        raise ValueError("state: the orientation is the zero quaternion; it must be a unit quaternion [x, y, z, w]")
-    if not (math.isfinite(dt) and dt > 0.0):
-        raise ValueError(f"dt: got {dt!r}; must be a number above 0, in s")
-    if steps < 0 or every < 1:
-        raise ValueError(f"steps and every: got {steps} and {every}; must be at least 0 and at least 1")
-    on_vertices = None if forces is None else _numbers("forces", forces, np.shape(body.points))
-    gravity = None if world.gravity is None else Vec3(*map(float, _numbers("gravity", world.gravity, (3,))))
-    damping = None if world.damping is None else KernelDamping(*(math.exp(-rate * dt) for rate in world.damping))
-    chosen = methods or Methods()
-    if world.floor is not None:
-        _assert_law_fits(chosen, world.floor)
-    rows = np.empty((1 + steps // every, 13))
-    kernel = recording_kernel(chosen, not _cannot_turn(start, body, world, on_vertices))
-    unsolved = kernel(rows, start, float(dt), every, kernel_body(body), gravity, on_vertices, damping, world.floor)
-    if unsolved:
-        warnings.warn(f"the contact was not solved in {unsolved} of {steps} steps", UnsolvedContact, stacklevel=3)
-    return rows
+class Simulator:
+    """A body in a world at one step size, checked and converted once, for who simulates it many times over.
+
+    Raises:
+        ValueError: As in `step`.
+    """
+
+    def __init__(self, body: Body, world: World, dt: float, methods: Methods | None = None) -> None:
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise ValueError(f"dt: got {dt!r}; must be a number above 0, in s")
+        self._methods = methods or Methods()
+        if world.floor is not None:
+            _assert_law_fits(self._methods, world.floor)
+        self._body, self._world, self._dt = body, world, float(dt)
+        self._kernel_body = kernel_body(body)
+        self._gravity = None if world.gravity is None else Vec3(*map(float, _numbers("gravity", world.gravity, (3,))))
+        self._damping = None if world.damping is None else KernelDamping(*(math.exp(-rate * dt) for rate in world.damping))
+
+    def run(self, state: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None) -> Array:
+        """States from `state` on: the arguments of `simulate`, and of `step`; shape (1 + steps // every, 13)."""
+        start = _numbers("state", state, (13,))
+        if not np.any(start[3:7]):
+            raise ValueError("state: the orientation is the zero quaternion; it must be a unit quaternion [x, y, z, w]")
+        if steps < 0 or every < 1:
+            raise ValueError(f"steps and every: got {steps} and {every}; must be at least 0 and at least 1")
+        on_vertices = None if forces is None else _numbers("forces", forces, np.shape(self._body.points))
+        rows = np.empty((1 + steps // every, 13))
+        kernel = recording_kernel(self._methods, not _cannot_turn(start, self._body, self._world, on_vertices))
+        unsolved = kernel(rows, start, self._dt, every, self._kernel_body, self._gravity, on_vertices, self._damping, self._world.floor)
+        if unsolved:
+            warnings.warn(f"the contact was not solved in {unsolved} of {steps} steps", UnsolvedContact, stacklevel=3)
+        return rows
 
 
 def _assert_law_fits(methods: Methods, floor: Floor) -> None:

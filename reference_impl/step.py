@@ -19,7 +19,8 @@ def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, turn, collide
         v = damping.linear * v
         w = damping.angular * w
     if floor is not None:
-        v, w, solved = collide(x, q, v, w, body, floor, law)
+        if x.y < body.reach:  # else no vertex can be below the floor
+            v, w, solved = collide(x, q, v, w, body, floor, law)
     x = x + dt * v  # eq 1: with the new velocity
     if turn is not None:
         q, w = turn(q, w, dt, body)  # eq 6, or one of its improvements

@@ -164,7 +164,7 @@ def solve(m, b):
     c1 = cross(m.row2, m.row3)
     c2 = cross(m.row3, m.row1)
     c3 = cross(m.row1, m.row2)
-    return (b.x * c1 + b.y * c2 + b.z * c3) / dot(m.row1, c1)
+    return (1.0 / dot(m.row1, c1)) * (b.x * c1 + b.y * c2 + b.z * c3)
 
 
 def _is(numba_type: Any, kind: type) -> bool:

@@ -57,26 +57,25 @@ class Document(Engine):
 
 
 class DocumentSimulation(Simulation):
-    """A state that `reference_impl.simulate` moves on."""
+    """A state that the reference implementation moves on."""
 
     staggered = True
 
     def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
-        self._methods = methods
         self._body = _body(scene.body)
         self._world = _world(scene)
-        self._dt = dt
+        self._simulator = reference_impl.Simulator(self._body, self._world, dt, methods)
         self._state = scene.initial_state
         self.settings = {"numba": version("numba"), **asdict(methods)}
 
     def advance(self, steps: int) -> None:
-        self._state = reference_impl.simulate(self._state, self._body, self._world, self._dt, steps, max(steps, 1), self._methods)[-1]
+        self._state = self._simulator.run(self._state, steps, max(steps, 1))[-1]
 
     def state(self) -> Array:
         return self._state.copy()
 
     def record(self, steps: int, every: int = 1) -> Array:
-        rows = reference_impl.simulate(self._state, self._body, self._world, self._dt, steps, every, self._methods)
+        rows = self._simulator.run(self._state, steps, every)
         self._state = rows[-1].copy()
         return rows
 

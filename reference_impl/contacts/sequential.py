@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from reference_impl.contacts.mean import N, impulse_response, vertex
+from reference_impl.contacts.mean import along_normal, impulse_response, vertex
 from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import Vec3, compiled, cross, dot, transpose
+from reference_impl.vectors import Vec3, compiled, cross, transpose
 
 TOLERANCE = 1e-10  # m/s: no vertex's velocity changes by more in the last sweep
 MOST_SWEEPS = 2000
@@ -33,8 +33,6 @@ def collide_coulomb(x, q, v, w, body, floor, law):
 
 @compiled
 def _sweep(x, q, v, w, body, floor, friction):
-    if x.y >= body.reach:
-        return v, w, True
     R = rotation_matrix(q)
     I_inverse = R @ body.inverse_inertia @ transpose(R)
     impulses = np.zeros((body.points.shape[0], 3))
@@ -43,14 +41,14 @@ def _sweep(x, q, v, w, body, floor, friction):
         largest = 0.0
         for i in range(body.points.shape[0]):
             r = vertex(R, body, i)
-            if x.y + dot(r, N) < 0.0:
-                approach = dot(v0 + cross(w0, r), N)
+            if x.y + along_normal(r) < 0.0:
+                approach = along_normal(v0 + cross(w0, r))
                 mu = 0.0 if abs(approach) < floor.rest_speed else floor.restitution
                 j = Vec3(float(impulses[i, 0]), float(impulses[i, 1]), float(impulses[i, 2]))
                 K = impulse_response(r, I_inverse, body.mass)
                 more = _improve(j, K, v + cross(w, r), max(-mu * approach, 0.0), friction)
                 change = more - j
-                v = v + change / body.mass
+                v = v + (1.0 / body.mass) * change
                 w = w + I_inverse @ cross(r, change)
                 impulses[i, 0], impulses[i, 1], impulses[i, 2] = more.x, more.y, more.z
                 largest = max(largest, abs(change.x) * K.row1.x + abs(change.y) * K.row2.y + abs(change.z) * K.row3.z)

@@ -5,14 +5,14 @@ to a factor of 7 at restitution 1. Eq 17 can add energy at restitution above .66
 Source: H. Wang, Rigid Body Dynamics, eq 11 to 17.
 """
 
-from reference_impl.contacts.mean import N
-from reference_impl.vectors import compiled, dot, solve
+from reference_impl.contacts.mean import N, along_normal
+from reference_impl.vectors import compiled, solve
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j that takes the contact velocity u to the prescribed one: K j = change."""
-    v_normal = dot(u, N)
+    v_normal = along_normal(u)
     if friction > 0.0:
         change = -u - mu * v_normal * N  # eq 17
     else:

@@ -119,8 +119,9 @@ def modelled(scene: Scenario) -> list[str]:
 
 
 def left_out(scene: Scenario) -> list[str]:
-    """What a scene does not model, so that no engine pays for it."""
-    return [part for part in ("gravity", "floor", "damping") if getattr(scene, part) is None]
+    """What a scene does not model, so that no engine pays for it, and what of it is not run."""
+    parts = [part for part in ("gravity", "floor", "damping") if getattr(scene, part) is None]
+    return parts + ([] if scene.ensemble is None else ["the ensemble: the scene's own start alone is run"])
 
 
 def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:

@@ -174,6 +174,8 @@ def angular_momentum_error(case: Comparison) -> Array:
     """Largest difference of angular momentum from the truth in flight, over the truth's largest."""
     found, exact = (angular_momentum(case.scene, motion) for motion in (case.compared, case.exact))
     scale = np.max(np.linalg.norm(exact, axis=1))
+    if scale == 0.0:
+        raise Unresolved("the angular momentum is too small to be a number")
     return _largest_of_each_flight(np.linalg.norm(found - exact, axis=1), case) / scale
 
 

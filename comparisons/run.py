@@ -1,6 +1,7 @@
 """The main job: scenes × engines × time steps, measured against truth and against each other, and judged."""
 
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -49,11 +50,20 @@ def simulate(scene: Scenario, engine: str | Engine, dt: float, every: int = 1) -
     refusal = chosen.declines(scene)
     if refusal is not None:
         raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
-    with chosen.prepare(scene, dt) as simulation:
-        assert_built_as_meant(chosen, scene, simulation)
+    motion, limits = _motion(scene, chosen, dt, every)
+    for limit in limits:
+        warnings.warn(limit, stacklevel=2)
+    return motion
+
+
+def _motion(scene: Scenario, engine: Engine, dt: float, every: int = 1) -> tuple[Trajectory, Sequence[str]]:
+    """What an engine does with a scene, checked, and which of its limits it met."""
+    with engine.prepare(scene, dt) as simulation:
+        assert_built_as_meant(engine, scene, simulation)
         states = sound_record(simulation.record(scene.steps(dt), every), 1 + scene.steps(dt) // every)
         lag = 0.5 * dt if simulation.staggered else 0.0
-    return Trajectory.from_states(dt * every * np.arange(len(states), dtype=float), states, lag)
+        limits = simulation.limits
+    return Trajectory.from_states(dt * every * np.arange(len(states), dtype=float), states, lag), limits
 
 
 def run(
@@ -80,13 +90,13 @@ def run(
         raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
     asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)}
     stamp = provenance(asked)
-    stamp = provenance({"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)})
     rows: list[Row] = []
     trajectories: dict[TrajectoryKey, Trajectory] = {}
     settings: dict[str, dict[str, Any]] = {}
     for scene in scenes:
+        truth = truth_for(scene)
         for dt in dts:
-            phases = [(phase, truth_for(phase)) for phase in start_phases(scene, truth_for(scene), dt)]
+            phases = [(phase, truth if phase is scene else truth_for(phase)) for phase in start_phases(scene, truth, dt)]
             attempts: list[_Attempt] = []
             for contestant in contestants:
                 attempt = _attempt(contestant, scene, dt, [phase for phase, _ in phases])
@@ -125,6 +135,7 @@ class _Attempt:
     reason: str = ""
     motion: Trajectory | None = None
     phases: list[Trajectory] = field(default_factory=list)
+    limits: Sequence[str] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     time_per_step: float = float("nan")
 
@@ -151,8 +162,8 @@ def _attempt(contestant: _Contestant, scene: Scenario, dt: float, phases: list[S
         if refusal is not None:
             attempt.verdict, attempt.reason = "declined", refusal
             return attempt
-        attempt.motion = simulate(scene, engine, dt)
-        attempt.phases = [attempt.motion] if phases == [scene] else [simulate(phase, engine, dt) for phase in phases]
+        attempt.motion, attempt.limits = _motion(scene, engine, dt)
+        attempt.phases = [attempt.motion] if phases == [scene] else [_motion(phase, engine, dt)[0] for phase in phases]
         attempt.settings, attempt.time_per_step = _settings_and_time(engine, scene, dt)
     except Diverged as error:
         attempt.verdict, attempt.reason = "diverged", str(error)
@@ -186,7 +197,7 @@ def _truth_rows(scene: Scenario, dt: float, attempt: _Attempt, phases: list[tupl
         return [shared | {"verdict": "diverged", "reason": reason}]
     cases = [Comparison.with_truth(phase, motion, truth) for (phase, truth), motion in zip(phases, attempt.phases, strict=True)]
     truth = phases[0][1]
-    rows = []
+    rows = [shared | {"verdict": "limited", "reason": limit} for limit in attempt.limits]
     for metric in metrics_for(scene, truth):
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}
         if metric.kind == "truth" and truth is not None:
@@ -200,7 +211,8 @@ def _truth_rows(scene: Scenario, dt: float, attempt: _Attempt, phases: list[tupl
 def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: list[Comparison]) -> Row:
     """A metric's mean over the start phases, judged."""
     try:
-        value = metric.value(cases)
+        with np.errstate(all="ignore"):  # an engine may say 1e300; what comes of it is inf or NaN, and judged as such
+            value = metric.value(cases)
         unresolved = ""
     except Unresolved as error:
         value, unresolved = float("nan"), str(error)

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from comparisons.engines.base import EngineMissing
 from comparisons.engines.registry import BUILT_IN, engine
 from comparisons.metrics import METRICS, Metric
-from scenarios import Scenario, SceneError, Truth
+from scenarios import DropspinError, Scenario, SceneError, Truth
 from scenarios.errors import did_you_mean
 from scenarios.model import Expectation
 
@@ -48,7 +48,10 @@ def assert_expectations_can_be_judged(scene: Scenario, truth: Truth | None, engi
                 f"Known: {', '.join(sorted(known_engines))}."
             )
         if expectation.engine and base in BUILT_IN:
-            canonical = _canonical(expectation.engine)
+            try:
+                canonical = _canonical(expectation.engine)
+            except DropspinError as error:
+                raise SceneError(f"{where}.engine: got {expectation.engine!r}; {error}") from None
             if canonical != expectation.engine:
                 raise SceneError(f"{where}.engine: got {expectation.engine!r}; write it as {canonical!r}, as the results do.")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from comparisons import Results
 from comparisons.store import save
-from reports.html import html_report, markdown_report, svg_plots
+from reports.html import PLOTS, html_report, markdown_report, svg_plots
 from scenarios import DropspinError
 
 OURS = frozenset({"run.json", "results.parquet", "results.csv", "report.html", "report.md", "plots", "trajectories"})
@@ -60,7 +60,7 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
         made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
         unfinished = Path(tempfile.mkdtemp(prefix=f".{target.name[:100]}-unfinished-", dir=target.parent))
-        unfinished.chmod(0o755)
+        unfinished.chmod(target.stat().st_mode if target.exists() else 0o777 & ~_umask())
     except OSError as error:
         raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o.") from None
     try:
@@ -74,6 +74,13 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
         for parent in made:
             with suppress(OSError):  # it holds the run, or somebody else's
                 parent.rmdir()
+
+
+def _umask() -> int:
+    """The process's own; it can only be read by setting it."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def _swap(unfinished: Path, target: Path) -> None:
@@ -99,14 +106,20 @@ def _assert_replaceable(given: str | Path, target: Path) -> None:
         raise DropspinError(f"{given}: is a file; choose a folder with -o.")
     if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
         raise DropspinError(f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it with -o.")
-    strangers = sorted(path.name for path in target.iterdir() if path.name not in OURS)
-    if strangers or (any(target.iterdir()) and not _is_run(target)):
-        example = f", {strangers[0]!r} for one" if strangers else ""
-        raise DropspinError(f"{given}: holds files that are no run of dropspin{example}; choose an empty or new folder with -o.")
+    known = _files_of_run(target)
+    strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
+    if strangers:
+        raise DropspinError(
+            f"{given}: holds files that are no run of dropspin, {strangers[0]!r} for one; choose an empty or new folder with -o."
+        )
 
 
-def _is_run(folder: Path) -> bool:
+def _files_of_run(folder: Path) -> set[str]:
+    """Everything that a run wrote into its folder, as far as it can be told; nothing if no run is there."""
     try:
-        return "provenance" in json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, TypeError):
-        return False
+        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        trajectories, scenes = set(content["trajectories"]), content["scenes"]
+    except (OSError, ValueError, TypeError, KeyError):
+        return set()
+    plots = {f"plots/{number:02d}-{kind}.svg" for number in range(len(scenes)) for kind in PLOTS}
+    return {*OURS, *trajectories, *plots}

@@ -17,6 +17,8 @@ from reports.plots import convergence_figure, time_figure
 from reports.svg import svg
 from scenarios import Scenario, truth_for
 
+PLOTS = ("time", "convergence")
+
 
 @cache
 def _environment() -> Environment:

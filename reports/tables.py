@@ -2,6 +2,7 @@
 
 import math
 import shlex
+from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -12,15 +13,19 @@ from comparisons import METRICS, Results
 from reports.findings import failures, finding_sentences, verdict_sentence
 from reports.numbers import MARKS, bound, word, written
 
-NUMBER_WIDTH = 9  # as in -1.23e-04: a narrow terminal may fold the names, never a number
+NUMBER_WIDTH = 9  # as in -1.23e-04: a narrow terminal may fold the names and break the table, never a number
+NAME_WIDTH, GAP = 20, 3
 STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diverged": "bold red", "timed_out": "bold red"}
 
 
 def print_table(results: Results, console: Console | None = None) -> None:
     """Print a run at its finest step: every metric against truth, and the engines against each other."""
     out = console or Console()
-    for name in results.scenes:
-        out.print(_scene_table(results, name))
+    at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
+    for name, scene in results.scenes.items():
+        out.print(Text(name, style="bold").append(f"  {scene.summary}" if scene.summary else "", style="not bold"))
+        for first in range(0, len(results.engines), at_once):
+            out.print(_scene_table(results, name, results.engines[first : first + at_once]))
         _print_remarks(results, name, out)
         out.print()
     _print_failures(results, out)
@@ -29,23 +34,21 @@ def print_table(results: Results, console: Console | None = None) -> None:
     out.print(Text(verdict_sentence(results), style="bold"))
 
 
-def _scene_table(results: Results, name: str) -> Table:
+def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     frame = results.frame[results.frame["scene"] == name]
     finest = frame[frame["dt"] == frame["dt"].min()]
     own = finest[(finest["kind"] != "agreement") & (finest["metric"] != "")]
     pairs = finest[finest["kind"] == "agreement"]
-    summary = results.scenes[name].summary
-    title = Text(name, style="bold").append(f"  {summary}" if summary else "", style="not bold")
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=20)
-    for engine in results.engines:
-        table.add_column(Text(engine), justify="right", min_width=NUMBER_WIDTH + 2)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
+    for engine in engines:
+        table.add_column(Text(engine, overflow="fold"), justify="right", min_width=NUMBER_WIDTH + 2)
     if not pairs.empty:
         table.add_column("apart by", justify="right", min_width=NUMBER_WIDTH)
     for metric in own["metric"].unique():
         unit = METRICS[metric].unit
         cells: list[Text] = [Text(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))]
-        for engine in results.engines:
+        for engine in engines:
             row = own[(own["metric"] == metric) & (own["engine"] == engine)]
             cells.append(_cell(float(row["value"].iloc[0]), str(row["verdict"].iloc[0])) if len(row) else Text("–"))
         if not pairs.empty:

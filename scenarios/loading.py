@@ -102,7 +102,7 @@ def _described(problem: Any) -> str:
     given = _shown(problem["input"])
     kind = problem["type"]
     if kind == "extra_forbidden":
-        allowed = _keys_allowed(location)
+        allowed = _keys_allowed(problem["loc"])
         guess = did_you_mean(str(location[-1]), allowed)
         return f"{key}: unknown key, with the value {given}.{guess} Allowed: {', '.join(allowed)}."
     if kind == "missing":
@@ -147,10 +147,7 @@ def _alternatives(location: tuple[Any, ...], kind: str) -> str:
 def _keys_allowed(location: tuple[Any, ...]) -> list[str]:
     table: type[BaseModel] = Scenario
     if len(location) > 1:
-        if location[0] == "body":
-            keys = set().union(*(shape.model_fields for shape in SHAPES.values()))
-            return sorted(keys)
-        table = FEATURES[location[0]]
+        table = SHAPES[location[1]] if location[0] == "body" else FEATURES[location[0]]
     return [key for key in table.model_fields if key not in INTERNAL]
 
 

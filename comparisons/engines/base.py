@@ -1,6 +1,6 @@
 """The engine protocol: subclass `Engine` and `Simulation` to bring an engine of your own."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
@@ -51,10 +51,12 @@ class Simulation:
     Attributes:
         staggered: Whether velocity lags position by half a step, as under semi-implicit Euler.
         settings: What the results are stamped with, versions included; values that JSON knows.
+        limits: Known limits of the engine that it has met on the way, each a sentence; they are told, and fail nothing.
     """
 
     staggered: bool = False
     settings: Mapping[str, Any] = {}
+    limits: Sequence[str] = ()
 
     def advance(self, steps: int) -> None:
         """Take some native steps and do nothing else: this is what gets timed."""
@@ -108,9 +110,9 @@ class Engine:
     def __post_init__(self) -> None:
         for option, value in self.options.items():
             if option not in self.choices:
-                raise UnknownName(f"option of engine {self.name!r}", option, self.choices)
+                raise UnknownName(f"{self.name}'s option", option, self.choices)
             if value not in self.choices[option]:
-                raise UnknownName(f"value of {option} for engine {self.name!r}", value, self.choices[option])
+                raise UnknownName(f"{self.name}'s {option}", value, self.choices[option])
         chosen = {key: value for key, value in sorted(self.options.items()) if value != self.choices[key][0]}
         object.__setattr__(self, "options", chosen)
 

@@ -1,6 +1,7 @@
 """The engine `document`: the note, literally."""
 
 import math
+import warnings
 from dataclasses import asdict
 from typing import ClassVar
 
@@ -69,14 +70,21 @@ class DocumentSimulation(Simulation):
         self.settings = {"numba": version("numba"), **asdict(methods)}
 
     def advance(self, steps: int) -> None:
-        self._state = self._simulator.run(self._state, steps, max(steps, 1))[-1]
+        self._state = self._run(steps, max(steps, 1))[-1]
 
     def state(self) -> Array:
         return self._state.copy()
 
     def record(self, steps: int, every: int = 1) -> Array:
-        rows = self._simulator.run(self._state, steps, every)
+        rows = self._run(steps, every)
         self._state = rows[-1].copy()
+        return rows
+
+    def _run(self, steps: int, every: int) -> Array:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", reference_impl.UnsolvedContact)
+            rows = self._simulator.run(self._state, steps, every)
+        self.limits = [*self.limits, *(str(warning.message) for warning in caught)]
         return rows
 
     def as_built(self) -> AsBuilt:

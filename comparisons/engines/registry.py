@@ -62,5 +62,7 @@ def _options(name: str, listed: str) -> dict[str, str]:
         key, equals, value = (part.strip() for part in item.partition("="))
         if not (key and equals and value):
             raise DropspinError(f"engine {name!r}: {item!r} is not option=value.")
+        if key in options:
+            raise DropspinError(f"engine {name!r}: {key} is given twice; give each option once.")
         options[key] = value
     return options

@@ -155,9 +155,9 @@ def test_names_with_options():
     assert engine_names() == ["document", "mujoco", "pybullet"]
     with pytest.raises(UnknownName, match=r"engine 'mujco' is unknown\. Did you mean 'mujoco'"):
         engine("mujco")
-    with pytest.raises(UnknownName, match=r"option of engine 'mujoco' 'integrater' is unknown\. Did you mean 'integrator'"):
+    with pytest.raises(UnknownName, match=r"mujoco's option 'integrater' is unknown\. Did you mean 'integrator'"):
         engine("mujoco[integrater=rk4]")
-    with pytest.raises(UnknownName, match=r"value of integrator for engine 'mujoco' 'rk5' is unknown\. Did you mean 'rk4'"):
+    with pytest.raises(UnknownName, match=r"mujoco's integrator 'rk5' is unknown\. Did you mean 'rk4'"):
         engine("mujoco[integrator=rk5]")
     for bad in ("mujoco[rk4]", "mujoco[integrator=rk4", "", "a b"):
         with pytest.raises(DropspinError):

@@ -331,3 +331,13 @@ def test_what_is_asked_is_checked():
     )
     with pytest.raises(SceneError, match=r"expect\[0\]\.metric: got 'energy_eror'.*Did you mean 'energy_error'"):
         comparisons.run([typo], ["document"])
+
+
+def test_unsolved_contacts_are_told():
+    """The reference implementation's sequential contact may not settle: a row says in how many steps, and nothing else is lost."""
+    scene = scenarios.load("drop-box-sticking").model_copy(update={"duration": 2.0, "expect": ()})
+    found = comparisons.run([scene], ["document[contact=sequential,law=coulomb]"], [1e-3])
+    limited = found.frame[found.frame["verdict"] == "limited"]
+    assert len(limited) == 1
+    assert re.fullmatch(r"the contact was not solved in \d+ of 2000 steps", limited["reason"].iloc[0])
+    assert found.exit_code() == 0

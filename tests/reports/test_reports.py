@@ -190,7 +190,7 @@ def test_what_is_not_ours_is_never_deleted(results, tmp_path, monkeypatch):
     with pytest.raises(DropspinError, match=r"holds files that are no run"):
         reports.write(results, tmp_path / "precious" / "new" / "..")
     (keep / "run.json").write_text("{}")
-    with pytest.raises(DropspinError, match=r"'thesis\.txt' for one"):
+    with pytest.raises(DropspinError, match=r"'run\.json' for one"):
         reports.write(results, keep)
     (keep / "thesis.txt").rename(tmp_path / "thesis.txt")
     with pytest.raises(DropspinError, match=r"holds files that are no run"):
@@ -201,6 +201,13 @@ def test_what_is_not_ours_is_never_deleted(results, tmp_path, monkeypatch):
     with pytest.raises(DropspinError, match=r"'my-notes\.txt' for one"):
         reports.write(results, run)
     (run / "my-notes.txt").unlink()
+    (run / "plots" / "mine.svg").write_text("x")
+    with pytest.raises(DropspinError, match=r"'plots/mine\.svg' for one"):
+        reports.write(results, run)
+    (run / "plots" / "mine.svg").unlink()
+    run.chmod(0o700)
+    reports.write(results, run)
+    assert run.stat().st_mode & 0o777 == 0o700
     monkeypatch.chdir(run)
     with pytest.raises(DropspinError, match="the working directory, or a mount point"):
         reports.write(results, ".")
@@ -307,3 +314,20 @@ def test_terminal_table(results, capsys):
     assert NASTY in text
     assert "expectations hold." in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_many_engines_break_the_table_and_no_number(capsys):
+    """Engines whose names begin alike stay apart, and the last column is there, in 80 columns."""
+    from rich.console import Console
+
+    engines = ["document", "document[rotation=rk4]", "document[rotation=exact,law=normal]", "mujoco", "mujoco[integrator=implicit]"]
+    found = comparisons.run([scenarios.load("spin-principal")], engines, [1e-2])
+    reports.print_table(found, Console(width=80, no_color=True))
+    text = capsys.readouterr().out
+    assert "…" not in text
+    assert "apart by" in text
+    assert max(map(len, text.splitlines())) <= 80
+    errors = found.frame[found.frame["metric"] == "orientation_error"]
+    assert len(errors) == len(engines)
+    for value in errors["value"]:
+        assert f"{value:.2e}" in text

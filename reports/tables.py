@@ -42,9 +42,9 @@ def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
     for engine in engines:
-        table.add_column(Text(engine, overflow="fold"), justify="right", min_width=NUMBER_WIDTH + 2)
+        table.add_column(Text(engine, overflow="fold"), justify="right", width=NUMBER_WIDTH + 2)
     if not pairs.empty:
-        table.add_column("apart by", justify="right", min_width=NUMBER_WIDTH)
+        table.add_column("apart by", justify="right", width=NUMBER_WIDTH)
     for metric in own["metric"].unique():
         unit = METRICS[metric].unit
         cells: list[Text] = [Text(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))]

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,6 +13,7 @@ import comparisons
 import reports
 import scenarios
 from comparisons.store import restore
+from reports.numbers import written
 from scenarios import DropspinError
 
 NASTY = "<script>alert(1)</script>$x_{"
@@ -320,14 +322,16 @@ def test_many_engines_break_the_table_and_no_number(capsys):
     """Engines whose names begin alike stay apart, and the last column is there, in 80 columns."""
     from rich.console import Console
 
-    engines = ["document", "document[rotation=rk4]", "document[rotation=exact,law=normal]", "mujoco", "mujoco[integrator=implicit]"]
-    found = comparisons.run([scenarios.load("spin-principal")], engines, [1e-2])
-    reports.print_table(found, Console(width=80, no_color=True))
-    text = capsys.readouterr().out
-    assert "…" not in text
-    assert "apart by" in text
-    assert max(map(len, text.splitlines())) <= 80
-    errors = found.frame[found.frame["metric"] == "orientation_error"]
-    assert len(errors) == len(engines)
-    for value in errors["value"]:
-        assert f"{value:.2e}" in text
+    every = ["document", "document[rotation=rk4]", "document[rotation=exact,law=normal]", "mujoco", "mujoco[integrator=implicit]"]
+    found = comparisons.run([scenarios.load("spin-principal")], every, [1e-2])
+    apart = found.frame[(found.frame["kind"] == "agreement") & (found.frame["metric"] == "energy_error")]["value"].abs().max()
+    for engines in (found.engines, found.engines[:3], found.engines[1:2]):
+        for width in (60, 80, 90, 200):
+            reports.print_table(replace(found, engines=engines), Console(width=width, no_color=True))
+            text = capsys.readouterr().out
+            assert "…" not in text
+            assert max(map(len, text.splitlines())) <= width
+            errors = found.frame[(found.frame["metric"] == "orientation_error") & found.frame["engine"].isin(engines)]
+            assert len(errors) == len(engines)
+            for value in [*errors["value"], apart]:
+                assert written(value) in text

@@ -37,7 +37,10 @@ def step(state: ArrayLike, body: Body, world: World, dt: float, forces: ArrayLik
 
     Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithms 1 and 2.
     """
-    return Simulator(body, world, dt, methods).run(state, 1, forces=forces)[1]
+    simulator = Simulator(body, world, dt, methods)
+    rows = simulator.run(state, 1, forces=forces)
+    _warn_if_unsolved(simulator, 1)
+    return rows[1]
 
 
 def simulate(state: ArrayLike, body: Body, world: World, dt: float, steps: int, every: int = 1, methods: Methods | None = None) -> Array:
@@ -61,11 +64,17 @@ def simulate(state: ArrayLike, body: Body, world: World, dt: float, steps: int, 
     Warns:
         UnsolvedContact: `contact=sequential` reached its limit of sweeps; the text says in how many steps.
     """
-    return Simulator(body, world, dt, methods).run(state, steps, every)
+    simulator = Simulator(body, world, dt, methods)
+    rows = simulator.run(state, steps, every)
+    _warn_if_unsolved(simulator, steps)
+    return rows
 
 
 class Simulator:
     """A body in a world at one step size, checked and converted once, for who simulates it many times over.
+
+    Attributes:
+        unsolved_steps: In how many steps so far the impulses of `contact=sequential` had not settled.
 
     Raises:
         ValueError: As in `step`.
@@ -80,6 +89,7 @@ class Simulator:
         self._body, self._world, self._dt = body, world, float(dt)
         self._kernel_body = kernel_body(body)
         self._gravity = None if world.gravity is None else Vec3(*map(float, _numbers("gravity", world.gravity, (3,))))
+        self.unsolved_steps = 0
         self._damping = None if world.damping is None else KernelDamping(*(math.exp(-rate * dt) for rate in world.damping))
 
     def run(self, state: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None) -> Array:
@@ -92,10 +102,16 @@ class Simulator:
         on_vertices = None if forces is None else _numbers("forces", forces, np.shape(self._body.points))
         rows = np.empty((1 + steps // every, 13))
         kernel = recording_kernel(self._methods, not _cannot_turn(start, self._body, self._world, on_vertices))
-        unsolved = kernel(rows, start, self._dt, every, self._kernel_body, self._gravity, on_vertices, self._damping, self._world.floor)
-        if unsolved:
-            warnings.warn(f"the contact was not solved in {unsolved} of {steps} steps", UnsolvedContact, stacklevel=3)
+        self.unsolved_steps += kernel(
+            rows, start, self._dt, every, self._kernel_body, self._gravity, on_vertices, self._damping, self._world.floor
+        )
         return rows
+
+
+def _warn_if_unsolved(simulator: Simulator, steps: int) -> None:
+    if simulator.unsolved_steps:
+        text = f"the contact was not solved in {simulator.unsolved_steps} of {steps} steps"
+        warnings.warn(text, UnsolvedContact, stacklevel=3)
 
 
 def _assert_law_fits(methods: Methods, floor: Floor) -> None:

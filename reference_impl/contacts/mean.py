@@ -28,10 +28,11 @@ def contact_point(R, v, w, height, body):
     total = Vec3(0.0, 0.0, 0.0)
     count = 0
     for i in range(body.points.shape[0]):
-        r = vertex(R, body, i)
-        if height + along_normal(r) < 0.0 and along_normal(v + cross(w, r)) < 0.0:
-            total = total + r
-            count += 1
+        if height + along_normal(vertex(R, body, i)) < 0.0:
+            r = vertex(R, body, i)
+            if along_normal(v + cross(w, r)) < 0.0:
+                total = total + r
+                count += 1
     return (total / count if count > 0 else total), count
 
 

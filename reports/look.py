@@ -1,0 +1,110 @@
+"""What `list`, `show` and `doctor` have to say: rows of words, for a table or for JSON."""
+
+import sys
+from collections.abc import Sequence
+
+from comparisons import METRICS, EngineMissing, engine, engine_names, simulate
+from comparisons.building import assert_built_as_meant
+from comparisons.provenance import processor, versions
+from comparisons.run import assert_step_fits
+from comparisons.verdicts import assert_expectations_can_be_judged
+from reports.html import left_out, modelled
+from reports.numbers import bound
+from scenarios import Scenario, load, names, truth_for
+
+Rows = list[dict[str, str]]
+
+
+def scene_rows() -> Rows:
+    """The catalogue."""
+    rows = []
+    for name in names():
+        scene = load(name)
+        truth = truth_for(scene)
+        rows.append({"scene": name, "truth": truth.name if truth else "", "tags": ", ".join(scene.tags), "summary": scene.summary})
+    return rows
+
+
+def engine_rows() -> Rows:
+    """The engines that can be named."""
+    rows = []
+    for name in engine_names():
+        try:
+            found = engine(name)
+        except EngineMissing as error:
+            rows.append({"engine": name, "options": "", "summary": str(error)})
+            continue
+        options = "; ".join(f"{key} = {' | '.join(values)}" for key, values in found.choices.items())
+        rows.append({"engine": name, "options": options, "summary": (type(found).__doc__ or "").strip().splitlines()[0]})
+    return rows
+
+
+def metric_rows() -> Rows:
+    """The metrics."""
+    return [
+        {"metric": metric.name, "unit": metric.unit, "needs": metric.needs, "definition": metric.definition} for metric in METRICS.values()
+    ]
+
+
+def description(scene: Scenario) -> Rows:
+    """A scene: what is modelled, its truth, what it expects."""
+    truth = truth_for(scene)
+    assert_expectations_can_be_judged(scene, truth, [])
+    start = scene.start
+    facts = {
+        "scene": scene.name,
+        "summary": scene.summary,
+        "source": scene.source,
+        "duration": f"{scene.duration:g} s",
+        "modelled": ", ".join(modelled(scene)),
+        "left out": ", ".join(left_out(scene)) or "nothing",
+        "inertia": f"{scene.body.inertia_tensor.tolist()} kg m²",
+        "start": f"x = {list(start.position)} m, q = {list(start.orientation)}",
+        "start rates": f"v = {list(start.velocity)} m/s, ω = {list(start.angular_velocity)} rad/s",
+        "truth": truth.statement if truth else "none known",
+    }
+    if truth and truth.events:
+        facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
+    for expectation in scene.expect:
+        below, within, above = expectation.below, expectation.within, expectation.above
+        limits = (-below, below) if below else within or (above, float("nan"))
+        steps = ", ".join(f"{dt:g}" for dt in expectation.dt or ())
+        who = " at ".join(filter(None, [expectation.engine or "any engine", f"{steps} s" if steps else ""]))
+        facts[f"expect {expectation.metric} ({who})"] = f"{bound(*limits)}: {expectation.reason}"
+    return [{"what": key, "is": value} for key, value in facts.items() if value]
+
+
+def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
+    """What an engine builds of a scene, read back, with its settings."""
+    assert_step_fits(scene, dt)
+    chosen = engine(engine_name)
+    refusal = chosen.declines(scene)
+    if refusal is not None:
+        return [{"what": chosen.label, "is": f"declines {scene.name}: {refusal}"}]
+    with chosen.prepare(scene, dt) as simulation:
+        assert_built_as_meant(chosen, scene, simulation)
+        built = simulation.as_built()
+        rows = [{"what": "engine", "is": chosen.label}, {"what": "staggered", "is": str(simulation.staggered)}]
+        if built is not None:
+            rows += [
+                {"what": "mass, read back", "is": f"{built.mass!r} kg"},
+                {"what": "inertia, read back", "is": f"{built.inertia.tolist()} kg m²"},
+                {"what": "gravity, read back", "is": f"{built.gravity.tolist()} m/s²"},
+            ]
+        return rows + [{"what": key, "is": str(value)} for key, value in simulation.settings.items()]
+
+
+def doctor_rows(engines: Sequence[str]) -> Rows:
+    """Versions, processor, and whether each engine steps."""
+    rows = [{"what": package, "found": found or "not installed"} for package, found in versions().items()]
+    rows += [{"what": "python", "found": sys.version.split()[0]}, {"what": "processor", "found": processor()}]
+    for name in engines:
+        try:
+            motion = simulate(load("drop-ball"), engine(name), 4e-3)
+            found = f"works: ball at {motion.position[-1, 1]:.4f} m after {motion.t[-1]:g} s"
+        except EngineMissing as error:
+            found = f"missing: {error}"
+        except Exception as error:  # a doctor reports whatever is wrong with an engine
+            found = f"broken: {type(error).__name__}: {error}"
+        rows.append({"what": f"engine {name}", "found": found})
+    return rows

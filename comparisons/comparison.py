@@ -48,8 +48,7 @@ class Comparison:
         """Hold a motion against the truth, as far as the truth goes."""
         if truth is None:
             return cls(scene, motion)
-        held = motion.t <= truth.horizon * (1.0 + 1e-9)
-        return cls(scene, motion, truth(motion.t[held]), tuple(event.time for event in truth.events))
+        return cls(scene, motion, truth(motion.t[truth.covers(motion.t)]), tuple(event.time for event in truth.events))
 
     @cached_property
     def exact(self) -> Trajectory:
@@ -69,7 +68,7 @@ class Comparison:
 
     @cached_property
     def flights(self) -> list[Rows]:
-        """Rows in the inner half of each flight, the whole first half of the first one included."""
+        """Rows in the inner half of each flight; the first one counts from the start, the last one to the end."""
         rows = np.arange(len(self.motion if self.reference is None else self.reference))
         times = self.motion.t[rows]
         if not self.impacts:

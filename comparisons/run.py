@@ -85,7 +85,8 @@ def run(
     """
     contestants = [_contestant(name) for name in engines]
     labels = [contestant.label for contestant in contestants]
-    _assert_sensible(scenes, dts, labels)
+    truths = [truth_for(scene) for scene in scenes]
+    _assert_sensible(scenes, truths, dts, labels)
     if len(set(labels)) < len(labels):
         raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
     asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)}
@@ -93,8 +94,7 @@ def run(
     rows: list[Row] = []
     trajectories: dict[TrajectoryKey, Trajectory] = {}
     settings: dict[str, dict[str, Any]] = {}
-    for scene in scenes:
-        truth = truth_for(scene)
+    for scene, truth in zip(scenes, truths, strict=True):
         for dt in dts:
             phases = [(phase, truth if phase is scene else truth_for(phase)) for phase in start_phases(scene, truth, dt)]
             attempts: list[_Attempt] = []
@@ -156,7 +156,6 @@ def _attempt(contestant: _Contestant, scene: Scenario, dt: float, phases: list[S
     if engine is None:
         attempt.verdict, attempt.reason = "missing", contestant.missing
         return attempt
-    # An engine is somebody else's code: whatever it raises costs its own row and is told there.
     try:
         refusal = engine.declines(scene)
         if refusal is not None:
@@ -167,7 +166,7 @@ def _attempt(contestant: _Contestant, scene: Scenario, dt: float, phases: list[S
         attempt.settings, attempt.time_per_step = _settings_and_time(engine, scene, dt)
     except Diverged as error:
         attempt.verdict, attempt.reason = "diverged", str(error)
-    except Exception as error:
+    except Exception as error:  # an engine is somebody else's code: whatever it raises costs its own row and is told there
         attempt.verdict, attempt.reason = "crashed", f"{type(error).__name__}: {error}"
     return attempt
 
@@ -252,7 +251,7 @@ def _agreement_rows(
 def _side_by_side(scene: Scenario, truth: Truth | None, one: Trajectory, other: Trajectory) -> Comparison:
     """Two engines' motions as far as they can be compared: to the truth's horizon, else to the first contact of either."""
     if truth is not None:
-        until = int(np.sum(one.t <= truth.horizon * (1.0 + 1e-9)))
+        until = int(np.sum(truth.covers(one.t)))
         return Comparison(scene, one, other[:until], tuple(event.time for event in truth.events))
     contacts = [Comparison(scene, motion).first_contact for motion in (one, other)]
     until = min([len(one), *(contact[0] + 1 for contact in contacts if contact is not None)])
@@ -271,14 +270,14 @@ def _value_or_nan(metric: Metric, case: Comparison) -> float:
         return float("nan")
 
 
-def _assert_sensible(scenes: Sequence[Scenario], dts: Sequence[float], labels: Sequence[str]) -> None:
+def _assert_sensible(scenes: Sequence[Scenario], truths: Sequence[Truth | None], dts: Sequence[float], labels: Sequence[str]) -> None:
     names = [scene.name for scene in scenes]
     if len(set(names)) < len(names):
         raise DropspinError(f"two scenes have the same name ({', '.join(names)}); a scene's name is its file's, rename one.")
     if len(set(dts)) < len(dts):
         raise DropspinError(f"dt: a step is named twice ({', '.join(f'{dt:g}' for dt in dts)}); name each once.")
-    for scene in scenes:
-        assert_expectations_can_be_judged(scene, truth_for(scene), labels)
+    for scene, truth in zip(scenes, truths, strict=True):
+        assert_expectations_can_be_judged(scene, truth, labels)
         for dt in dts:
             assert_step_fits(scene, dt)
 

@@ -89,8 +89,8 @@ class Simulator:
         self._body, self._world, self._dt = body, world, float(dt)
         self._kernel_body = kernel_body(body)
         self._gravity = None if world.gravity is None else Vec3(*map(float, _numbers("gravity", world.gravity, (3,))))
-        self.unsolved_steps = 0
         self._damping = None if world.damping is None else KernelDamping(*(math.exp(-rate * dt) for rate in world.damping))
+        self.unsolved_steps = 0
 
     def run(self, state: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None) -> Array:
         """States from `state` on: the arguments of `simulate`, and of `step`; shape (1 + steps // every, 13)."""

@@ -29,11 +29,10 @@ class Document(Engine):
     def __post_init__(self) -> None:
         super().__post_init__()
         try:
-            self.methods  # noqa: B018  # refuses what does not go together
+            self.methods()  # refuses what does not go together
         except ValueError as error:
             raise DropspinError(f"engine {self.label!r}: {error}.") from None
 
-    @property
     def methods(self) -> reference_impl.Methods:
         """The chosen leaves."""
         return reference_impl.Methods(**{name: self.option(name) for name in self.choices})
@@ -53,7 +52,7 @@ class Document(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DocumentSimulation(scene, dt, self.methods)
+        return DocumentSimulation(scene, dt, self.methods())
 
 
 class DocumentSimulation(Simulation):

@@ -38,13 +38,13 @@ def contact_point(R, v, w, height, body):
 
 @compiled
 def along_normal(a):
-    """A · N. Written out, because compiled code may not drop the products with N's zeros."""
+    """The component along N, a · N. Written out, because compiled code may not drop the products with N's zeros."""
     return a.y
 
 
 @compiled
 def vertex(R, body, i):
-    """Offset from the centre to vertex i; a rounded one touches at its lowest point, R N below (a departure, for balls)."""
+    """Offset from the centre to vertex i; a rounded one touches at its lowest point (a departure, for balls)."""
     r = R @ row(body.points, i)
     return Vec3(r.x, r.y - body.radius, r.z)
 

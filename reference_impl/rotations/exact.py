@@ -22,7 +22,7 @@ def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
     q = product(q, body.axes)
     spin = transpose(rotation_matrix(q)) @ w
-    I = body.moments  # noqa: E741  # the field's letter
+    I = body.moments
     L = Vec3(I.x * spin.x, I.y * spin.y, I.z * spin.z)
     torque = cross(L, spin)
     if dot(torque, torque) <= PARALLEL * PARALLEL * dot(L, L) * dot(spin, spin):
@@ -52,7 +52,7 @@ def _about(spin, dt):
 
 
 @compiled
-def _axes(I, spin):  # noqa: E741
+def _axes(I, spin):
     """The indices a, b, c of the principal axes: b intermediate, c the one that L circles."""
     low, middle, high = 0, 1, 2
     if I[low] > I[middle]:

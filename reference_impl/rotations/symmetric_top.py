@@ -22,7 +22,7 @@ def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
     q = product(q, body.axes)  # work along the principal axes
     spin = transpose(rotation_matrix(q)) @ w
-    I = body.moments  # noqa: E741  # the field's letter
+    I = body.moments
     m = Vec3(I.x * spin.x, I.y * spin.y, I.z * spin.z)
     for part in range(5):
         h = (INNER if part == 2 else OUTER) * dt
@@ -35,7 +35,7 @@ def turn(q, w, dt, body):
 
 
 @compiled
-def _about_second(q, m, h, I):  # noqa: E741
+def _about_second(q, m, h, I):
     """The flow of m₂²/2 (1/I₂ - 1/I₁): a turn about the second axis."""
     angle = h * m.y * (1.0 / I.y - 1.0 / I.x)
     c, s = math.cos(angle), math.sin(angle)
@@ -44,7 +44,7 @@ def _about_second(q, m, h, I):  # noqa: E741
 
 
 @compiled
-def _symmetric_top(q, m, h, I):  # noqa: E741
+def _symmetric_top(q, m, h, I):
     """The flow of the symmetric top: a turn about L by h |L|/I₁, then one about its own axis."""
     length = math.sqrt(dot(m, m))
     half = 0.5 * h * length / I.x

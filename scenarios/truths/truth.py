@@ -46,6 +46,10 @@ class Truth:
     events: tuple[Impact, ...] = ()
     horizon: float = float("inf")
 
+    def covers(self, t: Array) -> NDArray[np.bool_]:
+        """Which times [s] are not past the horizon; the last of n dt may round past it."""
+        return t <= self.horizon * (1.0 + 1e-9)
+
     def __call__(self, times: ArrayLike) -> Trajectory:
         """The motion at times [s] from 0 to `horizon`, shape (n,).
 
@@ -53,6 +57,6 @@ class Truth:
             ValueError: A time lies outside.
         """
         t = np.atleast_1d(np.asarray(times, dtype=float))
-        if not np.all((t >= 0.0) & (t <= self.horizon * (1.0 + 1e-9))):  # n dt may round past the end
+        if not np.all((t >= 0.0) & self.covers(t)):
             raise ValueError(f"the truth {self.name!r} holds for 0 <= t <= {self.horizon:.6g} s")
         return Trajectory.from_states(t, self.states(t))

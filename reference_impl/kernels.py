@@ -1,4 +1,4 @@
-"""Compiled loops over `step.advance`, one for each choice of methods, cached on disk.
+"""Compiled loops over `step.advance`, one for each choice of methods and parts, cached on disk.
 
 numba's own cache looks at the file of the compiled function alone and would serve old physics after an edit elsewhere in this package.
 So kernels are kept in a folder named after everything that goes into them.
@@ -8,49 +8,119 @@ import hashlib
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba import njit
 from numba.core import config as numba_config
+from numpy.typing import NDArray
 
+from reference_impl import lanes
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS, Methods
+from reference_impl.parameters import (
+    STEP_SIZE,
+    nothing,
+    read_body,
+    read_damping,
+    read_floor,
+    read_gravity,
+    read_quaternion,
+    read_vector,
+)
 from reference_impl.step import advance
-from reference_impl.vectors import Quat, Vec3
+from reference_impl.vectors import compiled
 
+Array = NDArray[np.float64]
 config: Any = numba_config  # numba sets its attributes at run time, which its type hints do not know
 PACKAGE = Path(__file__).parent
 
 
+@dataclass(frozen=True)
+class Parts:
+    """What there is to model; what there is not is left out of the compiled step."""
+
+    gravity: bool
+    forces: bool
+    damping: bool
+    floor: bool
+    turning: bool
+
+
 @cache
-def recording_kernel(methods: Methods, rotates: bool) -> Callable[..., int]:
-    """The loop that fills rows with each `every`-th state and counts the steps whose contact was not solved."""
-    turn = ROTATIONS[methods.rotation] if rotates else None
+def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[..., int]:
+    """The loop that records each `every`-th state of the bodies of some blocks, and counts the steps whose contact was not solved.
+
+    Its arrays hold `width` bodies to a block, as `blocks` puts them: one (a number is then a float), or `lanes.WIDTH`.
+    """
+    gravity_of = read_gravity if parts.gravity else nothing
+    damping_of = read_damping if parts.damping else nothing
+    floor_of = read_floor if parts.floor else nothing
+    turn = ROTATIONS[methods.rotation] if parts.turning else None
     law = LAWS[methods.law]
     collide = CONTACTS[methods.contact][methods.law]
     correct = CORRECTIONS[methods.correction]
+    load, rows_of, record = (_load, _rows_of, _record) if width == 1 else (lanes.load, lanes.rows_of, lanes.record)
+    forces_of = rows_of if parts.forces else _no_forces
 
-    def fill(rows, state, dt, every, body, gravity, forces, damping, floor):
-        x = Vec3(float(state[0]), float(state[1]), float(state[2]))
-        q = Quat(float(state[3]), float(state[4]), float(state[5]), float(state[6]))
-        v = Vec3(float(state[7]), float(state[8]), float(state[9]))
-        w = Vec3(float(state[10]), float(state[11]), float(state[12]))
-        rows[0] = state
+    def fill(recorded, states, columns, points, forces, every, first, last):
         unsolved = 0
-        for row in range(1, rows.shape[0]):
-            for _ in range(every):
-                x, q, v, w, solved = advance(x, q, v, w, dt, body, gravity, forces, damping, floor, turn, collide, law, correct)
-                unsolved += not solved
-            out = rows[row]
-            out[0], out[1], out[2] = x.x, x.y, x.z
-            out[3], out[4], out[5], out[6] = q.x, q.y, q.z, q.w
-            out[7], out[8], out[9] = v.x, v.y, v.z
-            out[10], out[11], out[12] = w.x, w.y, w.z
+        for block in range(first, last):
+            own = min(block, columns.shape[0] - 1)
+            body = read_body(load, columns, rows_of(points, block), own)
+            dt = load(columns, own, STEP_SIZE)
+            gravity = gravity_of(load, columns, own)
+            damping = damping_of(load, columns, own)
+            floor = floor_of(load, columns, own)
+            on_vertices = forces_of(forces, block)
+            x = read_vector(load, states, block, 0)
+            q = read_quaternion(load, states, block, 3)
+            v = read_vector(load, states, block, 7)
+            w = read_vector(load, states, block, 10)
+            record(recorded, block, 0, x, q, v, w)
+            for row in range(1, recorded.shape[1]):
+                for _ in range(every):
+                    x, q, v, w, solved = advance(x, q, v, w, dt, body, gravity, on_vertices, damping, floor, turn, collide, law, correct)
+                    unsolved += not solved
+                record(recorded, block, row, x, q, v, w)
         return unsolved
 
     return compile_cached(fill)
+
+
+# A body alone: its block is itself, its numbers are floats.
+
+
+@compiled
+def _load(array, block, column):
+    return float(array[block, column])
+
+
+@compiled
+def _rows_of(array, block):
+    return array[min(block, array.shape[0] - 1)]
+
+
+@compiled
+def _no_forces(array, block):
+    return None
+
+
+@compiled
+def _record(recorded, block, row, x, q, v, w):
+    out = recorded[block, row]
+    out[0], out[1], out[2] = x.x, x.y, x.z
+    out[3], out[4], out[5], out[6] = q.x, q.y, q.z, q.w
+    out[7], out[8], out[9] = v.x, v.y, v.z
+    out[10], out[11], out[12] = w.x, w.y, w.z
+
+
+def blocks(array: Array, width: int) -> Array:
+    """The numbers of bodies, shape (B, …), as a kernel of that width takes them."""
+    return np.ascontiguousarray(array) if width == 1 else lanes.side_by_side(array)
 
 
 def compile_cached(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -34,6 +34,8 @@ CONTACTS: dict[str, dict[str, Leaf]] = {
     "sequential": {"normal": sequential.collide_normal, "coulomb": sequential.collide_coulomb},
 }
 CORRECTIONS: dict[str, Leaf | None] = {"none": None, "projection": lift}
+ONE_BY_ONE = {"exact", "sequential"}
+"""Methods whose every decision differs from body to body: an ensemble of them runs one body after the other."""
 
 
 @dataclass(frozen=True)
@@ -61,3 +63,8 @@ class Methods:
         if self.law not in CONTACTS[self.contact]:
             laws = ", ".join(CONTACTS[self.contact])
             raise ValueError(f"contact {self.contact!r} works with the laws {laws}, not with {self.law!r}")
+
+    @property
+    def go_side_by_side(self) -> bool:
+        """Whether bodies can be worked on in the lanes of a register."""
+        return not ONE_BY_ONE & {self.rotation, self.contact}

@@ -7,7 +7,7 @@ Source: the simplest of the stabilisations in J. Baumgarte, CMAME 1 (1972), and 
 
 from reference_impl.contacts.mean import N, along_normal, vertex
 from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import compiled
+from reference_impl.vectors import any_, compiled, select
 
 SLOP = 1e-7  # m
 
@@ -15,10 +15,11 @@ SLOP = 1e-7  # m
 @compiled
 def lift(x, q, body):
     """The position after lifting the lowest vertex to SLOP below the floor, if it was lower."""
-    if x.y >= body.reach:
+    near = x.y < body.reach
+    if not any_(near):
         return x
     R = rotation_matrix(q)
     lowest = 0.0
     for i in range(body.points.shape[0]):
         lowest = min(lowest, x.y + along_normal(vertex(R, body, i)))
-    return x + max(-lowest - SLOP, 0.0) * N
+    return select(near, x + max(-lowest - SLOP, 0.0) * N, x)

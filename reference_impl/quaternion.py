@@ -25,7 +25,7 @@ def conjugate(q):
 @compiled
 def normalise(q):
     """Eq 3: back to unit length."""
-    return q / math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+    return q / math.sqrt((q.x * q.x + q.y * q.y) + (q.z * q.z + q.w * q.w))
 
 
 @compiled

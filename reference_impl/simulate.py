@@ -1,15 +1,20 @@
 """The Python boundary: flat float64 arrays in and out, value types in between."""
 
 import math
+import os
 import warnings
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reference_impl.body import Body, Floor, KernelDamping, World, kernel_body
-from reference_impl.kernels import recording_kernel
+from reference_impl import lanes
+from reference_impl.body import Body, World
+from reference_impl.kernels import Parts, blocks, config, recording_kernel
 from reference_impl.methods import Methods
-from reference_impl.vectors import Vec3
+from reference_impl.parameters import checked, ensemble_size, is_finite, pack
 
 Array = NDArray[np.float64]
 
@@ -18,19 +23,26 @@ class UnsolvedContact(RuntimeWarning):
     """Some steps ended before the impulses of `contact=sequential` had settled."""
 
 
-def step(state: ArrayLike, body: Body, world: World, dt: float, forces: ArrayLike | None = None, methods: Methods | None = None) -> Array:
-    """Advance one state by one step of the note's Algorithm 1.
+def step(
+    states: ArrayLike,
+    body: Body,
+    world: World,
+    dt: float | Array,
+    forces: ArrayLike | None = None,
+    methods: Methods | None = None,
+) -> Array:
+    """Advance one state, or an ensemble of them, by one step of the note's Algorithm 1.
 
     Args:
-        state: Position [m], orientation [x, y, z, w], velocity [m/s], angular velocity [rad/s], shape (13,).
-        body: The body.
+        states: Position [m], orientation [x, y, z, w], velocity [m/s], angular velocity [rad/s], shape (13,) or (B, 13).
+        body: The body, or an ensemble of B.
         world: What acts on it.
-        dt: Time step [s].
-        forces: Force on each vertex, in the world frame [N], shape (n, 3) (eq 9). None: none.
+        dt: Time step [s], one for all or shape (B,).
+        forces: Force on each vertex, in the world frame [N], shape (n, 3) or (B, n, 3) (eq 9). None: none.
         methods: What stands in place of the note's parts. None: the note, literally.
 
     Returns:
-        The next state, shape (13,).
+        The next states, shape (13,) or (B, 13).
 
     Raises:
         ValueError: An argument is no number, has the wrong shape, or describes no body. The text says which.
@@ -38,25 +50,38 @@ def step(state: ArrayLike, body: Body, world: World, dt: float, forces: ArrayLik
     Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithms 1 and 2.
     """
     simulator = Simulator(body, world, dt, methods)
-    rows = simulator.run(state, 1, forces=forces)
-    _warn_if_unsolved(simulator, 1)
-    return rows[1]
+    rows = simulator.run(states, 1, forces=forces)
+    _warn_if_unsolved(simulator, rows, 1)
+    return rows[..., 1, :]
 
 
-def simulate(state: ArrayLike, body: Body, world: World, dt: float, steps: int, every: int = 1, methods: Methods | None = None) -> Array:
-    """Advance one state by many steps, recording each `every`-th.
+def simulate(
+    states: ArrayLike,
+    body: Body,
+    world: World,
+    dt: float | Array,
+    steps: int,
+    every: int = 1,
+    methods: Methods | None = None,
+    threads: int | None = None,
+) -> Array:
+    """Advance one state, or an ensemble of them, by many steps, recording each `every`-th.
+
+    Whatever is given for each of B bodies (states, masses, step sizes, …) makes it an ensemble of B; what is given once holds for all. A
+    body moves in an ensemble as it does alone, to the last bit, for any number of threads.
 
     Args:
-        state: As in `step`, shape (13,).
-        body: The body.
+        states: As in `step`, shape (13,) or (B, 13).
+        body: The body, or an ensemble of B.
         world: What acts on it.
-        dt: Time step [s].
+        dt: Time step [s], one for all or shape (B,).
         steps: Number of steps.
         every: Steps between two rows of the result. Left-over steps at the end are not taken.
         methods: As in `step`.
+        threads: How many threads share an ensemble. None: as many as this process may use processors.
 
     Returns:
-        The states, the start first, shape (1 + steps // every, 13).
+        The states, the start first, shape (1 + steps // every, 13) or (B, 1 + steps // every, 13).
 
     Raises:
         ValueError: As in `step`.
@@ -65,13 +90,13 @@ def simulate(state: ArrayLike, body: Body, world: World, dt: float, steps: int, 
         UnsolvedContact: `contact=sequential` reached its limit of sweeps; the text says in how many steps.
     """
     simulator = Simulator(body, world, dt, methods)
-    rows = simulator.run(state, steps, every)
-    _warn_if_unsolved(simulator, steps)
+    rows = simulator.run(states, steps, every, threads=threads)
+    _warn_if_unsolved(simulator, rows, steps)
     return rows
 
 
 class Simulator:
-    """A body in a world at one step size, checked and converted once, for who simulates it many times over.
+    """Bodies in a world, checked and converted once, for who simulates them many times over.
 
     Attributes:
         unsolved_steps: In how many steps so far the impulses of `contact=sequential` had not settled.
@@ -80,66 +105,84 @@ class Simulator:
         ValueError: As in `step`.
     """
 
-    def __init__(self, body: Body, world: World, dt: float, methods: Methods | None = None) -> None:
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise ValueError(f"dt: got {dt!r}; must be a number above 0, in s")
+    def __init__(self, body: Body, world: World, dt: float | Array, methods: Methods | None = None) -> None:
         self._methods = methods or Methods()
+        self._parameters = pack(body, world, dt)
         if world.floor is not None:
-            _assert_law_fits(self._methods, world.floor)
-        self._body, self._world, self._dt = body, world, float(dt)
-        self._kernel_body = kernel_body(body)
-        self._gravity = None if world.gravity is None else Vec3(*map(float, _numbers("gravity", world.gravity, (3,))))
-        self._damping = None if world.damping is None else KernelDamping(*(math.exp(-rate * dt) for rate in world.damping))
+            _assert_law_fits(self._methods, world.floor.friction)
+        self._world = world
+        self._upright_ball = _falls_upright(body, world)
+        self._packed_blocks = cache(lambda width: [blocks(given, width) for given in self._parameters[:2]])
         self.unsolved_steps = 0
 
-    def run(self, state: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None) -> Array:
-        """States from `state` on: the arguments of `simulate`, and of `step`; shape (1 + steps // every, 13)."""
-        start = _numbers("state", state, (13,))
-        if not np.any(start[3:7]):
-            raise ValueError("state: the orientation is the zero quaternion; it must be a unit quaternion [x, y, z, w]")
+    def run(self, states: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None, threads: int | None = None) -> Array:
+        """States from `states` on: the arguments of `simulate`, and the forces of `step`; shape (…, 1 + steps // every, 13)."""
+        columns, points, is_ensemble = self._parameters
+        starts = checked("state", states, (13,), "finite numbers, the orientation not the zero quaternion", _is_state)
+        on_vertices = None if forces is None else checked("forces", forces, points.shape[1:], "finite numbers, in N", is_finite)
         if steps < 0 or every < 1:
             raise ValueError(f"steps and every: got {steps} and {every}; must be at least 0 and at least 1")
-        on_vertices = None if forces is None else _numbers("forces", forces, np.shape(self._body.points))
-        rows = np.empty((1 + steps // every, 13))
-        kernel = recording_kernel(self._methods, not _cannot_turn(start, self._body, self._world, on_vertices))
-        self.unsolved_steps += kernel(
-            rows, start, self._dt, every, self._kernel_body, self._gravity, on_vertices, self._damping, self._world.floor
-        )
-        return rows
+        given = {"state": starts, "body, world and dt": columns} | ({} if on_vertices is None else {"forces": on_vertices})
+        size = ensemble_size(given)
+        if len(starts) < size:
+            starts = np.broadcast_to(starts, (size, 13))
+        turning = on_vertices is not None or not (self._upright_ball and _is_without_spin(starts, self._world))
+        world = self._world
+        parts = Parts(world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning)
+        width = lanes.WIDTH if size > 1 and self._methods.go_side_by_side and not config.DISABLE_JIT else 1
+        recorded = np.empty((size, 1 + steps // every, 13))
+        packed = (blocks(starts, width), *self._packed_blocks(width), None if on_vertices is None else blocks(on_vertices, width))
+        kernel = recording_kernel(self._methods, parts, width)
+        self.unsolved_steps += _share_out(partial(kernel, recorded, *packed, every), -(-size // width), threads)
+        is_alone = not is_ensemble and np.ndim(states) == 1 and (forces is None or np.ndim(forces) == 2)
+        return recorded[0] if is_alone else recorded
 
 
-def _warn_if_unsolved(simulator: Simulator, steps: int) -> None:
+MOST_BLOCKS = 64
+"""Blocks a thread takes at a time: few enough to share the work evenly, and to stop soon at Ctrl-C."""
+
+
+def _share_out(fill: Callable[[int, int], int], count: int, threads: int | None) -> int:
+    """Fill all blocks, some at a time, and add up what the kernel counted."""
+    if count == 1:
+        return fill(0, 1)
+    threads = threads or len(os.sched_getaffinity(0))
+    each = min(MOST_BLOCKS, -(-count // threads))
+    firsts = range(0, count, each)
+    lasts = [min(first + each, count) for first in firsts]
+    if threads == 1:
+        return sum(map(fill, firsts, lasts))
+    with ThreadPoolExecutor(threads) as pool:
+        return sum(pool.map(fill, firsts, lasts))
+
+
+def _warn_if_unsolved(simulator: Simulator, recorded: Array, steps: int) -> None:
     if simulator.unsolved_steps:
-        text = f"the contact was not solved in {simulator.unsolved_steps} of {steps} steps"
+        taken = steps * math.prod(recorded.shape[:-2])
+        text = f"the contact was not solved in {simulator.unsolved_steps} of {taken} steps"
         warnings.warn(text, UnsolvedContact, stacklevel=3)
 
 
-def _assert_law_fits(methods: Methods, floor: Floor) -> None:
-    if not 0.0 <= floor.restitution <= 1.0:
-        raise ValueError(f"restitution: got {floor.restitution!r}; must be between 0 and 1")
-    if not floor.friction >= 0.0:
-        raise ValueError(f"friction: got {floor.friction!r}; must be 0 or more")
-    if not floor.rest_speed >= 0.0:
-        raise ValueError(f"rest_speed: got {floor.rest_speed!r}; must be 0 or more, in m/s")
-    if 0.0 < floor.friction < math.inf and methods.law not in ("normal", "coulomb"):
-        raise ValueError(f"law {methods.law!r} knows friction 0 and infinity, got {floor.friction:g}; use law='coulomb'")
+def _is_state(states: Array) -> NDArray[np.bool_]:
+    return is_finite(states) & states[:, 3:7].any(axis=1)
 
 
-def _cannot_turn(state: Array, body: Body, world: World, forces: Array | None) -> bool:
-    """A ball that falls straight without spin: nothing can turn it, so turning is left out."""
-    is_ball = body.radius > 0.0 and not np.any(body.points)
-    if not is_ball or np.any(state[10:13]) or forces is not None:
-        return False
-    if world.floor is None or world.floor.friction == 0.0:
-        return True
-    sideways = np.any(state[[7, 9]]) or (world.gravity is not None and np.any(np.asarray(world.gravity)[[0, 2]]))
-    return not sideways
+def _assert_law_fits(methods: Methods, friction: float | Array) -> None:
+    between = np.extract((np.asarray(friction) > 0.0) & np.isfinite(friction), friction)
+    if len(between) and methods.law not in ("normal", "coulomb"):
+        raise ValueError(f"law {methods.law!r} knows friction 0 and infinity, got {between[0]:g}; use law='coulomb'")
 
 
-def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = np.ascontiguousarray(values, dtype=float)
-    if array.shape != shape:
-        raise ValueError(f"{name}: must have shape {shape}, got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name}: got {array}; must be finite numbers")
-    return array
+def _falls_upright(body: Body, world: World) -> bool:
+    """Balls that neither a vertex nor gravity along a floor that grips can turn."""
+    is_ball = np.all(np.asarray(body.radius) > 0.0) and not np.any(body.points)
+    return bool(is_ball and (not _grips(world) or world.gravity is None or not np.any(np.asarray(world.gravity)[..., [0, 2]])))
+
+
+def _is_without_spin(states: Array, world: World) -> bool:
+    """And that neither spin nor slide: nothing turns them at all, so turning is left out."""
+    return not np.any(states[:, 10:13]) and not (_grips(world) and np.any(states[:, [7, 9]]))
+
+
+def _grips(world: World) -> bool:
+    return world.floor is not None and bool(np.any(world.floor.friction))

@@ -4,7 +4,7 @@ A part that is None (no gravity, no forces, no damping, no floor, no rotation, n
 """
 
 from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import Vec3, compiled, cross, row, transpose
+from reference_impl.vectors import Vec3, any_, compiled, cross, row, transpose
 
 
 @compiled
@@ -19,7 +19,7 @@ def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, turn, collide
         v = damping.linear * v
         w = damping.angular * w
     if floor is not None:
-        if x.y < body.reach:  # else no vertex can be below the floor
+        if any_(x.y < body.reach):  # else no vertex can be below the floor
             v, w, solved = collide(x, q, v, w, body, floor, law)
     x = x + dt * v  # eq 1: with the new velocity
     if turn is not None:

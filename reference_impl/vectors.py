@@ -130,6 +130,20 @@ class Mat3(NamedTuple):
         return _apply(self, other) if isinstance(other, Vec3) else _compose(self, other)
 
 
+def select(mask, a, b):
+    """`a` where the mask holds, else `b`.
+
+    With `any_`, this is how kernels decide: both sides are worked out, so that one text serves a body alone and many side by side.
+    Of numbers, vectors or quaternions.
+    """
+    return a if mask else b
+
+
+def any_(mask):
+    """Whether the mask holds for any body."""
+    return mask
+
+
 @compiled
 def row(array, i):
     """Row i of an (n, 3) array, as plain floats: NumPy's scalars would be slow and take over the operators below."""
@@ -167,9 +181,13 @@ def solve(m, b):
     return (1.0 / dot(m.row1, c1)) * (b.x * c1 + b.y * c2 + b.z * c3)
 
 
+class NumberLike(types.Type):
+    """What may stand in compiled code where the physics has a number."""
+
+
 def _is(numba_type: Any, kind: type) -> bool:
     if kind is float:
-        return isinstance(numba_type, types.Number)
+        return isinstance(numba_type, types.Number | NumberLike)
     return isinstance(numba_type, types.NamedTuple | types.NamedUniTuple) and numba_type.instance_class is kind
 
 
@@ -185,6 +203,28 @@ def _teach_numba(symbol: Callable[..., Any], source: Callable[..., Any], *kinds:
         @overload(symbol, strict=False)
         def binary(a, b):
             return source if _is(a, kinds[0]) and _is(b, kinds[1]) else None
+
+
+def _select3(mask: bool, a: "Vec3", b: "Vec3") -> "Vec3":
+    return Vec3(select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z))
+
+
+def _select4(mask: bool, a: "Quat", b: "Quat") -> "Quat":
+    return Quat(select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z), select(mask, a.w, b.w))
+
+
+@overload(select, strict=False)
+def _select(mask, a, b):
+    if isinstance(mask, types.Boolean):
+        return lambda mask, a, b: a if mask else b
+    if _is(a, Vec3):
+        return _select3
+    return _select4 if _is(a, Quat) else None
+
+
+@overload(any_)
+def _any(mask):
+    return (lambda mask: mask) if isinstance(mask, types.Boolean) else None
 
 
 for _symbol, _source, *_kinds in (

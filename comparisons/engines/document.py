@@ -88,7 +88,7 @@ class DocumentSimulation(Simulation):
 
     def as_built(self) -> AsBuilt:
         gravity = np.zeros(3) if self._world.gravity is None else self._world.gravity
-        return AsBuilt(self._body.mass, self._body.inertia, gravity)
+        return AsBuilt(float(self._body.mass), self._body.inertia, gravity)
 
 
 def _body(body: Body) -> reference_impl.Body:

@@ -5,7 +5,7 @@ once it leaves some of them approaching; the limit of small steps is then anothe
 """
 
 from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import Mat3, Vec3, compiled, cross, row, transpose
+from reference_impl.vectors import Mat3, Vec3, any_, compiled, cross, row, select, transpose
 
 N = Vec3(0.0, 1.0, 0.0)
 """The floor's normal, upwards."""
@@ -15,25 +15,26 @@ N = Vec3(0.0, 1.0, 0.0)
 def collide(x, q, v, w, body, floor, law):
     """Algorithm 2: the velocities (v, ω) after the floor has acted, and that this took no iteration."""
     R = rotation_matrix(q)
-    r, count = contact_point(R, v, w, x.y, body)
-    if count == 0:
-        return v, w, True
-    v, w = apply_impulse(r, R, v, w, body, floor, law)
+    r, hit = contact_point(R, v, w, x.y, body)
+    if any_(hit):
+        v_after, w_after = apply_impulse(r, R, v, w, body, floor, law)
+        v, w = select(hit, v_after, v), select(hit, w_after, w)
     return v, w, True
 
 
 @compiled
 def contact_point(R, v, w, height, body):
-    """Eq 10 and section 3.2: the mean offset r of the vertices below the floor and still descending, and their number."""
+    """Eq 10 and section 3.2: the mean offset r of the vertices below the floor and still descending, if there are any."""
     total = Vec3(0.0, 0.0, 0.0)
-    count = 0
+    count = 0.0
     for i in range(body.points.shape[0]):
-        if height + along_normal(vertex(R, body, i)) < 0.0:
+        below = height + along_normal(vertex(R, body, i)) < 0.0
+        if any_(below):
             r = vertex(R, body, i)
-            if along_normal(v + cross(w, r)) < 0.0:
-                total = total + r
-                count += 1
-    return (total / count if count > 0 else total), count
+            descends = along_normal(v + cross(w, r)) < 0.0
+            total = select(below & descends, total + r, total)
+            count = select(below & descends, count + 1.0, count)
+    return total / select(count > 0.0, count, 1.0), count > 0.0
 
 
 @compiled
@@ -53,7 +54,7 @@ def vertex(R, body, i):
 def apply_impulse(r, R, v, w, body, floor, law):
     """Eq 7, 12 and 15: the velocities (v, ω) after one impulse j at the offset r from the centre of mass."""
     v_contact = v + cross(w, r)
-    mu = 0.0 if abs(along_normal(v_contact)) < floor.rest_speed else floor.restitution
+    mu = select(abs(along_normal(v_contact)) < floor.rest_speed, 0.0, floor.restitution)
     I_inverse = R @ body.inverse_inertia @ transpose(R)  # eq 7
     j = law(impulse_response(r, I_inverse, body.mass), v_contact, mu, floor.friction)
     return v + (1.0 / body.mass) * j, w + I_inverse @ cross(r, j)  # eq 12

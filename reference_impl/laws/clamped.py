@@ -9,16 +9,15 @@ import math
 
 from reference_impl.contacts.mean import N
 from reference_impl.laws import normal
-from reference_impl.vectors import compiled, dot, solve
+from reference_impl.vectors import compiled, dot, select, solve
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j = K⁻¹ (-u - µ' u_n N) with µ' = min(µ, √(u·K⁻¹u / (u_n² N·K⁻¹N)))."""
-    if friction == 0.0:
-        return normal.impulse(K, u, mu, friction)
     v_normal = dot(u, N)
     before = dot(u, solve(K, u))
     at_one = v_normal * v_normal * dot(N, solve(K, N))
-    most = math.sqrt(max(before, 0.0) / at_one) if at_one > 0.0 else 0.0
-    return solve(K, -u - min(mu, most) * v_normal * N)
+    most = math.sqrt(max(before, 0.0) / select(at_one > 0.0, at_one, 1.0))
+    sticks = solve(K, -u - min(mu, most) * v_normal * N)
+    return select(friction > 0.0, sticks, normal.impulse(K, u, mu, friction))

@@ -12,21 +12,17 @@ import math
 
 from reference_impl.contacts.mean import N
 from reference_impl.laws import normal, note
-from reference_impl.vectors import compiled, dot
+from reference_impl.vectors import compiled, dot, select
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j within the cone |j_t| <= f j_n."""
-    if friction == 0.0:
-        return normal.impulse(K, u, mu, friction)
-    stick = note.impulse(K, u, mu, friction)
-    if math.sqrt(stick.x * stick.x + stick.z * stick.z) <= friction * stick.y:
-        return stick
     v_normal = dot(u, N)
+    stick = note.impulse(K, u, mu, friction)
+    holds = (math.sqrt(stick.x * stick.x + stick.z * stick.z) <= friction * stick.y) | (friction == math.inf)
     sliding = u - v_normal * N
     speed = math.sqrt(sliding.x * sliding.x + sliding.z * sliding.z)
-    if speed == 0.0:
-        return normal.impulse(K, u, mu, friction)
-    direction = N - (friction / speed) * sliding
-    return -(1.0 + mu) * v_normal / dot(N, K @ direction) * direction
+    direction = N - (friction / select(speed > 0.0, speed, 1.0)) * sliding
+    slip = -(1.0 + mu) * v_normal / dot(N, K @ direction) * direction
+    return select(friction > 0.0, select(holds, stick, slip), normal.impulse(K, u, mu, friction))

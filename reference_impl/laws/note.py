@@ -6,15 +6,13 @@ Source: H. Wang, Rigid Body Dynamics, eq 11 to 17.
 """
 
 from reference_impl.contacts.mean import N, along_normal
-from reference_impl.vectors import compiled, solve
+from reference_impl.vectors import compiled, select, solve
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j that takes the contact velocity u to the prescribed one: K j = change."""
     v_normal = along_normal(u)
-    if friction > 0.0:
-        change = -u - mu * v_normal * N  # eq 17
-    else:
-        change = -(1.0 + mu) * v_normal * N  # eq 11
-    return solve(K, change)
+    sticks = -u - mu * v_normal * N  # eq 17
+    slides = -(1.0 + mu) * v_normal * N  # eq 11
+    return solve(K, select(friction > 0.0, sticks, slides))

@@ -7,14 +7,12 @@ Source: S. D. Poisson, Traité de mécanique (1833); W. J. Stronge, Impact Mecha
 
 from reference_impl.contacts.mean import N
 from reference_impl.laws import normal
-from reference_impl.vectors import compiled, dot, solve
+from reference_impl.vectors import compiled, dot, select, solve
 
 
 @compiled
 def impulse(K, u, mu, friction):
     """The impulse j = K⁻¹ (s N - u)."""
-    if friction == 0.0:
-        return normal.impulse(K, u, mu, friction)
     compression = solve(K, u)
     s = mu * max(-dot(N, compression), 0.0) / dot(N, solve(K, N))
-    return solve(K, s * N - u)
+    return select(friction > 0.0, solve(K, s * N - u), normal.impulse(K, u, mu, friction))

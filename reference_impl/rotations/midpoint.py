@@ -9,7 +9,7 @@ Source: E. Hairer, C. Lubich & G. Wanner, Geometric Numerical Integration (2006)
 
 from reference_impl.contacts.mean import cross_matrix
 from reference_impl.quaternion import normalise, product, rotation_matrix
-from reference_impl.vectors import Mat3, Quat, Vec3, compiled, cross, dot, solve, transpose
+from reference_impl.vectors import Mat3, Quat, Vec3, any_, compiled, cross, dot, select, solve, transpose
 
 MOST_NEWTON_STEPS = 30
 IDENTITY = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
@@ -21,14 +21,16 @@ def turn(q, w, dt, body):
     start = body.inertia @ (transpose(rotation_matrix(q)) @ w)
     m = start
     small = 1e-32 * dot(start, start)
+    moving = True
     for _ in range(MOST_NEWTON_STEPS):
         middle = 0.5 * (start + m)
         spin = body.inverse_inertia @ middle
         residual = m - start - dt * cross(middle, spin)
         J = IDENTITY - (0.5 * dt) * (cross_matrix(middle) @ body.inverse_inertia - cross_matrix(spin))
         correction = solve(J, residual)
-        m = m - correction
-        if dot(correction, correction) <= small:
+        m = select(moving, m - correction, m)
+        moving = moving & (dot(correction, correction) > small)
+        if not any_(moving):
             break
     half = (0.5 * dt) * (body.inverse_inertia @ (0.5 * (start + m)))
     q = normalise(product(q, Quat(half.x, half.y, half.z, 1.0)))

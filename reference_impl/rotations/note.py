@@ -12,4 +12,5 @@ from reference_impl.vectors import Quat, compiled
 @compiled
 def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
-    return normalise(q + 0.5 * dt * product(Quat(w.x, w.y, w.z, 0.0), q)), w
+    half = (0.5 * dt) * w
+    return normalise(q + product(Quat(half.x, half.y, half.z, 0.0), q)), w

@@ -8,9 +8,10 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 import reference_impl
-from reference_impl.body import Floor, kernel_body
+from reference_impl.body import Floor, World
 from reference_impl.contacts.mean import apply_impulse, cross_matrix, impulse_response
 from reference_impl.laws import note
+from reference_impl.parameters import pack, read_body
 from reference_impl.quaternion import normalise, product, rotation_matrix
 from reference_impl.vectors import Mat3, Quat, Vec3, cross, dot, solve
 
@@ -95,7 +96,8 @@ def box_in_the_air(q):
     half = np.array([0.1, 0.2, 0.4])
     mass = 1.7
     inertia = reference_impl.solid_box_inertia(mass, half)
-    body = kernel_body(reference_impl.Body(mass, inertia, np.array([half])))
+    packed = pack(reference_impl.Body(mass, inertia, np.array([half])), World(), 1.0)
+    body = read_body(lambda columns, _, column: float(columns[0, column]), packed.columns, packed.points[0], 0)
     R = Rotation.from_quat(q).as_matrix()
     return body, R, R @ np.linalg.inv(inertia) @ R.T
 

@@ -1,10 +1,13 @@
 """One source, two ways to run it; and a cache on disk that never serves old physics."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 import reference_impl
 
@@ -32,37 +35,54 @@ TUMBLE = """
 import json, sys
 import numpy as np
 import reference_impl as r
-half = np.array([.1, .2, .3])
-points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
-body = r.Body(1.0, r.solid_box_inertia(1.0, half), points)
-start = np.array([0, .45, 0, .1, .2, .3, .9, .4, -1, .2, 3, 2, 1])
-start[3:7] /= np.linalg.norm(start[3:7])
+
+rng = np.random.default_rng(1)
+KINDS, BODIES = 5, 19  # 19 bodies of 5 kinds: more than fill the lanes, and not a multiple of their number
+half = rng.uniform(.1, .3, (KINDS, 3))
+mass = rng.uniform(.5, 2, KINDS)
+inertia = np.array([r.solid_box_inertia(m, h) for m, h in zip(mass, half)])
+points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half[:, None]
+starts = np.zeros((KINDS, 13))
+starts[:, 1] = rng.uniform(.4, .5, KINDS)
+starts[:, 3:] = rng.normal(size=(KINDS, 10))
+starts[:, 3:7] /= np.linalg.norm(starts[:, 3:7], axis=1)[:, None]
+gravity = np.array([0, -9.8, 0]) + rng.normal(size=(KINDS, 3))
+dt, restitution, linear, angular = rng.uniform([8e-4, .3, .1, .2], [2e-3, .9, .3, .4], (KINDS, 4)).T
+rest_speed = np.array([0, .01, 0, .02, .3])
+
+def given(which, law):
+    friction = np.array([.1, np.inf, 0, .4, .8]) if law == "coulomb" else np.array([np.inf, 0, np.inf, np.inf, 0])
+    floor = r.Floor(restitution[which], friction[which], rest_speed[which])
+    world = r.World(gravity[which], floor, (linear[which], angular[which]))
+    return starts[which], r.Body(mass[which], inertia[which], points[which], .01), world, dt[which]
+
 for choice in json.loads(sys.argv[1]):
-    friction = .4 if choice.get("law") == "coulomb" else np.inf
-    world = r.World(np.array([0, -9.8, 0]), r.Floor(.5, friction, .01), (.1, .2))
-    rows = r.simulate(start, body, world, 1e-3, 400, methods=r.Methods(**choice))
-    print(rows.tobytes().hex())
+    methods, law = r.Methods(**choice), choice.get("law")
+    if sys.argv[2] == "alone":
+        rows = np.array([r.simulate(*given(kind, law), 300, methods=methods) for kind in range(KINDS)])
+    else:
+        rows = r.simulate(*given(np.arange(BODIES) % KINDS, law), 300, methods=methods, threads=int(sys.argv[3]))
+        assert all(np.array_equal(rows[body], rows[body % KINDS]) for body in range(BODIES)), choice
+    print(rows[:KINDS].tobytes().hex())
 """
 
 
-def test_interpreted_and_compiled_agree_to_the_last_bit():
-    """Every method through contacts, in plain Python and compiled."""
-    import json
-
+@pytest.mark.parametrize("choices", [CHOICES[first::6] for first in range(6)])
+def test_alone_interpreted_compiled_and_in_an_ensemble_agree_to_the_last_bit(choices):
+    """Every method through contacts; of bodies, worlds and step sizes that all differ."""
     outputs = [
         subprocess.run(
-            [sys.executable, "-c", TUMBLE, json.dumps(CHOICES)],
+            [sys.executable, "-W", "ignore", "-c", TUMBLE, json.dumps(choices), *how],
             env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
             capture_output=True,
             text=True,
             check=True,
         ).stdout.split()
-        for disabled in ("0", "1")
+        for disabled, *how in (("1", "alone"), ("0", "alone"), ("0", "ensemble", "1"), ("0", "ensemble", "2"))
     ]
-    assert len(outputs[0]) == len(CHOICES)
-    for choice, compiled, interpreted in zip(CHOICES, *outputs, strict=True):
-        assert compiled == interpreted, choice
-    assert len(set(outputs[0][:7])) == 7  # and no two rotations are the same
+    for choice, interpreted, *others in zip(choices, *outputs, strict=True):
+        assert others == [interpreted] * 3, choice
+    assert len(set(outputs[0])) == len(choices)  # and no two choices are the same
 
 
 FALL = """
@@ -72,9 +92,9 @@ import numpy as np
 import reference_impl as r
 body = r.Body(1.0, np.eye(3), np.zeros((1, 3)), 0.1)
 rows = r.simulate(np.array([0, 9, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.]), body, r.World(np.array([0, -1, 0])), 1.0, 1)
-from reference_impl.kernels import recording_kernel
-from reference_impl import Methods
-print(rows[-1, 8], sum(recording_kernel(Methods(), False).stats.cache_hits.values()), numba.config.CACHE_DIR == before)
+from reference_impl.kernels import Parts, recording_kernel
+kernel = recording_kernel(r.Methods(), Parts(gravity=True, forces=False, damping=False, floor=False, turning=False), 1)
+print(rows[-1, 8], sum(kernel.stats.cache_hits.values()), numba.config.CACHE_DIR == before)
 """
 
 

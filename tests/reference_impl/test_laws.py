@@ -298,7 +298,7 @@ def test_what_is_refused():
     nan, zero_q = ok.copy(), ok.copy()
     nan[8], zero_q[6] = np.nan, 0.0
     cases = [
-        (lambda: run(nan), "state: got .* must be finite"),
+        (lambda: run(nan), "state: got .* must be finite numbers"),
         (lambda: run(zero_q), "zero quaternion"),
         (lambda: run(dt=0.0), "dt: got 0.0; must be a number above 0"),
         (lambda: run(dt=np.nan), "dt: got nan"),
@@ -306,14 +306,14 @@ def test_what_is_refused():
         (lambda: run(b=Body(np.inf, body.inertia, body.points)), "mass: got inf"),
         (lambda: run(b=Body(1.0, np.zeros((3, 3)), body.points)), "inertia: got .* positive definite"),
         (lambda: run(b=Body(1.0, body.inertia * np.nan, body.points)), "inertia: got"),
-        (lambda: run(b=Body(1.0, body.inertia, body.points[:, :2])), "points: got an array of shape"),
+        (lambda: run(b=Body(1.0, body.inertia, body.points[:, :2])), r"points: must have shape \(8, 3\) or \(B, 8, 3\), got \(8, 2\)"),
         (lambda: run(b=Body(1.0, body.inertia, body.points, -1.0)), "radius: got -1.0"),
         (lambda: run(world=World(gravity=np.array([0, np.inf, 0]))), "gravity: got"),
         (lambda: run(world=World(floor=Floor(1.5, 0.0))), "restitution: got 1.5; must be between 0 and 1"),
         (lambda: run(world=World(floor=Floor(0.5, -1.0))), "friction: got -1.0"),
         (lambda: run(world=World(floor=Floor(0.5, 0.0, -1.0))), "rest_speed: got -1.0"),
         (lambda: run(world=World(floor=Floor(0.5, 0.3))), "law 'note' knows friction 0 and infinity, got 0.3"),
-        (lambda: run(forces=np.zeros((3, 3))), r"forces: must have shape \(8, 3\), got \(3, 3\)"),
+        (lambda: run(forces=np.zeros((3, 3))), r"forces: must have shape \(8, 3\) or \(B, 8, 3\), got \(3, 3\)"),
         (lambda: Methods(rotation="rk5"), "rotation: got 'rk5'; must be one of note, gyroscopic"),
         (lambda: Methods(contact="sequential"), "works with the laws normal, coulomb, not with 'note'"),
     ]

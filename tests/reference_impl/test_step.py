@@ -127,5 +127,5 @@ def test_every_kth_row_is_the_kth_row():
 
 def test_state_of_the_wrong_shape_is_refused():
     """The boundary says what it wants."""
-    with pytest.raises(ValueError, match=r"shape \(13,\), got \(7,\)"):
+    with pytest.raises(ValueError, match=r"shape \(13,\) or \(B, 13\), got \(7,\)"):
         reference_impl.step(np.zeros(7), BODY, World(), 1e-3)

@@ -1,0 +1,229 @@
+"""What may differ from body to body: checked, packed into rows of numbers, and read back by the kernels."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from reference_impl.body import Body, Floor, KernelBody, KernelDamping, World
+from reference_impl.quaternion import from_matrix
+from reference_impl.vectors import Mat3, Quat, Vec3, compiled
+
+Array = NDArray[np.float64]
+Test = Callable[[Array], NDArray[np.bool_]]
+
+# The first column of each quantity: `pack` writes them in this order, the readers at the end of this file read them.
+STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, RADIUS, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 36
+
+
+class Parameters(NamedTuple):
+    """Bodies in their worlds, at their step sizes: one row for all, or one for each."""
+
+    columns: Array
+    """Shape (1, 37) or (B, 37)."""
+    points: Array
+    """Vertices [m], shape (1, n, 3) or (B, n, 3)."""
+    is_ensemble: bool
+    """Whether anything was given for each body, even if B is 1."""
+
+
+def pack(body: Body, world: World, dt: float | Array) -> Parameters:
+    """A body in a world, or an ensemble of them.
+
+    Raises:
+        ValueError: A number is out of its range, a shape does not fit, or two quantities are of ensembles of different size.
+    """
+    quantities = _quantities(body, world, dt)
+    given = {name: checked(name, *quantity) for name, quantity in quantities.items()}
+    is_ensemble = any(np.ndim(values) > len(shape) for values, shape, *_ in quantities.values())
+    size = ensemble_size(given)
+    points = given.pop("points")
+    # The margin covers the rounding of R: a vertex must never reach the floor before the bounding sphere does.
+    reach = (np.sqrt(np.max(np.sum(points**2, axis=2), axis=1)) + given["radius"]) * (1.0 + 1e-12)
+    inertia = given["inertia"]
+    moments, axes = _principal(inertia)
+    in_order = [
+        given["dt"],
+        given["gravity"],
+        _decay(given["linear damping"], given["dt"]),
+        _decay(given["angular damping"], given["dt"]),
+        given["restitution"],
+        given["friction"],
+        given["rest_speed"],
+        given["mass"],
+        inertia,
+        np.linalg.inv(inertia),
+        moments,
+        axes,
+        given["radius"],
+        reach,
+    ]
+    columns = np.concatenate([np.broadcast_to(part.reshape(len(part), -1), (size, part[0].size)) for part in in_order], axis=1)
+    return Parameters(columns, points, is_ensemble)
+
+
+def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]]:
+    """What was given, the shape of one body's, what is allowed, in words and as a test."""
+    floor = world.floor or Floor(0.0, 0.0)
+    gravity = np.zeros(3) if world.gravity is None else world.gravity
+    linear, angular = world.damping or (0.0, 0.0)
+    vertices = max(1, *np.shape(body.points)[-2:-1])
+    return {
+        "dt": (dt, (), "a number above 0, in s", _is_above_zero),
+        "gravity": (gravity, (3,), "finite numbers, in m/s²", is_finite),
+        "linear damping": (linear, (), "a finite number, in 1/s", is_finite),
+        "angular damping": (angular, (), "a finite number, in 1/s", is_finite),
+        "restitution": (floor.restitution, (), "between 0 and 1", lambda e: (e >= 0.0) & (e <= 1.0)),
+        "friction": (floor.friction, (), "0 or more", lambda f: f >= 0.0),
+        "rest_speed": (floor.rest_speed, (), "0 or more, in m/s", _is_not_negative),
+        "mass": (body.mass, (), "a number above 0, in kg", _is_above_zero),
+        "inertia": (body.inertia, (3, 3), "a symmetric, positive definite 3 x 3 matrix, in kg m²", _is_inertia),
+        "points": (body.points, (vertices, 3), "finite numbers, in m, for one vertex at least", is_finite),
+        "radius": (body.radius, (), "0 or more, in m", _is_not_negative),
+    }
+
+
+def is_finite(values: Array) -> NDArray[np.bool_]:
+    """Whether all numbers of a body are, for each body."""
+    return np.logical_and.reduce(np.isfinite(values).reshape(len(values), -1), axis=1)
+
+
+def _is_above_zero(values: Array) -> NDArray[np.bool_]:
+    return is_finite(values) & (values > 0.0)
+
+
+def _is_not_negative(values: Array) -> NDArray[np.bool_]:
+    return is_finite(values) & (values >= 0.0)
+
+
+def _is_inertia(matrices: Array) -> NDArray[np.bool_]:
+    usable = np.where(is_finite(matrices)[:, np.newaxis, np.newaxis], matrices, -np.eye(3))
+    lowest = np.linalg.eigvalsh(usable)[:, 0]
+    lopsided = np.abs(usable - usable.transpose(0, 2, 1)).max(axis=(1, 2))
+    return (lowest > 0.0) & (lopsided <= 1e-12 * np.abs(usable).max(axis=(1, 2)))
+
+
+def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, holds: Test) -> Array:
+    """What was given for one body (of that shape) or for each (one more axis, first), as an array with that axis, shape (1 or B, …).
+
+    Raises:
+        ValueError: It has another shape, or is not as allowed; of an ensemble the text says whose.
+    """
+    try:
+        array = np.ascontiguousarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: got {values!r}; must be {allowed}") from None
+    if np.ndim(values) == len(shape):
+        array = array.reshape(1, *np.shape(values))
+    if array.shape[1:] != shape or len(array) == 0:
+        raise ValueError(f"{name}: must have shape {shape} or {('B', *shape)}, got {np.shape(values)}".replace("'", ""))
+    wrong = np.flatnonzero(~holds(array))
+    if len(wrong):
+        whose = f" for body {wrong[0]}" if np.ndim(values) > len(shape) else ""
+        raise ValueError(f"{name}: got {array[wrong[0]].tolist()}{whose}; must be {allowed}")
+    return array
+
+
+def ensemble_size(quantities: Mapping[str, Array]) -> int:
+    """The number of bodies that quantities of shape (1, …) or (B, …) are for.
+
+    Raises:
+        ValueError: There are two numbers. The text names both.
+    """
+    sizes = {len(values): name for name, values in quantities.items() if len(values) > 1}
+    if len(sizes) > 1:
+        listed = " but ".join(f"{size} of {name}" for size, name in sizes.items())
+        raise ValueError(f"ensemble: got {listed}; what differs from body to body must be given for each of the same number of bodies")
+    return next(iter(sizes), 1)
+
+
+def _decay(rates: Array, step_sizes: Array) -> Array:
+    """Algorithm 1's factors. By `math`, whose last bit does not depend on the length of an array as NumPy's may."""
+    return np.array([math.exp(-rate * dt) for rate, dt in zip(*np.broadcast_arrays(rates, step_sizes), strict=True)])
+
+
+def _principal(inertia: Array) -> tuple[Array, Array]:
+    """Principal moments, the odd one out last, shape (…, 3), and the rotations from their frames to the bodies', shape (…, 4)."""
+    different, which = np.unique(inertia.reshape(-1, 9), axis=0, return_inverse=True)
+    found = [_principal_of_one(matrix.reshape(3, 3)) for matrix in different]
+    return np.array([moments for moments, _ in found])[which], np.array([axes for _, axes in found])[which]
+
+
+def _principal_of_one(inertia: Array) -> tuple[Array, Quat]:
+    if np.count_nonzero(inertia - np.diag(np.diag(inertia))) == 0:
+        moments, axes = np.diag(inertia), np.eye(3)
+    else:
+        moments, axes = np.linalg.eigh(inertia)
+    inverse = 1.0 / moments
+    gaps = [abs(inverse[(axis + 1) % 3] - inverse[(axis + 2) % 3]) for axis in range(3)]
+    odd = int(np.argmin(gaps))
+    order = [(odd + 1) % 3, (odd + 2) % 3, odd]  # a cyclic permutation: no axis changes its sense
+    axes = axes[:, order] * np.linalg.det(axes)
+    return moments[order], from_matrix(Mat3(*(Vec3(*map(float, row)) for row in axes)))
+
+
+# Reading, by a `load(columns, block, column)` that gives a number, or the lanes of many bodies.
+
+
+@compiled
+def read_body(load, columns, points, block):
+    """The body, or bodies, of a block."""
+    return KernelBody(
+        load(columns, block, MASS),
+        _read_matrix(load, columns, block, INERTIA),
+        _read_matrix(load, columns, block, INVERSE_INERTIA),
+        read_vector(load, columns, block, MOMENTS),
+        read_quaternion(load, columns, block, AXES),
+        points,
+        load(columns, block, RADIUS),
+        load(columns, block, REACH),
+    )
+
+
+@compiled
+def read_gravity(load, columns, block):
+    """Gravity [m/s²]."""
+    return read_vector(load, columns, block, GRAVITY)
+
+
+@compiled
+def read_damping(load, columns, block):
+    """The factors of a step."""
+    return KernelDamping(load(columns, block, DAMPING), load(columns, block, DAMPING + 1))
+
+
+@compiled
+def read_floor(load, columns, block):
+    """The floor."""
+    return Floor(load(columns, block, FLOOR), load(columns, block, FLOOR + 1), load(columns, block, FLOOR + 2))
+
+
+@compiled
+def read_vector(load, columns, block, first):
+    """Three columns."""
+    return Vec3(load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2))
+
+
+@compiled
+def read_quaternion(load, columns, block, first):
+    """Four columns."""
+    return Quat(
+        load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2), load(columns, block, first + 3)
+    )
+
+
+@compiled
+def _read_matrix(load, columns, block, first):
+    return Mat3(
+        read_vector(load, columns, block, first),
+        read_vector(load, columns, block, first + 3),
+        read_vector(load, columns, block, first + 6),
+    )
+
+
+@compiled
+def nothing(load, columns, block):
+    """A part that the world does not have."""
+    return None

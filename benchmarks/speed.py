@@ -12,9 +12,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +26,20 @@ import reference_impl
 import scenarios
 from comparisons import engine
 from comparisons.provenance import processor, versions
+from reference_impl import lanes
 from reference_impl.methods import ROTATIONS
+from reference_impl.simulate import usable_cores
 
 Array = NDArray[np.float64]
 
 ROUNDS = 15
+WINDOW = 0.02
+"""Seconds that each contestant runs in a round, over and over: long beside what a processor takes to settle after the one before."""
 STEPS = 5000
 DT = 1e-3
+BODIES = 1024
+SIZES = (16, 128, 1024, 10_000, 100_000)
+BOX = {"shape": "box", "half_extents": [0.1, 0.05, 0.15], "mass": 1.0}
 OUT = Path("out")
 
 
@@ -38,7 +48,7 @@ def scene(name: str) -> scenarios.Scenario:
     content = {
         "name": name,
         "duration": STEPS * DT,
-        "body": {"shape": "box", "half_extents": [0.1, 0.05, 0.15], "mass": 1.0},
+        "body": BOX,
         "start": {"position": [0.0, 1.05, 0.0], "angular_velocity": [1.0, 2.0, 3.0]},
         "gravity": {"acceleration": [0.0, -9.8, 0.0]},
     }
@@ -50,43 +60,96 @@ def scene(name: str) -> scenarios.Scenario:
     return scenarios.load(content)
 
 
-Contestant = Callable[[], tuple[Callable[[], object], Callable[[], object]]]
-"""Builds anew and gives what to time and what to do afterwards."""
+@dataclass(frozen=True)
+class Run:
+    """Something to time: so many steps of so many bodies."""
+
+    go: Callable[[], object]
+    body_steps: int = STEPS
+    close: Callable[[], None] = lambda: None
 
 
-def contestants(name: str, recording: bool) -> dict[str, Contestant]:
-    """The engines on one scene, stepping alone or recording every step."""
+Contestant = Callable[[], Run]
+"""Builds a run anew; building is not timed."""
 
-    def maker(label: str) -> Contestant:
-        chosen = engine(label)
 
-        def build() -> tuple[Callable[[], object], Callable[[], object]]:
-            simulation = chosen.prepare(scene(name), DT)
-            return (partial(simulation.record if recording else simulation.advance, STEPS), simulation.close)
+def alone(label: str, name: str, recording: bool) -> Contestant:
+    """An engine on one body, stepping alone or recording every step."""
+    chosen = engine(label)
 
-        return build
+    def build() -> Run:
+        simulation = chosen.prepare(scene(name), DT)
+        return Run(partial(simulation.record if recording else simulation.advance, STEPS), close=simulation.close)
 
-    return {label: maker(label) for label in ("document", "mujoco", "pybullet")}
+    return build
+
+
+def rollout(name: str) -> Contestant:
+    """MuJoCo's own loop that records every step."""
+    import mujoco
+    from mujoco.rollout import rollout as mujoco_rollout
+
+    def build() -> Run:
+        simulation: Any = engine("mujoco").prepare(scene(name), DT)
+        model, data = simulation._model, simulation._data
+        size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        start, rows = np.empty(size), np.empty((1, STEPS, size))
+        mujoco.mj_getState(model, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        return Run(partial(mujoco_rollout, model, data, start[None], nstep=STEPS, state=rows, sensordata=np.empty((1, STEPS, 0))))
+
+    return build
+
+
+def ensemble(name: str, bodies: int = BODIES, steps: int = STEPS, threads: int = 1) -> Contestant:
+    """The note for many bodies in one call, each with a start of its own (at rest: the same)."""
+    spread = np.random.default_rng(0).normal(size=(bodies, 7)) if name != "rest" else np.zeros((bodies, 7))
+    starts = np.tile(scene(name).initial_state, (bodies, 1))
+    starts[:, 3:7] += 0.3 * spread[:, :4]
+    starts[:, 3:7] /= np.linalg.norm(starts[:, 3:7], axis=1, keepdims=True)
+    starts[:, 10:13] += spread[:, 4:]
+    simulator = reference_impl.Simulator(*body_and_world(name), DT)
+    simulator.run(starts, 1)  # compiled before anything is timed
+    return lambda: Run(partial(simulator.run, starts, steps, steps, threads=threads), bodies * steps)
+
+
+def body_and_world(name: str) -> tuple[reference_impl.Body, reference_impl.World]:
+    """The box of the scenes, to the reference implementation."""
+    half = np.array(BOX["half_extents"])
+    corners = np.array(list(product((-1, 1), repeat=3))) * half
+    floor = None if name == "flight" else reference_impl.Floor(0.5, np.inf)
+    body = reference_impl.Body(1.0, reference_impl.solid_box_inertia(1.0, half), corners)
+    return body, reference_impl.World(np.array([0.0, -9.8, 0.0]), floor)
 
 
 def prepared(start: Array, body: reference_impl.Body, world: reference_impl.World, rotation: str = "note") -> Contestant:
     """The reference implementation by itself."""
     simulator = reference_impl.Simulator(body, world, DT, reference_impl.Methods(rotation=rotation))
-    simulator.run(start, 1)  # compiled before anything is timed
-    return lambda: (partial(simulator.run, start, STEPS, STEPS), lambda: None)
+    simulator.run(start, 1)
+    return lambda: Run(partial(simulator.run, start, STEPS, STEPS))
 
 
 def timed(makers: dict[str, Contestant]) -> dict[str, list[float]]:
-    """Nanoseconds a step of each contestant, once a round, in turn; building is not timed."""
-    seconds: dict[str, list[float]] = {label: [] for label in makers}
+    """Nanoseconds a step and body of each contestant, once a round, in turn."""
+    runs = {}
+    for label, make in makers.items():
+        first = make()
+        runs[label] = max(1, round(WINDOW / (nanoseconds_a_step([first]) * first.body_steps * 1e-9)))
+    nanoseconds: dict[str, list[float]] = {label: [] for label in makers}
     for _ in range(ROUNDS):
         for label, make in makers.items():
-            run, close = make()
-            start = time.perf_counter()
-            run()
-            seconds[label].append((time.perf_counter() - start) / STEPS * 1e9)
-            close()
-    return seconds
+            nanoseconds[label].append(nanoseconds_a_step([make() for _ in range(runs[label])]))
+    return nanoseconds
+
+
+def nanoseconds_a_step(runs: list[Run]) -> float:
+    """Of runs one after the other, a step and body."""
+    start = time.perf_counter()
+    for run in runs:
+        run.go()
+    taken = time.perf_counter() - start
+    for run in runs:
+        run.close()
+    return taken / sum(run.body_steps for run in runs) * 1e9
 
 
 def rotations() -> dict[str, Contestant]:
@@ -111,12 +174,14 @@ def parts() -> dict[str, Contestant]:
     }
 
 
-def first_call(cached: bool) -> float:
+def first_call(cached: bool, width: str) -> float:
     """Seconds of the first simulate in a fresh process, import of numba apart."""
     program = (
         "import time, numpy as np, reference_impl as r\n"
         "b = r.Body(1.0, np.eye(3), np.ones((8, 3))); w = r.World(np.array([0, -9.8, 0]), r.Floor(.5, np.inf))\n"
-        "s = np.array([0, 5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.]); t = time.perf_counter(); r.simulate(s, b, w, 1e-3, 10)\n"
+        "s = np.array([0, 5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.])\n"
+        f"if {width == 'ensemble'}: s = np.tile(s, (32, 1))\n"
+        "t = time.perf_counter(); r.simulate(s, b, w, 1e-3, 10)\n"
         "print(time.perf_counter() - t)\n"
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -126,9 +191,12 @@ def first_call(cached: bool) -> float:
     return float(done.stdout)
 
 
-def report(title: str, nanoseconds: dict[str, list[float]], base: str) -> dict[str, dict[str, float]]:
+Table = dict[str, dict[str, float]]
+
+
+def report(title: str, nanoseconds: dict[str, list[float]], base: str) -> Table:
     """Print one comparison: best and median, and how many times the base each takes."""
-    print(f"\n{title} [ns a step; times {base}, best and median]")
+    print(f"\n{title} [ns a step; times {base}: best, median]")
     table = {}
     for label, values in nanoseconds.items():
         best, median = min(values), statistics.median(values)
@@ -138,36 +206,64 @@ def report(title: str, nanoseconds: dict[str, list[float]], base: str) -> dict[s
     return table
 
 
-def plot(results: dict[str, dict[str, dict[str, float]]], path: Path) -> None:
-    """Bars of the best times, a panel for each comparison."""
+def lead(title: str, table: Table, ours: str, engines: Iterable[str]) -> dict[str, float]:
+    """How many times as fast as the faster of the engines one of ours is."""
+    ratios = {kind: min(table[label][kind] for label in engines) / table[ours][kind] for kind in ("best", "median")}
+    print(f"  {title}: {ratios['best']:.1f} times as many steps a second as the faster engine (by the medians {ratios['median']:.1f})")
+    return ratios
+
+
+def plot(results: dict[str, Table], path: Path) -> None:
+    """The best times as points, a panel for each comparison, all on one logarithmic scale."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 2.2 * ((len(results) + 1) // 2)), layout="constrained")
-    for number, (title, table) in enumerate(results.items(), start=1):
-        axes = figure.add_subplot((len(results) + 1) // 2, 2, number)
-        axes.barh(list(table), [row["best"] for row in table.values()], color="#0072B2")
-        axes.set_xscale("log")
-        axes.set_title(title, fontsize=9)
-        axes.set_xlabel("ns a step", fontsize=8)
-        axes.tick_params(labelsize=8)
-        axes.invert_yaxis()
+    rows = -(-len(results) // 3)
+    figure = Figure(figsize=(13, 2.1 * rows), layout="constrained")
+    for axes, (title, table) in zip(figure.subplots(rows, 3, sharex=True).flat, results.items(), strict=False):
+        best = [row["best"] for row in table.values()]
+        axes.plot(best, list(table), "o", color="#0072B2")
+        for place, nanoseconds in enumerate(best):
+            axes.annotate(
+                f"{nanoseconds:,.0f}" if nanoseconds >= 100 else f"{nanoseconds:.1f}",
+                (nanoseconds, place),
+                (6, -3),
+                textcoords="offset points",
+                fontsize=8,
+            )
+        axes.set(xscale="log", xlim=(1, 5e4), ylim=(len(best) - 0.5, -0.5))
+        axes.set_title(f"{title} [ns a step]", fontsize=9)
+        axes.tick_params(labelsize=8, labelbottom=True)
+        axes.grid(axis="x", alpha=0.3)
     figure.savefig(path)
 
 
 def main() -> None:
     """Run all comparisons, print them, and write `out/bench.json` and `out/bench.svg`."""
     OUT.mkdir(exist_ok=True)
-    results = {}
+    results: dict[str, Table] = {}
+    leads = {}
+    many = f"document, {BODIES} at once"
     for name in ("flight", "drop", "rest"):
-        for recording in (False, True):
-            title = f"{name}, {'every step recorded' if recording else 'stepping alone'}"
-            results[title] = report(title, timed(contestants(name, recording)), "document")
+        stepping = {label: alone(label, name, recording=False) for label in ("document", "mujoco", "pybullet")}
+        title = f"{name}, stepping alone"
+        results[title] = table = report(title, timed(stepping | {many: ensemble(name), "mujoco.rollout": rollout(name)}), "document")
+        for ours in ("document", many):
+            leads[f"{ours}: {name}"] = lead(ours, table, ours, ("mujoco", "mujoco.rollout", "pybullet"))
+        recording = {label: alone(label, name, recording=True) for label in ("document", "mujoco", "pybullet")}
+        title = f"{name}, every step recorded"
+        results[title] = table = report(title, timed(recording | {"mujoco.rollout": rollout(name)}), "document")
+        leads[f"document, recording: {name}"] = lead("document", table, "document", ("mujoco", "mujoco.rollout", "pybullet"))
+        sizes = {f"{size} bodies": ensemble(name, size, steps=1000) for size in SIZES}
+        title = f"{name}, ensembles, 1,000 steps a call"
+        results[title] = report(title, timed(sizes), f"{BODIES} bodies")
+    cores = {f"threads: {threads}": ensemble("drop", threads=threads) for threads in sorted({1, 2, usable_cores()})}
+    results["drop, ensembles, threads"] = report("drop, ensembles, threads", timed(cores), "threads: 1")
     results["rotation methods"] = report("rotation methods", timed(rotations()), "note")
     results["what leaving out saves"] = report("what leaving out saves", timed(parts()), "everything")
-    first = {"cold": first_call(cached=False), "warm": first_call(cached=True)}
-    print(f"\nfirst call in a fresh process: {first['cold']:.2f} s without a cache, {first['warm']:.2f} s with")
-    stamp = {"versions": versions(), "cpu": processor()}
-    (OUT / "bench.json").write_text(json.dumps({"results": results, "first_call": first} | stamp, indent=1))
+    first = {f"{kind}, {width}": first_call(kind == "cached", width) for width in ("one body", "ensemble") for kind in ("cold", "cached")}
+    print("\nfirst call in a fresh process: " + "; ".join(f"{label} {seconds:.2f} s" for label, seconds in first.items()))
+    stamp = {"versions": versions(), "cpu": processor(), "lanes": lanes.WIDTH}
+    (OUT / "bench.json").write_text(json.dumps({"results": results, "leads": leads, "first_call": first} | stamp, indent=1))
     plot(results, OUT / "bench.svg")
     print(f"Written: {OUT / 'bench.json'}, {OUT / 'bench.svg'}")
 

@@ -13,6 +13,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.registry import cpu_target
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typeconv.rules import default_type_manager
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -23,8 +24,9 @@ from reference_impl.vectors import NumberLike, Vec3, any_, compiled, select
 
 Array = NDArray[np.float64]
 
-WIDTH = 16
-"""Two registers of AVX-512, four of AVX2: as many operations at once as hide each other's latency."""
+FEATURES = cpu_target.target_context.codegen().magic_tuple()[2].split(",")  # of the processor that numba compiles for
+WIDTH = 16 if "+avx512f" in FEATURES else 8 if "+avx" in FEATURES else 4
+"""Two registers full: while one operation is under way, the next can start."""
 
 
 class LanesType(NumberLike):

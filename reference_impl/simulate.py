@@ -122,6 +122,8 @@ class Simulator:
         on_vertices = None if forces is None else checked("forces", forces, points.shape[1:], "finite numbers, in N", is_finite)
         if steps < 0 or every < 1:
             raise ValueError(f"steps and every: got {steps} and {every}; must be at least 0 and at least 1")
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads: got {threads}; must be at least 1, or None for all of this process's processors")
         given = {"state": starts, "body, world and dt": columns} | ({} if on_vertices is None else {"forces": on_vertices})
         size = ensemble_size(given)
         if len(starts) < size:
@@ -138,6 +140,11 @@ class Simulator:
         return recorded[0] if is_alone else recorded
 
 
+def usable_cores() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 MOST_BLOCKS = 64
 """Blocks a thread takes at a time: few enough to share the work evenly, and to stop soon at Ctrl-C."""
 
@@ -146,7 +153,7 @@ def _share_out(fill: Callable[[int, int], int], count: int, threads: int | None)
     """Fill all blocks, some at a time, and add up what the kernel counted."""
     if count == 1:
         return fill(0, 1)
-    threads = threads or len(os.sched_getaffinity(0))
+    threads = threads or usable_cores()
     each = min(MOST_BLOCKS, -(-count // threads))
     firsts = range(0, count, each)
     lasts = [min(first + each, count) for first in firsts]

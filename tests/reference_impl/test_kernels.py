@@ -85,6 +85,17 @@ def test_alone_interpreted_compiled_and_in_an_ensemble_agree_to_the_last_bit(cho
     assert len(set(outputs[0])) == len(choices)  # and no two choices are the same
 
 
+def test_an_ensemble_has_the_same_bits_on_a_plain_processor():
+    """Without AVX there are fewer lanes; the physics is none the wiser."""
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", TUMBLE, "[{}]", "ensemble", "1"], env=os.environ | target, capture_output=True, text=True, check=True
+        ).stdout
+        for target in ({}, {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
+    ]
+    assert outputs[0] == outputs[1]
+
+
 FALL = """
 import numba, sys
 before = numba.config.CACHE_DIR

@@ -5,7 +5,7 @@ Flights are kept apart so that errors are averaged over start phases before the 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ class Metric:
         applies: Whether a scene, with its truth, has that.
         measure: From a comparison to the number, or one a flight; raises `Unresolved` where the step is too coarse.
         agreement: Whether two engines are held against each other by it.
+        first_flight: Whether it looks no farther than the first impact and the flight after it.
     """
 
     name: str
@@ -44,17 +45,33 @@ class Metric:
     applies: Callable[[Scenario, Truth | None], bool]
     measure: Measure
     agreement: bool = False
+    first_flight: bool = False
 
-    def value(self, cases: Sequence[Comparison]) -> float:
-        """The mean over start phases, and of several flights the largest in size, with its sign.
+    def average(self, cases: Sequence[Comparison]) -> "Average":
+        """Over start phases, and of several flights the largest in size, with its sign.
 
         Raises:
             Unresolved: The time step is too coarse to tell.
         """
         measured = [np.atleast_1d(self.measure(case)) for case in cases]
         flights = min(map(len, measured))
-        means = np.mean([values[:flights] for values in measured], axis=0)
-        return float(means[np.argmax(np.abs(means))])
+        phases = np.array([values[:flights] for values in measured])
+        means = phases.mean(axis=0)
+        worst = int(np.argmax(np.abs(means)))
+        over_later_impacts = worst > 1 or (flights == 1 and not self.first_flight and len(cases[0].impacts) > 1)
+        if over_later_impacts:
+            # The phases are even at the first impact only; what they draw at later ones is correlated, hardly better than one draw.
+            return Average(float(means[worst]), float(phases[:, worst].std()))
+        # Each quarter of the phases, evenly spread as all of them are, gives a mean of its own.
+        quarters = [phases[first::4, worst].mean() for first in range(min(4, len(phases)))]
+        return Average(float(means[worst]), float(0.5 * np.ptp(quarters)))
+
+
+class Average(NamedTuple):
+    """A metric's mean over start phases, and how finely these phases resolve it."""
+
+    value: float
+    resolution: float
 
 
 METRICS: dict[str, Metric] = {}
@@ -73,12 +90,13 @@ def _metric(
     *,
     signed: bool = False,
     agreement: bool = False,
+    first_flight: bool = False,
 ) -> Callable[[Measure], Measure]:
     """Register a function as a metric; its name is the metric's, its docstring the definition."""
 
     def register(measure: Measure) -> Measure:
         name, definition = measure.__name__, " ".join((measure.__doc__ or "").split())
-        METRICS[name] = Metric(name, unit, kind, signed, definition, needs, applies, measure, agreement)
+        METRICS[name] = Metric(name, unit, kind, signed, definition, needs, applies, measure, agreement, first_flight)
         return measure
 
     return register
@@ -128,7 +146,7 @@ def energy_error_raw(case: Comparison) -> Array:
     return _largest_of_each_flight(found, case) / case.energy_scale
 
 
-@_metric("1", "invariant", "no damping", _keeps_energy, signed=True)
+@_metric("1", "invariant", "no damping", _keeps_energy, signed=True, first_flight=True)
 def energy_drift(case: Comparison) -> float:
     """Change of energy from the start to the end of the first flight, over the scene's energy."""
     rows = case.flights[0]
@@ -143,7 +161,7 @@ def energy_gain(case: Comparison) -> float:
     return float(np.max(over_time - np.minimum.accumulate(over_time))) / case.energy_scale
 
 
-@_metric("1", "truth", "a truth with an impact, gravity downwards", _has_apex, signed=True, agreement=True)
+@_metric("1", "truth", "a truth with an impact, gravity downwards", _has_apex, signed=True, agreement=True, first_flight=True)
 def bounce_height_error(case: Comparison) -> float:
     """Apex of the centre of mass after the first impact minus the truth's, over the height of the drop."""
     if len(case.flights) < 2:
@@ -153,7 +171,7 @@ def bounce_height_error(case: Comparison) -> float:
     return float(np.mean(found - exact)) / case.scene.clearance
 
 
-@_metric("1", "truth", "a truth with an impact", _has_impact, signed=True)
+@_metric("1", "truth", "a truth with an impact", _has_impact, signed=True, first_flight=True)
 def restitution_error(case: Comparison) -> float:
     """Separation over approach speed of the contact point in the first impact, native rows, minus the restitution."""
     assert case.scene.floor is not None

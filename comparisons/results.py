@@ -50,6 +50,16 @@ class Results:
     trajectories: Mapping[TrajectoryKey, Trajectory]
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def measurements(self) -> pd.DataFrame:
+        """The rows that measure an engine against truth and conservation laws, at one step each."""
+        return self.frame[self.frame["kind"].isin(["truth", "invariant"])]
+
+    @property
+    def model_errors(self) -> pd.DataFrame:
+        """The rows of errors whose limit as the step goes to 0 is not 0."""
+        return self.frame[(self.frame["kind"] == "model_error") & (self.frame["cause"] == "model")]
+
     def exit_code(self, named: frozenset[str] = frozenset()) -> int:
         """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""
         verdicts = self.frame["verdict"]

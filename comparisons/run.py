@@ -17,6 +17,7 @@ from comparisons.metrics import METRICS, Metric, metrics_for
 from comparisons.phases import start_phases
 from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
+from comparisons.studies import study_rows
 from comparisons.verdicts import assert_expectations_can_be_judged, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
@@ -95,6 +96,7 @@ def run(
     trajectories: dict[TrajectoryKey, Trajectory] = {}
     settings: dict[str, dict[str, Any]] = {}
     for scene, truth in zip(scenes, truths, strict=True):
+        measured: dict[str, list[Row]] = {label: [] for label in labels}
         for dt in dts:
             phases = [(phase, truth if phase is scene else truth_for(phase)) for phase in start_phases(scene, truth, dt)]
             attempts: list[_Attempt] = []
@@ -103,11 +105,15 @@ def run(
                 if attempt.motion is not None:
                     trajectories[scene.name, contestant.label, dt] = attempt.motion
                     settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
-                rows += _truth_rows(scene, dt, attempt, phases)
+                measured[contestant.label] += _truth_rows(scene, dt, attempt, phases)
                 attempts.append(attempt)
                 progress(scene.name, contestant.label, dt)
             for first, second in combinations(attempts, 2):
                 rows += _agreement_rows(scene, dt, first, second, phases)
+        for contestant in contestants:
+            rows += measured[contestant.label]
+            if contestant.engine is not None:
+                rows += study_rows(scene, contestant.engine, measured[contestant.label])
     by_name = {scene.name: scene for scene in scenes}
     return Results(as_frame(rows), by_name, tuple(labels), trajectories, stamp | {"settings": settings})
 
@@ -211,10 +217,10 @@ def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: lis
     """A metric's mean over the start phases, judged."""
     try:
         with np.errstate(all="ignore"):  # an engine may say 1e300; what comes of it is inf or NaN, and judged as such
-            value = metric.value(cases)
+            value, resolution = metric.average(cases)
         unresolved = ""
     except Unresolved as error:
-        value, unresolved = float("nan"), str(error)
+        value, resolution, unresolved = float("nan"), float("nan"), str(error)
     judgement = judge(scene, label, dt, metric, value)
     reason = "; ".join(filter(None, [unresolved, judgement.reason]))
     # What should be a number and is none is a failure, expected or not; what the step cannot resolve fails only what was expected.
@@ -222,7 +228,8 @@ def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: lis
     if verdict == "failed" and not reason:
         reason = "not a number: what is measured here never happened"
     cause = "unresolved" if unresolved else ""
-    return {"value": value, "lower": judgement.lower, "upper": judgement.upper, "verdict": verdict, "cause": cause, "reason": reason}
+    measurement = {"value": value, "lower": judgement.lower, "upper": judgement.upper, "verdict": verdict, "cause": cause, "reason": reason}
+    return measurement | {"resolution": resolution}
 
 
 def _agreement_rows(
@@ -241,7 +248,7 @@ def _agreement_rows(
         if not (metric.agreement and metric.applies(scene, phases[0][1] or _as_truth(second.phases[0]))):
             continue
         try:
-            found: Row = {"value": metric.value(cases)}
+            found: Row = {"value": metric.average(cases).value}
         except Unresolved as error:
             found = {"cause": "unresolved", "reason": str(error)}
         rows.append(shared | {"metric": metric.name, "unit": metric.unit, "verdict": "measured"} | found)
@@ -265,7 +272,7 @@ def _as_truth(motion: Trajectory) -> Truth:
 
 def _value_or_nan(metric: Metric, case: Comparison) -> float:
     try:
-        return metric.value([case])
+        return metric.average([case]).value
     except Unresolved:
         return float("nan")
 

@@ -87,6 +87,16 @@ def judge(scene: Scenario, label: str, dt: float, metric: Metric, value: float) 
     return Judgement(_finite_or_nan(lower), _finite_or_nan(upper), verdict, reason)
 
 
+def known_fault(scene: Scenario, label: str, dt: float, metric: Metric, limit: float, uncertainty: float) -> str | None:
+    """The reason of an expectation, made of this engine by name, that an error whose limit is not 0 meets; None if there is none."""
+    judgement = judge(scene, label, dt, metric, limit)
+    named = any(expectation.metric == metric.name and expectation.engine == label for expectation in scene.expect)
+    lower, upper = (
+        bound if math.isfinite(bound) else other for bound, other in ((judgement.lower, -math.inf), (judgement.upper, math.inf))
+    )
+    return judgement.reason if named and lower - uncertainty <= limit <= upper + uncertainty else None
+
+
 def _finite_or_nan(bound: float) -> float:
     return bound if math.isfinite(bound) else math.nan
 

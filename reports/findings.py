@@ -1,17 +1,12 @@
 """What a run found, in words and counts; the one place that reports agree on."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
 from comparisons import Results
 from comparisons.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 
-LEAST_STEPS = 3
-SMALLEST_RANGE = 3.99
-"""Fewer steps than three, or a range of less than four, say nothing about how errors shrink."""
 NEGLIGIBLE = 1e-4
 """Errors below this (of the scene's scale, in m or in rad) are not worth a sentence."""
 
@@ -20,19 +15,26 @@ SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined",
 assert set(SEVERITY) == set(VERDICTS)
 
 
+STUDIES = ("order", "model_error")
+"""Kinds of rows that several steps together give."""
+
+
 @dataclass(frozen=True)
 class Counts:
-    """How many expectations held and failed, and how many rows broke down."""
+    """How many checks held and failed, how many of them are of limits and orders, and how many rows broke down."""
 
     passed: int
     failed: int
+    of_studies: int
     broken: int
 
 
 def counts(results: Results) -> Counts:
     """The verdicts of a run, counted."""
     verdicts = results.frame["verdict"]
-    return Counts(int((verdicts == "passed").sum()), int(verdicts.isin(FAILURES).sum()), int(verdicts.isin(BREAKDOWNS).sum()))
+    passed, failed = verdicts == "passed", verdicts.isin(FAILURES)
+    of_studies = (passed | failed) & results.frame["kind"].isin(STUDIES)
+    return Counts(int(passed.sum()), int(failed.sum()), int(of_studies.sum()), int(verdicts.isin(BREAKDOWNS).sum()))
 
 
 def worst_verdicts(results: Results) -> dict[tuple[str, str], str]:
@@ -49,65 +51,55 @@ def failures(results: Results) -> pd.DataFrame:
     return results.frame[results.frame["verdict"].isin(FAILURES | BREAKDOWNS)]
 
 
-def plateaus(results: Results) -> dict[str, list[str]]:
-    """For each engine the scenes in which an error against the truth does not shrink with the step."""
-    found: dict[str, list[str]] = {engine: [] for engine in results.engines}
-    truth = results.frame[(results.frame["kind"] == "truth") & (results.frame["metric"] != "energy_error_raw")]
-    for engine in results.engines:
-        mine = truth[truth["engine"] == engine]
-        table = mine.pivot_table(index=["scene", "metric"], columns="dt", values="value", sort=True, dropna=False)
-        dts = [float(dt) for dt in sorted(mine["dt"].unique())]
-        if not _says_something(dts):
-            continue
-        errors = table.to_numpy()
-        # An error that changes its sign, or is not known at every step, shows no trend.
-        steady = np.abs(np.sign(errors).sum(axis=1)) == len(dts)
-        finest, coarsest = np.abs(errors[:, 0]), np.abs(errors[:, -1])
-        # Halfway, on a logarithmic scale, between no order and first order.
-        stuck = steady & (finest > NEGLIGIBLE) & (coarsest < np.sqrt(dts[-1] / dts[0]) * finest)
-        concerned = set(table.index[stuck].get_level_values("scene"))
-        found[engine] = [scene for scene in results.scenes if scene in concerned]
-    return found
+def model_errors(results: Results) -> dict[str, list[str]]:
+    """For each engine the scenes in which an error that is worth a word does not vanish with the step."""
+    worth = results.model_errors[results.model_errors["value"].abs() > NEGLIGIBLE]
+    return {
+        engine: [scene for scene in results.scenes if ((worth["engine"] == engine) & (worth["scene"] == scene)).any()]
+        for engine in results.engines
+    }
 
 
-def _says_something(dts: Sequence[float]) -> bool:
-    return len(dts) >= LEAST_STEPS and max(dts) / min(dts) >= SMALLEST_RANGE
+def orders(results: Results, scene: str, engine: str) -> tuple[float, float] | None:
+    """The least and the largest order at which an engine's errors vanish in a scene; None if none does at a clear order."""
+    frame = results.frame
+    mine = frame[(frame["kind"] == "order") & (frame["scene"] == scene) & (frame["engine"] == engine)]
+    found = mine.loc[mine["cause"] == "discretisation", "value"].dropna()
+    return (float(found.min()), float(found.max())) if len(found) else None
 
 
 def verdict_sentence(results: Results) -> str:
-    """What came of the expectations, one sentence."""
+    """What came of the checks, one sentence."""
     tally = counts(results)
     judged = tally.passed + tally.failed
     if tally.broken:
-        judgement = f"; of {judged} expectations {tally.failed} fail" if judged else ""
+        judgement = f"; of {judged} checks {tally.failed} fail" if judged else ""
         return f"{tally.broken} {'run' if tally.broken == 1 else 'runs'} of an engine broke down{judgement}."
     if tally.failed:
-        return f"{tally.failed} of {judged} expectations fail."
+        return f"{tally.failed} of {judged} checks fail."
     if judged == 0:
         set_at_all = any(scene.expect for scene in results.scenes.values())
         none = "No expectation is for these engines at these steps" if set_at_all else "No expectations were set"
         return f"{none}; everything was measured."
-    return f"All {judged} expectations hold."
+    kinds = [f"{judged - tally.of_studies} expectations of the scenes", f"{tally.of_studies} limits and orders"]
+    both = " and ".join(kind for kind in kinds if not kind.startswith("0 "))
+    return f"All {judged} checks hold: {both}."
 
 
 def finding_sentences(results: Results) -> list[str]:
     """What a reader should know first about each engine."""
-    steps = np.sort(results.frame["dt"].unique())
-    sentences = []
     missing = results.frame[results.frame["verdict"] == "missing"].drop_duplicates("engine")
-    sentences += [f"{row.reason}" for row in missing.itertuples()]
-    if not _says_something(list(steps)):
-        return sentences
-    found = plateaus(results)
-    ran = results.frame[results.frame["kind"] == "truth"].groupby("engine")["scene"].nunique()
+    sentences = [f"{row.reason}" for row in missing.itertuples()]
+    found = model_errors(results)
+    limits = results.frame[results.frame["kind"] == "model_error"]
+    studied = limits.groupby("engine")["scene"].nunique()
     for engine in results.engines:
-        stuck, total = found[engine], int(ran.get(engine, 0))
+        stuck, total = found[engine], int(studied.get(engine, 0))
         if total and stuck:
             sentences.append(
-                f"{engine}: in {len(stuck)} of {total} scenes ({', '.join(stuck)}) an error does not shrink with the step "
-                f"from {steps[-1]:g} to {steps[0]:g} s: it is the model's, no step cures it."
+                f"{engine}: model error in {len(stuck)} of {total} scenes ({', '.join(stuck)}): an error that stays as the step goes to 0."
             )
         elif total:
             where = f"in all {total} scenes " if total > 1 else ""
-            sentences.append(f"{engine}: {where}no error above {NEGLIGIBLE:g} stays as the step shrinks.")
+            sentences.append(f"{engine}: {where}no error above {NEGLIGIBLE:g} stays as the step goes to 0.")
     return sentences

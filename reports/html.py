@@ -12,7 +12,7 @@ from markupsafe import Markup
 from comparisons import METRICS, Results
 from reports import numbers
 from reports.colours import engine_colours
-from reports.findings import NEGLIGIBLE, counts, failures, finding_sentences, plateaus, verdict_sentence, worst_verdicts
+from reports.findings import NEGLIGIBLE, STUDIES, counts, failures, finding_sentences, model_errors, verdict_sentence, worst_verdicts
 from reports.plots import convergence_figure, time_figure
 from reports.svg import svg
 from scenarios import Scenario, truth_for
@@ -30,8 +30,8 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"written": numbers.written, "word": numbers.word, "cell": _markdown_cell}
-    environment.globals |= {"bound": numbers.bound, "marks": numbers.MARKS}
+    environment.filters |= {"written": numbers.written, "step": numbers.step, "word": numbers.word, "cell": _markdown_cell}
+    environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": numbers.MARKS}
     return environment
 
 
@@ -73,7 +73,7 @@ def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
         "engines": results.engines,
         "colours": engine_colours(results.engines),
         "matrix": {name: {engine: worst.get((name, engine), "missing") for engine in results.engines} for name in results.scenes},
-        "stuck": plateaus(results),
+        "stuck": model_errors(results),
         "negligible": NEGLIGIBLE,
         "failures": [_row(row) for row in failures(results).itertuples()],
         "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
@@ -87,8 +87,9 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
     scene = results.scenes[name]
     truth = truth_for(scene)
     frame = results.frame[results.frame["scene"] == name]
-    dts = sorted(frame["dt"].unique(), reverse=True)
-    own = frame[(frame["kind"] != "agreement") & (frame["metric"] != "")]
+    dts = sorted(frame["dt"].dropna().unique(), reverse=True)
+    own = results.measurements[results.measurements["scene"] == name]
+    studies = frame[frame["kind"].isin(STUDIES)]
     return {
         "id": f"scene-{number:02d}",
         "name": name,
@@ -99,6 +100,7 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         "dts": dts,
         "metrics": list(own["metric"].unique()),
         "cells": {(row.metric, row.engine, row.dt): _row(row) for row in own.itertuples()},
+        "trends": _trends(studies),
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
         "agreement": _agreement(frame, min(dts)),
         "time_plot": Markup(plots.get(f"{number:02d}-time", "")),  # our own SVG; its text is escaped by matplotlib
@@ -124,6 +126,25 @@ def left_out(scene: Scenario) -> list[str]:
     """What a scene does not model, so that no engine pays for it, and what of it is not run."""
     parts = [part for part in ("gravity", "floor", "damping") if getattr(scene, part) is None]
     return parts + ([] if scene.ensemble is None else ["the ensemble: the scene's own start alone is run"])
+
+
+def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
+    """What becomes of each metric of each engine as the step goes to 0: a word, the worse of two verdicts, and the reasons."""
+    trends = {}
+    for (metric, engine), rows in studies.groupby(["metric", "engine"]):
+        order, limit = (rows[rows["kind"] == kind] for kind in STUDIES)
+        p, m = (float(part["value"].iloc[0]) if len(part) else float("nan") for part in (order, limit))
+        reasons = [f"order {p:.3f}, {reason}" for reason in order["reason"]]
+        reasons += [f"limit {m:.3g} ± {upper:.1g}, {reason}" for upper, reason in zip(limit["upper"], limit["reason"], strict=True)]
+        cause = str(rows["cause"].iloc[0])
+        verdict = "failed" if (rows["verdict"] == "failed").any() else str(rows["verdict"].iloc[-1])
+        trends[str(metric), str(engine)] = {
+            "text": numbers.trend(p, m, cause),
+            "cause": cause,
+            "verdict": verdict,
+            "reason": "; ".join(reasons),
+        }
+    return trends
 
 
 def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:

@@ -38,3 +38,21 @@ def bound(lower: float, upper: float) -> str:
 def word(verdict: str) -> str:
     """A verdict as people write it."""
     return WORDS.get(verdict, verdict)
+
+
+def step(dt: float) -> str:
+    """A step in seconds; what several steps say together belongs to none, but to their limit."""
+    return "→ 0" if math.isnan(dt) else f"{dt:g}"
+
+
+def subject(metric: str, kind: str) -> str:
+    """What a row is about."""
+    words = metric.replace("_", " ")
+    return {"order": f"order of {words}", "model_error": f"limit of {words}"}.get(kind, words)
+
+
+def trend(order: float, limit: float, cause: str) -> str:
+    """What becomes of an error as the step goes to 0."""
+    if cause == "discretisation":
+        return "→ 0" if math.isnan(order) else f"order {order:.2f}"
+    return f"→ {written(limit)}" if cause == "model" else cause

@@ -87,8 +87,8 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
 def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
     """Draw the size of one error over the time step, logarithmic, with a dotted line of first order."""
     colours, markers = engine_colours(results.engines), engine_markers(results.engines)
-    frame = results.frame
-    mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric) & (frame["kind"] != "agreement")]
+    frame = results.measurements
+    mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric)]
     largest = 0.0
     for number, engine in enumerate(results.engines):
         rows = mine[(mine["engine"] == engine) & mine["value"].notna()].sort_values("dt")
@@ -96,6 +96,7 @@ def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Ax
         largest = max([largest, *sizes])
         style: Any = {"marker": markers[engine], "markerfacecolor": "none", "linewidth": 1.5, "color": colours[engine]}
         axes.loglog(rows["dt"], sizes, markersize=_thinner(8.0, 4.0, number, results), label=engine, **style)
+        _draw_fit(results, scene_name, metric, engine, rows["dt"].to_numpy(), rows["value"].to_numpy(), axes)
     dts = np.sort(mine["dt"].unique())
     if len(dts) > 1 and largest > 0.0:
         # Above the data, so that it hides no line that it may coincide with.
@@ -105,6 +106,20 @@ def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Ax
     axes.set_xlabel("step [ms]")
     unit = METRICS[metric].unit
     axes.set_ylabel(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))
+
+
+def _draw_fit(results: Results, scene_name: str, metric: str, engine: str, dts: Array, errors: Array, axes: "Axes") -> None:
+    """Draw |m + C hᵖ| through the finest step, dashed, from the coarsest to a quarter of the finest."""
+    frame = results.frame
+    mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric) & (frame["engine"] == engine)]
+    fitted, limits = (mine[mine["kind"] == kind] for kind in ("order", "model_error"))
+    if fitted.empty or limits.empty:
+        return
+    order = float(fitted["value"].iloc[0])
+    limit = float(limits["value"].iloc[0]) if limits["cause"].iloc[0] == "model" else 0.0
+    h = np.geomspace(dts.max(), 0.25 * dts.min(), 50)
+    curve = np.abs(limit + (errors[0] - limit) * (h / dts[0]) ** order)
+    axes.loglog(h, np.maximum(curve, ROUNDING), color=engine_colours(results.engines)[engine], linewidth=0.8, linestyle=(0, (4, 3)))
 
 
 def time_figure(results: Results, scene_name: str) -> "Figure":
@@ -120,8 +135,7 @@ def time_figure(results: Results, scene_name: str) -> "Figure":
 
 def convergence_figure(results: Results, scene_name: str) -> "Figure | None":
     """The scene's first three errors that are not zero everywhere, over the time step; None if all are."""
-    frame = results.frame
-    mine = frame[(frame["scene"] == scene_name) & (frame["kind"] != "agreement")]
+    mine = results.measurements[results.measurements["scene"] == scene_name]
     present = [name for name in CONVERGENCE if (mine.loc[mine["metric"] == name, "value"].abs() > 1e-13).any()]
     if not present:
         return None

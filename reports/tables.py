@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from comparisons import METRICS, Results
-from reports.findings import failures, finding_sentences, verdict_sentence
-from reports.numbers import MARKS, bound, word, written
+from reports.findings import STUDIES, failures, finding_sentences, orders, verdict_sentence
+from reports.numbers import MARKS, bound, step, subject, trend, word, written
 
 NUMBER_WIDTH = 9  # as in -1.23e-04: a narrow terminal may fold the names and break the table, never a number
 NAME_WIDTH, GAP = 20, 3
@@ -26,6 +26,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
         out.print(Text(name, style="bold").append(f"  {scene.summary}" if scene.summary else "", style="not bold"))
         for first in range(0, len(results.engines), at_once):
             out.print(_scene_table(results, name, results.engines[first : first + at_once]))
+        _print_trends(results, name, out)
         _print_remarks(results, name, out)
         out.print()
     _print_failures(results, out)
@@ -37,7 +38,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
 def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     frame = results.frame[results.frame["scene"] == name]
     finest = frame[frame["dt"] == frame["dt"].min()]
-    own = finest[(finest["kind"] != "agreement") & (finest["metric"] != "")]
+    own = finest[finest["kind"].isin(["truth", "invariant"])]
     pairs = finest[finest["kind"] == "agreement"]
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
@@ -62,6 +63,26 @@ def _cell(value: float, verdict: str) -> Text:
     return Text(f"{written(value)} {MARKS[verdict]}", style=STYLES.get(verdict, ""))
 
 
+def _print_trends(results: Results, name: str, out: Console) -> None:
+    """What becomes of the errors as the step goes to 0: for each engine the orders, and what does not vanish."""
+    frame = results.frame[results.frame["scene"] == name]
+    for engine in results.engines:
+        mine = frame[frame["engine"] == engine]
+        found = orders(results, name, engine)
+        told = (
+            []
+            if found is None
+            else [f"order {found[0]:.2f}" if found[1] - found[0] < 0.005 else f"orders {found[0]:.2f} to {found[1]:.2f}"]
+        )
+        wrong = mine[(mine["kind"] == "model_error") & (mine["cause"] == "model")]
+        told += [
+            f"{metric.replace('_', ' ')} {trend(math.nan, value, 'model')}"
+            for metric, value in zip(wrong["metric"], wrong["value"], strict=True)
+        ]
+        if told:
+            out.print(Text(f"as dt → 0, {engine}: {', '.join(told)}", style="dim"))
+
+
 def _print_remarks(results: Results, name: str, out: Console) -> None:
     frame = results.frame[(results.frame["scene"] == name) & (results.frame["metric"] == "")]
     for row in frame.drop_duplicates(["engine", "verdict", "reason"]).to_dict("records"):
@@ -71,7 +92,11 @@ def _print_remarks(results: Results, name: str, out: Console) -> None:
 def _print_failures(results: Results, out: Console) -> None:
     for row in failures(results).to_dict("records"):
         if row["metric"]:
-            told = f"{row['metric']} is {written(row['value'])}, expected {bound(row['lower'], row['upper'])}: {row['reason']}"
+            what = subject(row["metric"], row["kind"])
+            told = f"{what} is {written(row['value'])}, expected {bound(row['lower'], row['upper'])}: {row['reason']}"
             scene = results.scenes[row["scene"]]
-            again = shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", row["engine"], "--dt", repr(row["dt"])])
-            out.print(Text(f"✗ {row['scene']} · {row['engine']} · {row['dt']:g} s: {told}. Again: {again}", style="red"))
+            steps = [row["dt"]] if row["kind"] not in STUDIES else sorted(results.measurements["dt"].unique(), reverse=True)
+            named = [word for dt in steps for word in ("--dt", repr(float(dt)))]
+            again = shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", row["engine"], *named])
+            at = step(row["dt"]) if row["kind"] in STUDIES else f"{step(row['dt'])} s"
+            out.print(Text(f"✗ {row['scene']} · {row['engine']} · {at}: {told}. Again: {again}", style="red"))

@@ -126,6 +126,10 @@ class Engine:
         listed = ",".join(f"{key}={value}" for key, value in self.options.items())
         return f"{self.name}[{listed}]" if listed else self.name
 
+    def order_in(self, scene: Scenario) -> float | None:
+        """The order claimed for a scene's errors: `order` in free flight, none where there is a floor to hit."""
+        return self.order if scene.floor is None else None
+
     def declines(self, scene: Scenario) -> str | None:
         """Why this engine cannot run a scene as meant, or None: it can."""
         return None

@@ -37,10 +37,12 @@ class Document(Engine):
         """The chosen leaves."""
         return reference_impl.Methods(**{name: self.option(name) for name in self.choices})
 
-    @property
-    def order(self) -> float | None:  # type: ignore[override]  # the claim depends on the option
+    def order_in(self, scene: Scenario) -> float | None:
         """Order of the rotation; the note's own makes no claim. Translation under gravity is of first order with all of them."""
-        return ORDERS.get(self.option("rotation"))
+        rotation = ORDERS.get(self.option("rotation"))
+        if rotation is None or scene.floor is not None:
+            return None
+        return rotation if scene.gravity is None else min(rotation, 1.0)
 
     def declines(self, scene: Scenario) -> str | None:
         """Most laws know no friction between none and infinite."""

@@ -151,4 +151,4 @@ def test_too_coarse_a_step_is_said_to_be():
     scene, motion = exact_motion("drop-ball", dt=0.1)
     case = Comparison.with_truth(scene, motion, truth_for(scene))
     with pytest.raises(Unresolved, match=r"too short for steps of 0\.1 s"):
-        METRICS["bounce_height_error"].value([case])
+        METRICS["bounce_height_error"].average([case])

@@ -45,9 +45,12 @@ def test_table(core):
     """The columns are the documented ones, with no missing or double key."""
     assert list(core.frame.columns) == list(COLUMNS)
     assert not core.frame.duplicated(KEY).any()
-    assert (core.frame["steps"] > 0).all()
-    own = core.frame[core.frame["kind"] != "agreement"]
-    assert (own["time_per_step"] > 0).all()
+    assert (core.measurements["steps"] > 0).all()
+    assert (core.measurements["time_per_step"] > 0).all()
+    assert core.measurements["dt"].notna().all()
+    studies = core.frame[core.frame["kind"].isin(["order", "model_error"])]
+    assert studies["dt"].isna().all()
+    assert set(core.measurements["cause"]) <= {"discretisation", "model", "rounding", "unresolved", ""}
 
 
 @pytest.mark.parametrize("restitution", [0.5, 0.9])

@@ -98,7 +98,7 @@ def test_expectation_that_fails_is_exit_code_1(tmp_path):
     assert done.returncode == 1
     assert "penetration is" in done.stdout
     assert "no engine is that stiff" in done.stdout.replace("\n", " ")
-    assert "1 of 1 expectations fail." in done.stdout
+    assert "1 of 1 checks fail." in done.stdout
 
 
 @pytest.mark.parametrize("what", ["scenes", "engines", "metrics"])

@@ -104,10 +104,10 @@ def test_page_says_the_verdict_first(results, folder):
     """The sentence before any table, one chip for each scene and engine, the colours of each engine."""
     text = (folder / "report.html").read_text(encoding="utf-8")
     held = (results.frame["verdict"] == "passed").sum()
-    assert f"All {held} expectations hold." in text
-    assert text.index("expectations hold") < text.index("<table")
+    assert f"All {held} checks hold:" in text
+    assert text.index("checks hold") < text.index("<table")
     assert len(re.findall(r'class="chip (passed|measured)"', text)) == 6
-    assert "does not shrink with the step" in text
+    assert "stays as the step goes to 0" in text
 
 
 def test_failures_come_first(tmp_path):
@@ -118,7 +118,7 @@ def test_failures_come_first(tmp_path):
     }
     found = comparisons.run([scenarios.load(harsh)], ["mujoco"], [4e-3])
     text = reports.write(found, tmp_path / "run").read_text(encoding="utf-8")
-    assert "1 of 1 expectations fail." in text
+    assert "1 of 1 checks fail." in text
     assert text.index("What failed") < text.index("Against the truth")
     assert "too much to ask" in text
     assert "± 1e-09" in text
@@ -265,32 +265,43 @@ def test_markdown_cells_hold_anything(tmp_path):
     assert "&#39;" not in markdown
 
 
-def made_up(values):
-    """Results with one metric of one engine at some steps."""
-    from comparisons.results import Results, as_frame
-
-    rows = [
-        {"scene": "drop-ball", "engine": "e", "dt": dt, "metric": "energy_error", "value": value, "kind": "truth", "verdict": "measured"}
-        for dt, value in values.items()
-    ]
-    return Results(as_frame(rows), {"drop-ball": scenarios.load("drop-ball")}, ("e",), {})
+@pytest.fixture(scope="module")
+def studied(tmp_path_factory):
+    """A run at three steps, with an engine whose errors stay, and its page."""
+    found = comparisons.run([scenarios.load("spin-asymmetric")], ["document", "mujoco"], [8e-3, 4e-3, 2e-3])
+    page = reports.write(found, tmp_path_factory.mktemp("studied") / "run")
+    return found, page.read_text(encoding="utf-8")
 
 
-def test_findings_say_only_what_the_figures_show():
-    """A plateau is called one; a falling error, two steps, a narrow range, a change of sign or a gap are not."""
-    from reports.findings import finding_sentences, plateaus
+def test_page_says_what_becomes_of_each_error_as_the_step_goes_to_zero(studied):
+    """Orders in a column of their own, with window and limit; model errors named above and on a chip."""
+    _, text = studied
+    assert "document: model error in 1 of 1 scenes (spin-asymmetric)" in text
+    assert "mujoco: no error above 0.0001 stays as the step goes to 0." in text
+    assert text.count("model error</a>") == 1
+    assert len(re.findall(r">order 1\.0[012]</td>", text)) >= 4
+    assert ">→ 7.53e-01</td>" in text
+    assert "fitted at 0.008, 0.004, 0.002 s; claimed 1" in text
+    assert ">rounding</td>" in text
 
-    assert plateaus(made_up({4e-3: 0.11, 2e-3: 0.1, 1e-3: 0.1})) == {"e": ["drop-ball"]}
-    for values in (
-        {4e-3: 0.4, 2e-3: 0.2, 1e-3: 0.1},
-        {4e-3: 0.1, 1e-3: 0.1},
-        {2e-3: 0.1, 1.9e-3: 0.1, 1.8e-3: 0.1},
-        {4e-3: -0.1, 2e-3: 0.1, 1e-3: 0.1},
-        {4e-3: float("nan"), 2e-3: 0.1, 1e-3: 0.1},
-        {4e-3: 1e-6, 2e-3: 1e-6, 1e-3: 1e-6},
-    ):
-        assert plateaus(made_up(values)) == {"e": []}
-    assert finding_sentences(made_up({2e-3: 0.1, 1.9e-3: 0.1})) == []
+
+def test_terminal_says_what_becomes_of_the_errors(studied, capsys):
+    """A line for each engine below the scene's table."""
+    from rich.console import Console
+
+    reports.print_table(studied[0], Console(width=200, no_color=True))
+    text = capsys.readouterr().out
+    assert "as dt → 0, document: angular momentum error → 7.36e-01" in text
+    assert re.search(r"as dt → 0, mujoco: orders 0\.99 to 1\.02|as dt → 0, mujoco: orders? 1\.0", text)
+
+
+def test_two_steps_say_nothing_about_limits():
+    """No study, no sentence."""
+    from reports.findings import finding_sentences
+
+    found = comparisons.run([scenarios.load("spin-asymmetric")], ["document"], [8e-3, 4e-3])
+    assert not found.frame["kind"].isin(["order", "model_error"]).any()
+    assert finding_sentences(found) == []
 
 
 def test_folder_that_is_no_run(tmp_path):
@@ -314,7 +325,7 @@ def test_terminal_table(results, capsys):
     text = capsys.readouterr().out
     assert "…" not in text
     assert NASTY in text
-    assert "expectations hold." in text
+    assert "checks hold:" in text
     assert max(map(len, text.splitlines())) <= 80
 
 

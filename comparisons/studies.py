@@ -1,0 +1,90 @@
+"""What several steps say together: of each error the observed order, the limit as the step goes to 0, and the cause.
+
+Any engine is held to this, whatever a scene expects besides: its limit is the truth, within the limit's uncertainty, and its order is not
+below the one it claims. A fault that is known, and expected of this engine by name, passes as long as the limit is what is expected.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from comparisons.convergence import Convergence, says_something, take_apart
+from comparisons.engines.base import Engine
+from comparisons.metrics import METRICS
+from comparisons.verdicts import Verdict, known_fault
+from scenarios import Scenario
+
+Row = dict[str, Any]
+
+ARTEFACTS = frozenset({"energy_error_raw"})
+"""Metrics that show how a state is sampled rather than how wrong it is."""
+NEGLIGIBLE = 1e-9
+"""Errors as small as this, of the metric's own scale, are put down to rounding and to the residues of iterative solvers."""
+ULPS_A_STEP = 16.0
+SHORT_OF_ORDER = 0.25
+"""How far three steps may find an order below the one claimed."""
+
+
+def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row]:
+    """Rows of kind `order` and `model_error` from an engine's measurements of a scene at several steps.
+
+    Puts the cause into the measurements that have none yet.
+    """
+    studies: list[Row] = []
+    if not says_something(sorted({row["dt"] for row in rows})):
+        return studies
+    for metric in _metrics(rows):
+        measured = [row for row in rows if row.get("metric") == metric]
+        found = take_apart(*_series(scene, engine, metric, measured))
+        for row in measured:
+            row["cause"] = row["cause"] or found.cause
+        shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}
+        studies += _order_row(scene, engine, shared, found)
+        studies += _limit_row(scene, engine, shared, found, [row["dt"] for row in measured])
+    return studies
+
+
+def _metrics(rows: Iterable[Row]) -> list[str]:
+    return list(
+        dict.fromkeys(row["metric"] for row in rows if row.get("kind") in ("truth", "invariant") and row["metric"] not in ARTEFACTS)
+    )
+
+
+def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row]) -> tuple[Any, ...]:
+    dts, errors, resolutions, steps = (
+        np.array([row[name] for row in measured], dtype=float) for name in ("dt", "value", "resolution", "steps")
+    )
+    scale = scene.body.size + float(np.linalg.norm(scene.start.position)) if METRICS[metric].unit == "m" else 1.0
+    rounding = scale * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(engine.precision).eps) * steps)
+    return dts, errors, resolutions, rounding
+
+
+def _order_row(scene: Scenario, engine: Engine, shared: Row, found: Convergence) -> list[Row]:
+    claimed = engine.order_in(scene) if found.cause == "discretisation" else None
+    if math.isnan(found.order) and claimed != math.inf:
+        return []
+    lower = math.nan if claimed is None else claimed - SHORT_OF_ORDER
+    verdict: Verdict = "measured" if claimed is None else "passed" if found.order >= lower else "failed"
+    steps = ", ".join(f"{dt:g}" for dt in found.window)
+    left_out = "".join(f"; {dt:g} s left out: {why}" for dt, why in found.left_out)
+    claim = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
+    reason = f"fitted at {steps} s{left_out}{claim}" if steps else f"{found.reason}{claim}"
+    return [
+        shared
+        | {"kind": "order", "unit": "1", "value": found.order, "lower": lower, "verdict": verdict, "cause": found.cause, "reason": reason}
+    ]
+
+
+def _limit_row(scene: Scenario, engine: Engine, shared: Row, found: Convergence, dts: Sequence[float]) -> list[Row]:
+    if math.isnan(found.limit):
+        return []
+    reason, verdict = found.reason, "passed"
+    if found.cause == "unresolved":
+        verdict = "measured"
+    if found.cause == "model":
+        fault = known_fault(scene, engine.label, min(dts), METRICS[shared["metric"]], found.limit, found.uncertainty)
+        verdict, reason = ("failed", f"{reason}; no step cures it") if fault is None else ("passed", fault)
+    bounds = {"lower": -found.uncertainty, "upper": found.uncertainty}
+    return [shared | bounds | {"kind": "model_error", "value": found.limit, "verdict": verdict, "cause": found.cause, "reason": reason}]

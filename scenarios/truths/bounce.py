@@ -7,8 +7,8 @@
 For e < 1 the impacts pile up at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time; then the body rests.
 
 Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
-Valid for: a ball on a frictionless floor, with any spin about any axis; a ball or a box without spin that lands on a face, on
-any floor if nothing moves sideways, on a frictionless one otherwise; gravity straight down, no damping.
+Valid for: a ball on a frictionless floor, with any spin about any axis; a box that lands on a face, without spin or with one
+about the vertical; without sideways motion and spin on any floor, with them on a frictionless one; gravity straight down, no damping.
 """
 
 import math
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from scenarios.body import Sphere
 from scenarios.model import Floor, Scenario
-from scenarios.rotations import rotate
+from scenarios.rotations import rotate, unrotate
 from scenarios.truths.flight import flight_states
 from scenarios.truths.truth import Impact, Truth
 
@@ -109,4 +109,12 @@ def _stays_flat(scene: Scenario) -> bool:
     corners = rotate(np.array(start.orientation), scene.body.vertices)
     lowest = corners[corners[:, 1] <= corners[:, 1].min() + 1e-12 * scene.body.size]
     under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size
-    return len(lowest) >= 3 and bool(under_centre) and not any(start.angular_velocity)
+    return len(lowest) >= 3 and bool(under_centre) and _turns_about_the_vertical(scene)
+
+
+def _turns_about_the_vertical(scene: Scenario) -> bool:
+    """Whether a body that lies flat goes on lying flat: without spin, or with one about a vertical principal axis."""
+    w = np.array(scene.start.angular_velocity)
+    momentum = scene.body.inertia_tensor @ unrotate(np.array(scene.start.orientation), w)
+    sideways = np.abs(rotate(np.array(scene.start.orientation), momentum)[[0, 2]]).max()
+    return not w[[0, 2]].any() and bool(sideways <= 1e-12 * np.linalg.norm(momentum))

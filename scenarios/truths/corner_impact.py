@@ -1,4 +1,4 @@
-"""A tilted body falls and strikes the floor with one corner: flight, one impulse, flight.
+"""A body falls and strikes the floor with one corner, one edge or as a ball: flight, one impulse, flight.
 
 With r from the centre of mass to the corner, v_c = v + ω × r, and K = 1/M - r* I⁻¹ r* (the note's eq 15):
 
@@ -6,7 +6,8 @@ With r from the centre of mass to the corner, v_c = v + ω × r, and K = 1/M - r
     sticking       K j = -v_c - e v_n N                     the note's eq 17, Newton's restitution
 
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
-Valid for: one corner alone touches, no damping, from the start to the second impact, which ends it.
+Valid for: one corner alone touches, or the two of an edge that meet the floor at once and with one velocity, before and after; a ball with
+any spin; no damping; from the start to the second impact, or to the first if it does not bounce.
 """
 
 from itertools import pairwise
@@ -29,7 +30,7 @@ UP = np.array([0.0, 1.0, 0.0])
 CHUNK = 4000  # samples of the height at a time, in search of an impact
 FINEST_ANGLE = 0.02  # rad between two samples: a corner moves by less than 1e-4 of the body's size off a straight line
 MOST_CHUNKS = 1000
-ONE_CORNER = 1e-6  # of the body's size: how far above the corner that touches the next one must be
+ONE_CORNER = 1e-9  # of the body's size: how far above the corner that touches another one touches too
 TOUCHING = 1e-9  # of the body's size: how near to the floor counts as on it, as in the scene's own check
 
 
@@ -40,7 +41,7 @@ class TooLong(Exception):
 def corner_impact(scene: Scenario) -> Truth | None:
     """The truth of a drop on one corner."""
     floor = scene.floor
-    if floor is None or scene.damping is not None or isinstance(scene.body, Sphere):
+    if floor is None or scene.damping is not None:
         return None
     if not isinstance(floor.friction, str):
         return None
@@ -52,16 +53,18 @@ def corner_impact(scene: Scenario) -> Truth | None:
         if time is None:
             return Truth("flight", "free flight that ends above the floor", falling, horizon=scene.duration)
         before = falling(np.array([time]))[0]
-        corner = _single_corner(scene, before)
-        if corner is None:
-            return None
+        touching = _touching(scene, before)
         after = before.copy()
-        after[7:13] = velocities_after(before, corner, scene.body.mass, inertia, floor)
+        after[7:13] = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, floor)
+        if not (_move_alike(touching, before) and _move_alike(touching, after)):
+            return None
         leaving = flight_states(after, inertia, g)
-        second = _next_impact(scene, after, leaving, scene.duration - time)
+        second = _next_impact(scene, after, leaving, scene.duration - time) if _leaves(touching[0], after) else 0.0
     except TooLong:
         return None
     horizon = scene.duration if second is None else time + second
+    if horizon == 0.0:
+        return None  # it stays in contact from the start
 
     def states(t: Array) -> Array:
         rows = np.empty((len(t), 13))
@@ -71,8 +74,9 @@ def corner_impact(scene: Scenario) -> Truth | None:
         return rows
 
     law = "normal impulse" if floor.friction == "none" else "sticking impulse, eq 17"
-    statement = f"free rotor and parabola, one corner impact ({law}), free rotor and parabola"
-    return Truth("corner-impact", statement, states, (Impact(time, before, after),), horizon)
+    where = "ball" if isinstance(scene.body, Sphere) else "corner" if len(touching) == 1 else "edge"
+    statement = f"free rotor and parabola, one {where} impact ({law}), free rotor and parabola"
+    return Truth(f"{where}-impact", statement, states, (Impact(time, before, after),), horizon)
 
 
 def velocities_after(state: Array, corner: Array, mass: float, inertia: Array, floor: Floor) -> Array:
@@ -129,15 +133,15 @@ def _next_impact(scene: Scenario, start: Array, states: States, duration: float)
 
 def _within_reach(scene: Scenario, start: Array, duration: float) -> list[tuple[float, float]]:
     """The times [s] at which the centre is so low that a corner may touch the floor: x_y(t) below the body's size."""
-    parabola = [0.5 * scene.acceleration[1], start[8], start[1] - scene.body.size]
+    reach = 1.001 * scene.body.size  # a ball's own reach ends where it touches, which rounding may miss
+    parabola = [0.5 * scene.acceleration[1], start[8], start[1] - reach]
     crossings = sorted(float(root.real) for root in np.roots(parabola) if root.imag == 0.0 and 0.0 < root.real < duration)
     edges = [0.0, *crossings, duration]
     return [(begin, end) for begin, end in pairwise(edges) if np.polyval(parabola, 0.5 * (begin + end)) < 0.0]
 
 
 def _descends(scene: Scenario, state: Array) -> bool:
-    offsets = rotate(state[3:7], scene.body.vertices)
-    lowest = offsets[np.argmin(offsets[:, 1])]
+    lowest = _touching(scene, state)[0]
     speed = state[8] + np.cross(state[10:13], lowest)[1]
     if speed == 0.0:
         return bool(scene.acceleration[1] <= 0.0)
@@ -151,8 +155,19 @@ def _fastest_spin(scene: Scenario, state: Array) -> float:
     return float(np.linalg.norm(momentum) / np.linalg.eigvalsh(inertia)[0])
 
 
-def _single_corner(scene: Scenario, state: Array) -> Array | None:
+def _touching(scene: Scenario, state: Array) -> Array:
+    """Offsets from the centre of mass of the points that are lowest, shape (n, 3)."""
     offsets = rotate(state[3:7], scene.body.vertices)
-    order = np.argsort(offsets[:, 1])
-    gap = offsets[order[1], 1] - offsets[order[0], 1]
-    return offsets[order[0]] if gap > ONE_CORNER * scene.body.size else None
+    lowest = offsets[offsets[:, 1] <= offsets[:, 1].min() + ONE_CORNER * scene.body.size]
+    return lowest - scene.body.rounding * UP
+
+
+def _leaves(point: Array, state: Array) -> bool:
+    velocity = state[7:10] + np.cross(state[10:13], point)
+    return bool(velocity[1] > 1e-12 * np.linalg.norm(state[7:10]))
+
+
+def _move_alike(points: Array, state: Array) -> bool:
+    """Whether points of the body have one velocity, so that one impulse amid them does for all what one at each would do."""
+    velocities = state[7:10] + np.cross(state[10:13], points)
+    return bool(np.ptp(velocities, axis=0).max() <= 1e-9 * np.linalg.norm(velocities, axis=1).max())

@@ -1,37 +1,55 @@
-"""Free flight: the centre of mass on a parabola, the body turning about it as a free rotor.
+"""Free flight: the centre of mass on its path, the body turning about it as a free rotor, both slowed by damping if there is any.
+
+Without damping:
 
     x(t) = x₀ + v₀ t + g t²/2,   v(t) = v₀ + g t
 
-Source: Galileo (1638), Discorsi, fourth day, for the parabola; `free_rotor` for the attitude.
-Valid for: any body without floor and damping, or between two impacts.
+With decay rates k of velocity and κ of angular velocity (v' = g - k v, (I ω)' = -κ I ω), φ₁(z) = (1 - e⁻ᶻ)/z, φ₂(z) = (z - 1 + e⁻ᶻ)/z²:
+
+    x(t) = x₀ + v₀ t φ₁(kt) + g t² φ₂(kt),   v(t) = v₀ e⁻ᵏᵗ + g t φ₁(kt)
+    ω(t) = e^(-κt) Ω(s),  attitude that of the free rotor Ω at the time s = t φ₁(κt)
+
+because the damped Euler equations are the free ones in the time s.
+
+Source: Galileo (1638), Discorsi, fourth day, for the parabola; J. Bernoulli (1719) for a resistance in proportion to speed; `free_rotor`
+for the attitude.
+Valid for: any body without floor, or, undamped, between two impacts.
 """
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import Scenario
+from scenarios.model import Damping, Scenario
 from scenarios.truths.free_rotor import AsymmetricTop, free_rotor
 from scenarios.truths.truth import States, Truth
 
 Array = NDArray[np.float64]
 
+UNDAMPED = Damping()
+SERIES_TERMS = 22  # enough for 17 digits of φ₂ up to z = 1
 
-def flight_states(state: Array, inertia: Array, acceleration: Array) -> States:
+
+def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Damping = UNDAMPED) -> States:
     """Times since `state`, shape (n,), to states, shape (n, 13)."""
     x, q, v, w = state[0:3], state[3:7], state[7:10], state[10:13]
     rotor = free_rotor(inertia, q, w)
 
     def states(t: Array) -> Array:
-        s = t[:, None]
-        orientation, angular_velocity = rotor(t)
-        return np.hstack([x + s * v + 0.5 * s * s * acceleration, orientation, v + s * acceleration, angular_velocity])
+        k, t_ = damping.linear, t[:, None]
+        slowed = t_ * _phi1(k * t_)
+        orientation, angular_velocity = rotor(t * _phi1(damping.angular * t))
+        position = x + slowed * v + t_ * t_ * _phi2(k * t_) * acceleration
+        velocity = np.exp(-k * t_) * v + slowed * acceleration
+        return np.hstack([position, orientation, velocity, np.exp(-damping.angular * t_) * angular_velocity])
 
     return states
 
 
 def flight(scene: Scenario) -> Truth | None:
-    """The truth of a scene in which nothing but gravity acts."""
-    if scene.floor is not None or scene.damping is not None:
+    """The truth of a scene in which nothing but gravity and damping acts."""
+    if scene.floor is not None:
         return None
     q, w = np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
     rotor = free_rotor(scene.body.inertia_tensor, q, w)
@@ -42,5 +60,22 @@ def flight(scene: Scenario) -> Truth | None:
     else:
         name = "principal-spin" if np.any(w) else "parabola"
         turning = "angular velocity constant, angle ωt" if np.any(w) else "orientation constant"
-    states = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration)
+    if scene.damping is not None:
+        name = f"damped-{name}"
+        parabola = "" if scene.gravity is None else "path of resistance in proportion to speed; "
+        turning += ", in the time (1 - exp(-κt))/κ, all rates decaying"
+    states = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration, scene.damping or UNDAMPED)
     return Truth(name, parabola + turning, states)
+
+
+def _phi1(z: Array) -> Array:
+    """(1 - e⁻ᶻ)/z, 1 at 0."""
+    safe = np.where(z == 0.0, 1.0, z)
+    return np.where(z == 0.0, 1.0, -np.expm1(-safe) / safe)
+
+
+def _phi2(z: Array) -> Array:
+    """(z - 1 + e⁻ᶻ)/z², 1/2 at 0; by its series where the difference would lose digits."""
+    series = np.polynomial.polynomial.polyval(np.minimum(z, 1.0), [(-1.0) ** n / math.factorial(n + 2) for n in range(SERIES_TERMS)])
+    safe = np.maximum(z, 1.0)
+    return np.where(z < 1.0, series, (safe + np.expm1(-safe)) / (safe * safe))

@@ -8,11 +8,11 @@ import mpmath
 from mpmath import mp, mpf
 
 
-def free_rotor(moments, spin, quaternion, times, digits=40, order=40, step="0.4"):
+def free_rotor(moments, spin, quaternion, times, digits=40, order=40, step="0.4", damping=0.0):
     """Quaternions [x, y, z, w] (body to world) and body-frame spins at ascending times, from t = 0.
 
     Everything starts from the exact values of the doubles given. `step` is divided by the spin, so that the series converge
-    alike for slow and fast bodies.
+    alike for slow and fast bodies. `damping` is the decay rate κ of (I ω)' = -κ I ω.
     """
     with mp.workdps(digits):
         moments = [mpf(m) for m in moments]
@@ -24,13 +24,13 @@ def free_rotor(moments, spin, quaternion, times, digits=40, order=40, step="0.4"
         for time in times:
             while t < time:
                 h = min(longest, mpf(time) - t)
-                spin, quaternion = _advance(moments, spin, quaternion, h, order)
+                spin, quaternion = _advance(moments, spin, quaternion, h, order, mpf(damping))
                 t += h
             states.append(([+c for c in quaternion], [+w for w in spin]))
     return states
 
 
-def _advance(moments, spin, quaternion, h, order):
+def _advance(moments, spin, quaternion, h, order, damping):
     I1, I2, I3 = moments
     factors = ((I2 - I3) / I1, (I3 - I1) / I2, (I1 - I2) / I3)
     w = [[c] for c in spin]
@@ -49,7 +49,7 @@ def _advance(moments, spin, quaternion, h, order):
             -conv(0, 0) - conv(1, 1) - conv(2, 2),
         )
         for series, factor, product in zip(w, factors, products, strict=True):
-            series.append(factor * product / (n + 1))
+            series.append((factor * product - damping * series[n]) / (n + 1))
         for series, rate in zip(q, rates, strict=True):
             series.append(rate / 2 / (n + 1))
     return [mpmath.polyval(s, h, asc=True) for s in w], [mpmath.polyval(s, h, asc=True) for s in q]

@@ -87,14 +87,14 @@ def test_sideways_motion_and_spin_go_on():
 
 def test_what_it_is_not_valid_for():
     """A rough floor with sideways motion, a tilted box, damping, slanting gravity: no ladder."""
-    assert truth_for(ball(velocity=(1.0, 0.0, 0.0), friction="infinite")) is None
+    assert truth_for(ball(velocity=(1.0, 0.0, 0.0), friction="infinite")).name == "ball-impact"
     assert truth_for(ball(spin=(1.0, 0.0, 0.0), friction=0.3)) is None
     assert truth_for(ball(friction="infinite")).name == "bounce-ladder"
     box = ball().model_dump(exclude_none=True)
     box["body"] = {"shape": "box", "mass": 1.0, "half_extents": [0.1, 0.1, 0.1]}
     assert truth_for(load(box)).name == "bounce-ladder"
     box["start"]["orientation"] = [0.0, 0.0, 0.1, 1.0]
-    assert truth_for(load(box)) is None  # lands on an edge: two corners at once
+    assert truth_for(load(box)).name == "edge-impact"
     assert truth_for(load(ball().model_dump(exclude_none=True) | {"damping": {"linear": 0.1}})) is None
 
 
@@ -115,5 +115,20 @@ def test_a_hair_above_the_floor_is_on_it(height):
 
 
 def test_more_bounces_than_can_be_listed():
-    """There is no ladder of a million rungs: no truth, and no exhausted memory."""
-    assert truth_for(ball(1.0, 1e-6, duration=3600.0)) is None
+    """There is no ladder of a million rungs: the truth ends at the second impact, and memory does not."""
+    truth = truth_for(ball(1.0, 1e-6, duration=3600.0))
+    assert (truth.name, len(truth.events)) == ("ball-impact", 1)
+
+
+def test_a_flat_box_may_spin_about_the_vertical():
+    """On a smooth floor it lands flat whatever its turn; about any other axis it does not."""
+    box = ball().model_dump(exclude_none=True)
+    box["body"] = {"shape": "box", "mass": 1.0, "half_extents": [0.1, 0.1, 0.3]}
+    box["start"] |= {"angular_velocity": [0.0, 3.0, 0.0]}
+    truth = truth_for(load(box))
+    assert truth.name == "bounce-ladder"
+    turned = truth([0.5]).orientation[0]
+    np.testing.assert_allclose(turned, [0, np.sin(0.75), 0, np.cos(0.75)], atol=1e-15)
+    assert truth_for(load(box | {"floor": {"restitution": 0.5, "friction": "infinite"}})) is None
+    box["start"] |= {"angular_velocity": [0.1, 3.0, 0.0]}
+    assert truth_for(load(box)) is None or truth_for(load(box)).name != "bounce-ladder"

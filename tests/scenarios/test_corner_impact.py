@@ -116,12 +116,14 @@ def test_it_ends_with_the_second_impact():
 
 
 def test_scenes_without_it():
-    """An edge that lands flat, a Coulomb floor, damping: no closed form here; a flight that ends in the air has one."""
+    """A Coulomb floor, an edge whose ends move apart, damping: no closed form here; a flight that ends in the air has one."""
     content = dropped_from_rest("none").model_dump(exclude_none=True)
     coulomb = content | {"floor": {"restitution": 0.5, "friction": 0.3}}
     assert truth_for(load(coulomb)) is None
-    edge = content | {"start": {"position": [0, 1.5, 0], "orientation": [0.3, 0, 0, 1]}}
-    assert truth_for(load(edge)) is None
+    spinning_edge = content | {"start": {"position": [0, 1.5, 0], "orientation": [0.3, 0, 0, 1], "velocity": [0, 0, 1]}}
+    assert truth_for(load(spinning_edge)).name == "edge-impact"
+    spinning_edge["start"] |= {"velocity": [0, 0, 0], "angular_velocity": [0, 0, 0.1]}
+    assert truth_for(load(spinning_edge)) is None or truth_for(load(spinning_edge)).name == "corner-impact"
     assert truth_for(load(content | {"damping": {"linear": 0.1}})) is None
     assert truth_for(load(content | {"duration": 0.3})).events == ()
 
@@ -172,3 +174,69 @@ def test_fast_spins_do_not_slip_between_samples(speed):
     [impact] = truth_for(scene).events
     t, h = heights(scene, turn)
     assert impact.time == pytest.approx(t[np.argmax(h < 0)], abs=turn / 100_000)
+
+
+def ball_with_spin(friction, inertia="solid"):
+    return load(
+        {
+            "name": "backspin",
+            "duration": 0.5,
+            "body": {"shape": "sphere", "radius": 0.1, "mass": 1.5, "inertia": inertia},
+            "start": {"position": [0, 0.5, 0], "velocity": [2, -3, 0.5], "angular_velocity": [1.0, 7.0, 40.0]},
+            "floor": {"restitution": 0.8, "friction": friction},
+        }
+    )
+
+
+@pytest.mark.parametrize("beta", [0.4, 2 / 3])
+def test_a_ball_that_grips_leaves_as_the_closed_form_says(beta):
+    """v_x+ = v_x - β (v_x + R ω_z)/(1 + β), ω_z+ = -v_x+/R: the contact point stops; likewise across. To 1e-14."""
+    moment = beta * 1.5 * 0.1**2
+    truth = truth_for(ball_with_spin("infinite", [moment] * 3))
+    [impact] = truth.events
+    after = impact.after
+    assert impact.time == pytest.approx(0.4 / 3, abs=1e-15)
+    vx, vz = 2 - beta * (2 + 0.1 * 40) / (1 + beta), 0.5 - beta * (0.5 - 0.1 * 1) / (1 + beta)
+    np.testing.assert_allclose(after[7:10], [vx, 2.4, vz], rtol=0, atol=1e-14 * 3)
+    np.testing.assert_allclose(after[10:13], [vz / 0.1, 7.0, -vx / 0.1], rtol=0, atol=1e-13 * 40)
+    assert truth.horizon == 0.5
+
+
+def test_a_ball_on_a_smooth_floor_keeps_its_spin():
+    """Only the normal velocity turns round."""
+    scene = ball_with_spin("none")
+    after = truth_for(scene)([0.5]).states[0]
+    np.testing.assert_allclose(after[7:13], [2, 2.4, 0.5, 1, 7, 40], rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("friction", ["none", "infinite"])
+def test_an_edge_strikes_as_one_point_at_its_middle(friction):
+    """Two equal impulses by symmetry: u_n+ = -e u_n at both corners, energy balance of the planar collision. To 1e-13."""
+    content = dropped_from_rest(friction).model_dump(exclude_none=True)
+    start = {"position": [0, 1.5, 0], "orientation": [0, 0, np.sin(0.2), np.cos(0.2)]}
+    scene = load(content | {"start": start, "duration": 0.6})
+    [impact] = truth_for(scene).events
+    half = np.array(scene.body.half_extents)
+    c, s = np.cos(0.4), np.sin(0.4)
+    r = np.array([-c * half[0] + s * half[1], -s * half[0] - c * half[1]])  # the lower edge: x and y from the centre
+    u = impact.before[8]
+    M, moment = scene.body.mass, scene.body.inertia_tensor[2, 2]
+    if friction == "none":
+        j = np.array([0.0, -(1 + 0.5) * u / (1 / M + r[0] ** 2 / I)])
+    else:
+        K = np.eye(2) / M + np.array([[r[1] ** 2, -r[0] * r[1]], [-r[0] * r[1], r[0] ** 2]]) / moment
+        j = np.linalg.solve(K, [0.0, -(1 + 0.5) * u])
+    spin = (r[0] * j[1] - r[1] * j[0]) / moment
+    np.testing.assert_allclose(impact.after[7:9], impact.before[7:9] + j / M, rtol=0, atol=1e-13 * abs(u))
+    np.testing.assert_allclose(impact.after[10:13], [0, 0, spin], rtol=0, atol=1e-12 * abs(spin))
+
+
+def test_a_body_that_stays_on_the_floor_has_no_impact_truth():
+    """Put down on a corner it stays in contact: no free flight. Dropped without restitution, the truth ends where it lands."""
+    content = dropped_from_rest("infinite").model_dump(exclude_none=True)
+    scene = load(content)
+    content["floor"] |= {"restitution": 0.0}
+    dropped = truth_for(load(content))
+    assert dropped.horizon == dropped.events[0].time
+    content["start"] |= {"position": [0.0, scene.start.position[1] - scene.clearance, 0.0]}
+    assert truth_for(load(content)) is None

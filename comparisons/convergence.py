@@ -4,8 +4,8 @@
 
 An error whose limit is 0 is the step's; one whose limit is not 0 is the model's. The limit is Richardson's, from the three finest steps and
 the order, among those that methods have, that is nearest to the one observed. It is found again from the observed order itself and from
-each pair of powers that might look like it; how far these limits are apart is what neglected powers of the step may amount to, and 1.25
-times that (Roache's factor) is the uncertainty.
+each pair of powers that might look like it; how far these limits are apart is what neglected powers of the step may amount to, and three
+times that (Roache's factor for an order that is not known beforehand) is the uncertainty.
 
 Source: L. F. Richardson & J. A. Gaunt, Phil. Trans. R. Soc. A 226 (1927); P. J. Roache, J. Fluids Engineering 116 (1994).
 """
@@ -32,13 +32,19 @@ MIXED_WITH = {
     4.0: [(3.0, 4.0), (4.0, 5.0), (4.0, 6.0)],
 }
 """The orders that methods have, and the pairs of powers of the step that three steps may show as about that order."""
-NEAR_AN_ORDER = 0.3
-SAFETY = 1.25
+NEAR_AN_ORDER = 0.15
+PLAIN_SERIES = 2.0
+"""A sum of powers of the step whose terms add up to more than this many times their sum explains an error by cancellation only."""
+SAFETY = 3.0
 LOWEST_ORDER, HIGHEST_ORDER = 0.5, 8.0
 SAME_SLOPE = 0.3
 """Slopes between neighbouring steps that differ by less belong to one power of the step."""
+SAME_ORDER = 0.05
+"""Slopes that differ by less are those of the finest steps to come."""
 TOO_FAR_FOR_CHANCE = 10.0
 """Errors no larger than rounding may still follow a power of the step, if they fall by so much."""
+GROWTH = 1.25
+"""An error that is larger by this factor at the finest step than at any coarser one grows as the step shrinks."""
 PLATEAU = 0.1
 """An error that changes by a smaller share over the steps does not depend on them."""
 
@@ -55,6 +61,7 @@ class Convergence:
         limit: The error that stays as the step goes to 0, in the metric's unit; NaN where it cannot be told.
         uncertainty: Of the limit.
         reason: A sentence.
+        is_asymptotic: Whether the order does not change from step to step, so that finer steps would show it too.
     """
 
     cause: Cause
@@ -64,6 +71,7 @@ class Convergence:
     limit: float
     uncertainty: float
     reason: str
+    is_asymptotic: bool = True
 
 
 def says_something(dts: Sequence[float]) -> bool:
@@ -71,7 +79,7 @@ def says_something(dts: Sequence[float]) -> bool:
     return len(dts) >= LEAST_STEPS and max(dts) / min(dts) >= SMALLEST_RANGE
 
 
-def take_apart(dts: Array, errors: Array, resolution: Array, rounding: Array) -> Convergence:
+def take_apart(dts: Array, errors: Array, resolution: Array, rounding: Array, claimed: float | None = None) -> Convergence:
     """The order, limit and cause of one error.
 
     Args:
@@ -79,6 +87,7 @@ def take_apart(dts: Array, errors: Array, resolution: Array, rounding: Array) ->
         errors: The error at each, with its sign if it has one; NaN where the step was too coarse to tell.
         resolution: How finely each was measured (start phases are a sample), in the same unit.
         rounding: What rounding alone may have brought about.
+        claimed: The order that the method is known to have, if it is; else lower powers of the step may hide behind a higher one.
     """
     coarsest_first = np.argsort(-dts)
     h, e, noise, floor = (values[coarsest_first] for values in (dts, errors, resolution, rounding))
@@ -100,16 +109,18 @@ def take_apart(dts: Array, errors: Array, resolution: Array, rounding: Array) ->
         told = "smaller at every step than the start phases resolve"
         return Convergence("discretisation", math.nan, (), untold, float(e[-1]), float(noise[-1] + floor[-1]), told)
     finest = slice(window.stop - 3, window.stop) if steps else slice(len(h) - 3, len(h))
-    observed, limit, uncertainty = _limit(h[finest], e[finest], noise[finest])
+    observed, limit, uncertainty = _limit(h[finest], e[finest], noise[finest], claimed)
     uncertainty += float(floor[-1])
     if math.isnan(observed) and steps:
-        told = f"shrinks as step^{order:.2f}; its limit is finer than the start phases resolve"
-        return Convergence("discretisation", order, steps, left_out, float(e[-1]), float(abs(e[-1]) + noise[-1] + floor[-1]), told)
+        told = f"shrinks as step^{order:.2f}; its limit cannot be told"
+        most = float(abs(e[-1]) + noise[-1] + floor[-1])
+        return Convergence("discretisation", order, steps, left_out, float(e[-1]), most, told, _is_asymptotic(h[window], e[window]))
     if math.isnan(observed):
         return _without_a_power(h, e, noise + floor, untold)
     if abs(limit) <= uncertainty:
         fitted, within = (order, steps) if steps else (observed, tuple(float(step) for step in h[finest]))
-        return Convergence("discretisation", fitted, within, left_out, limit, uncertainty, f"shrinks as step^{fitted:.2f}")
+        told = f"shrinks as step^{fitted:.2f}"
+        return Convergence("discretisation", fitted, within, left_out, limit, uncertainty, told, _is_asymptotic(h[finest], e[finest]))
     told = f"approaches a wrong limit as step^{observed:.2f}"
     return Convergence("model", observed, tuple(float(step) for step in h[finest]), untold, limit, uncertainty, told)
 
@@ -134,11 +145,15 @@ def _window(h: Array, e: Array, floor: Array) -> slice:
     return slice(0, 0)
 
 
+def _is_asymptotic(h: Array, e: Array) -> bool:
+    return bool(np.ptp(np.diff(np.log(np.abs(e))) / np.diff(np.log(h))) <= SAME_ORDER)
+
+
 def _outside(window: slice, count: int) -> list[int]:
     return [n for n in range(count) if window.stop > 0 and not window.start <= n < window.stop]
 
 
-def _limit(h: Array, e: Array, noise: Array) -> tuple[float, float, float]:
+def _limit(h: Array, e: Array, noise: Array, claimed: float | None) -> tuple[float, float, float]:
     """Observed order, limit and its uncertainty from three steps, coarsest first; NaN where they follow no power of the step."""
     first, second = e[0] - e[1], e[1] - e[2]
     if abs(second) <= noise[1] + noise[2] or second == 0.0:
@@ -151,7 +166,8 @@ def _limit(h: Array, e: Array, noise: Array) -> tuple[float, float, float]:
         return math.nan, math.nan, math.nan
     observed = float(brentq(excess, LOWEST_ORDER, HIGHEST_ORDER))
     nearest = min(MIXED_WITH, key=lambda p: abs(p - observed))
-    if abs(nearest - observed) > NEAR_AN_ORDER:
+    could_hide_lower_powers = nearest > 1.0 and nearest != claimed and _is_a_plain_series(h, e)
+    if abs(nearest - observed) > NEAR_AN_ORDER or could_hide_lower_powers:
         return math.nan, math.nan, math.nan
 
     def without(*powers: float) -> float:
@@ -166,13 +182,20 @@ def _limit(h: Array, e: Array, noise: Array) -> tuple[float, float, float]:
     return observed, limit, float(SAFETY * np.max(np.abs(limit - np.array(others))) + from_noise)
 
 
+def _is_a_plain_series(h: Array, e: Array) -> bool:
+    """Whether C₁ h + C₂ h² + C₃ h³ meets three errors without terms that cancel at the coarsest step."""
+    terms = np.linalg.solve((h[:, None] / h[0]) ** np.array([1.0, 2.0, 3.0]), e)
+    return bool(np.sum(np.abs(terms)) <= PLAIN_SERIES * abs(e[0]))
+
+
 def _without_a_power(h: Array, e: Array, small: Array, untold: tuple[tuple[float, str], ...]) -> Convergence:
     """What can be said of an error that follows no power of the step."""
     limit, spread = float(e[-1]), float(np.ptp(e[-3:]) + small[-1])
-    if spread <= PLATEAU * abs(limit) + small[-1] and abs(limit) > spread:
+    settles = abs(e[-2] - e[-1]) <= abs(e[-3] - e[-2]) + small[-2] + small[-1]
+    if settles and spread <= PLATEAU * abs(limit) + small[-1] and abs(limit) > spread:
         return Convergence("model", math.nan, (), untold, limit, spread, "does not depend on the step")
     coarser = float(np.max(np.abs(e[:-1])))
-    if abs(limit) > SAFETY * coarser + small[-1]:
+    if abs(limit) > GROWTH * coarser + small[-1]:
         return Convergence("model", math.nan, (), untold, limit, 0.0, "grows as the step shrinks")
     if abs(limit) <= coarser * math.sqrt(h[-1] / h[0]) + small[-1]:
         return Convergence("discretisation", math.nan, (), untold, limit, abs(limit) + small[-1], "shrinks, but as no power of the step")

@@ -12,15 +12,15 @@ from comparisons.convergence import take_apart
 H = np.array([4e-3, 2e-3, 1e-3])
 
 
-def apart(errors, h=H, noise=0.0, floor=1e-12):
-    return take_apart(np.asarray(h), np.asarray(errors, dtype=float), np.full(len(h), noise), np.full(len(h), floor))
+def apart(errors, h=H, noise=0.0, floor=1e-12, claimed=None):
+    return take_apart(np.asarray(h), np.asarray(errors, dtype=float), np.full(len(h), noise), np.full(len(h), floor), claimed)
 
 
 @pytest.mark.parametrize("p", [1, 2, 3, 4])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_pure_power_has_its_order_and_no_limit(p, sign):
     """To rounding; all three steps are in the window."""
-    found = apart(sign * 7.0 * H**p, floor=1e-30)
+    found = apart(sign * 7.0 * H**p, floor=1e-30, claimed=p)
     assert found.cause == "discretisation"
     assert found.order == pytest.approx(p, abs=1e-9)
     assert abs(found.limit) <= 1e-9 * abs(7.0 * H[-1] ** p)
@@ -32,7 +32,7 @@ def test_a_pure_power_has_its_order_and_no_limit(p, sign):
 def test_a_limit_that_is_not_zero_is_found_below_the_finest_error(p, share):
     """An error m + C hᵖ with m a thousandth of what the finest step shows: the model's, and m to rounding."""
     m = share * H[-1] ** p
-    found = apart(m + H**p, floor=1e-30)
+    found = apart(m + H**p, floor=1e-30, claimed=p)
     assert found.cause == "model"
     assert found.order == pytest.approx(p, abs=1e-6)
     assert found.limit == pytest.approx(m, rel=1e-6)
@@ -63,6 +63,26 @@ def test_the_limit_is_within_its_uncertainty(second, share, sign):
     found = apart(m + H + second * H**2)
     if found.cause == "model" and not math.isnan(found.order):
         assert abs(found.limit - m) <= found.uncertainty + 1e-15
+
+
+@given(st.floats(0.1, 1.0), st.sampled_from([1.0, -1.0]))
+def test_an_error_that_grows_or_saturates_within_a_step_is_no_model_error(rate, sense):
+    """An error e^(±ah) - 1, as of methods that gain or lose energy, with a times the coarsest step up to 2: all powers of the step at once."""
+    found = apart(np.expm1(sense * rate * H / 2e-3))
+    assert found.cause in ("discretisation", "unresolved")
+
+
+def test_without_a_claim_a_higher_power_may_hide_a_lower_one():
+    """An error m + h², m of the size of the finest error, may as well be h + h²: no model error unless the order is known to be 2."""
+    errors = H[-1] ** 2 + H**2
+    assert apart(errors, floor=1e-30).cause == "discretisation"
+    assert apart(errors, floor=1e-30, claimed=2.0).cause == "model"
+
+
+def test_an_order_that_changes_from_step_to_step_is_not_asymptotic():
+    """Only an order that stays may be held against a claim."""
+    assert apart(H).is_asymptotic
+    assert not apart(H + 100.0 * H**2).is_asymptotic
 
 
 def test_a_plateau_is_the_model():

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from comparisons.convergence import Convergence, says_something, take_apart
 from comparisons.engines.base import Engine
@@ -17,6 +18,7 @@ from comparisons.verdicts import Verdict, known_fault
 from scenarios import Scenario
 
 Row = dict[str, Any]
+Array = NDArray[np.float64]
 
 ARTEFACTS = frozenset({"energy_error_raw"})
 """Metrics that show how a state is sampled rather than how wrong it is."""
@@ -39,7 +41,8 @@ def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row
         return studies
     for metric in _metrics(rows):
         measured = [row for row in rows if row.get("metric") == metric]
-        found = take_apart(*_series(scene, engine, metric, measured), engine.order_in(scene))
+        dts, errors, resolutions, rounding = _series(scene, engine, metric, measured)
+        found = take_apart(dts, errors, resolutions, rounding, engine.order_in(scene))
         for row in measured:
             row["cause"] = row["cause"] or found.cause
         shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}
@@ -54,7 +57,7 @@ def _metrics(rows: Iterable[Row]) -> list[str]:
     )
 
 
-def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row]) -> tuple[Any, ...]:
+def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row]) -> tuple[Array, Array, Array, Array]:
     dts, errors, resolutions, steps = (
         np.array([row[name] for row in measured], dtype=float) for name in ("dt", "value", "resolution", "steps")
     )

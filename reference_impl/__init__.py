@@ -3,6 +3,7 @@
 It knows no scene and no engine. README.md beside this file is the ledger: equation, function, test.
 """
 
+from reference_impl import sources  # noqa: F401  # isort: skip  # before anything that is compiled from them
 from reference_impl.body import Body, Floor, World
 from reference_impl.inertia import solid_box_inertia, solid_sphere_inertia, total_mass, vertex_inertia
 from reference_impl.methods import Methods

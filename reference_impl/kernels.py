@@ -6,6 +6,8 @@ So kernels are kept in a folder named after everything that goes into them.
 
 import hashlib
 import os
+import shutil
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,13 +15,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import numba
 import numpy as np
 from numba import njit
 from numba.core import config as numba_config
 from numpy.typing import NDArray
 
-from reference_impl import lanes
+from reference_impl import lanes, sources
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS, Methods
 from reference_impl.parameters import (
     STEP_SIZE,
@@ -36,7 +39,8 @@ from reference_impl.vectors import compiled
 
 Array = NDArray[np.float64]
 config: Any = numba_config  # numba sets its attributes at run time, which its type hints do not know
-PACKAGE = Path(__file__).parent
+COMPILER_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "CPU_NAME", "CPU_FEATURES", "ENABLE_AVX", "DEBUGINFO_DEFAULT")
+KEPT_FOLDERS = 8
 
 
 @dataclass(frozen=True)
@@ -132,26 +136,36 @@ def compile_cached(function: Callable[..., Any]) -> Callable[..., Any]:
 @contextmanager
 def _cache_folder() -> Iterator[bool]:
     """Point numba at this package's own folder while a kernel is declared; the user's setting is left as it was."""
-    kept = config.CACHE_DIR
-    base = Path(kept) if kept else PACKAGE / "__pycache__"
-    folder = base / f"dropspin-{_fingerprint()}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        config.CACHE_DIR = str(folder)
-        yield os.access(folder, os.W_OK)
-    except OSError:
-        yield False
-    finally:
-        config.CACHE_DIR = kept
+    with _declaring:
+        kept = config.CACHE_DIR
+        base = Path(kept) if kept else sources.PACKAGE / "__pycache__"
+        folder = base / f"dropspin-{_fingerprint()}"
+        try:
+            _make_room(folder)
+            config.CACHE_DIR = str(folder)
+            yield os.access(folder, os.W_OK)
+        except OSError:
+            yield False
+        finally:
+            config.CACHE_DIR = kept
 
 
-@cache
+_declaring = threading.Lock()  # numba's setting is one for all threads
+
+
+def _make_room(folder: Path) -> None:
+    """Make the folder, and remove those of sources and settings that have gone out of use."""
+    if folder.is_dir():
+        return
+    folder.mkdir(parents=True)
+    others = sorted(folder.parent.glob("dropspin-*"), key=lambda path: path.stat().st_mtime)
+    for stale in others[:-KEPT_FOLDERS]:
+        shutil.rmtree(stale, ignore_errors=True)
+
+
 def _fingerprint() -> str:
-    """A hash of every source file of the package, of numba's version and of its settings in the environment."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(PACKAGE.rglob("*.py")):
-        digest.update(str(source.relative_to(PACKAGE)).encode() + b"\0" + source.read_bytes())
-    for name in sorted(os.environ):
-        if name.startswith("NUMBA_") and name != "NUMBA_CACHE_DIR":
-            digest.update(f"{name}={os.environ[name]}".encode())
+    """A hash of every source file of the package, of the compilers' versions, and of the settings that change what they compile."""
+    digest = hashlib.sha256(f"{sources.HASH} {numba.__version__} {llvmlite.__version__}".encode())
+    for name in COMPILER_SETTINGS:
+        digest.update(f"{name}={getattr(config, name, None)}".encode())
     return digest.hexdigest()[:16]

@@ -133,8 +133,8 @@ def _teach(symbol: Callable[..., Any], operands: int, operand: Any, result: Any,
         return build(builder, *arguments)
 
 
-def _comparison(sign: str, ordered: bool = True) -> Callable[..., ir.Value]:
-    return lambda builder, a, b: (builder.fcmp_ordered if ordered else builder.fcmp_unordered)(sign, a, b)
+def _comparison(sign: str) -> Callable[..., ir.Value]:
+    return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
 _teach(operator.add, 2, LANES, LANES, lambda builder, a, b: builder.fadd(a, b))
@@ -147,7 +147,6 @@ _teach(operator.le, 2, LANES, MASK, _comparison("<="))
 _teach(operator.gt, 2, LANES, MASK, _comparison(">"))
 _teach(operator.ge, 2, LANES, MASK, _comparison(">="))
 _teach(operator.eq, 2, LANES, MASK, _comparison("=="))
-_teach(operator.ne, 2, LANES, MASK, _comparison("!=", ordered=False))
 _teach(operator.and_, 2, MASK, MASK, lambda builder, a, b: builder.and_(a, b))
 _teach(operator.or_, 2, MASK, MASK, lambda builder, a, b: builder.or_(a, b))
 

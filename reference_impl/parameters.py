@@ -18,6 +18,9 @@ Test = Callable[[Array], NDArray[np.bool_]]
 STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, RADIUS, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 36
 
 
+FRICTION = FLOOR + 1
+
+
 class Parameters(NamedTuple):
     """Bodies in their worlds, at their step sizes: one row for all, or one for each."""
 
@@ -68,13 +71,15 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
     """What was given, the shape of one body's, what is allowed, in words and as a test."""
     floor = world.floor or Floor(0.0, 0.0)
     gravity = np.zeros(3) if world.gravity is None else world.gravity
+    if world.damping is not None and len(world.damping) != 2:
+        raise ValueError(f"damping: got {world.damping!r}; must be two rates, of velocity and of angular velocity, in 1/s")
     linear, angular = world.damping or (0.0, 0.0)
-    vertices = max(1, *np.shape(body.points)[-2:-1])
+    vertices = max(1, *_numbers("points", body.points, "finite numbers, in m").shape[-2:-1], 1)
     return {
         "dt": (dt, (), "a number above 0, in s", _is_above_zero),
         "gravity": (gravity, (3,), "finite numbers, in m/s²", is_finite),
-        "linear damping": (linear, (), "a finite number, in 1/s", is_finite),
-        "angular damping": (angular, (), "a finite number, in 1/s", is_finite),
+        "linear damping": (linear, (), "0 or more, in 1/s", _is_not_negative),
+        "angular damping": (angular, (), "0 or more, in 1/s", _is_not_negative),
         "restitution": (floor.restitution, (), "between 0 and 1", lambda e: (e >= 0.0) & (e <= 1.0)),
         "friction": (floor.friction, (), "0 or more", lambda f: f >= 0.0),
         "rest_speed": (floor.rest_speed, (), "0 or more, in m/s", _is_not_negative),
@@ -98,11 +103,17 @@ def _is_not_negative(values: Array) -> NDArray[np.bool_]:
     return is_finite(values) & (values >= 0.0)
 
 
+SINGULAR = 1e-13
+"""Moments this much smaller than the largest are the rounding of 0: points on one line have none about it."""
+SMALLEST = 1e-290  # kg m²; the inverse must be a number too
+
+
 def _is_inertia(matrices: Array) -> NDArray[np.bool_]:
     usable = np.where(is_finite(matrices)[:, np.newaxis, np.newaxis], matrices, -np.eye(3))
     lowest = np.linalg.eigvalsh(usable)[:, 0]
     lopsided = np.abs(usable - usable.transpose(0, 2, 1)).max(axis=(1, 2))
-    return (lowest > 0.0) & (lopsided <= 1e-12 * np.abs(usable).max(axis=(1, 2)))
+    highest = np.abs(usable).max(axis=(1, 2))
+    return (lowest > SINGULAR * highest) & (highest > SMALLEST) & (lopsided <= 1e-12 * highest)
 
 
 def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, holds: Test) -> Array:
@@ -111,19 +122,26 @@ def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, 
     Raises:
         ValueError: It has another shape, or is not as allowed; of an ensemble the text says whose.
     """
-    try:
-        array = np.ascontiguousarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: got {values!r}; must be {allowed}") from None
-    if np.ndim(values) == len(shape):
-        array = array.reshape(1, *np.shape(values))
+    given = _numbers(name, values, allowed)
+    array = given[np.newaxis] if given.ndim == len(shape) else given
     if array.shape[1:] != shape or len(array) == 0:
-        raise ValueError(f"{name}: must have shape {shape} or {('B', *shape)}, got {np.shape(values)}".replace("'", ""))
+        raise ValueError(f"{name}: must have shape {shape} or {('B', *shape)}, got {given.shape}".replace("'", ""))
     wrong = np.flatnonzero(~holds(array))
     if len(wrong):
-        whose = f" for body {wrong[0]}" if np.ndim(values) > len(shape) else ""
+        whose = f" for body {wrong[0]}" if given.ndim > len(shape) else ""
         raise ValueError(f"{name}: got {array[wrong[0]].tolist()}{whose}; must be {allowed}")
     return array
+
+
+def _numbers(name: str, values: ArrayLike, allowed: str) -> Array:
+    """A copy of what was given, so that what becomes of the caller's array does not matter."""
+    try:
+        given = np.asarray(values)
+    except ValueError:  # rows of different length
+        given = np.asarray(None)
+    if given.dtype.kind not in "iuf":
+        raise ValueError(f"{name}: got {values!r}; must be {allowed}")
+    return np.array(given, dtype=float, order="C")
 
 
 def ensemble_size(quantities: Mapping[str, Array]) -> int:

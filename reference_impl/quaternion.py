@@ -2,7 +2,7 @@
 
 import math
 
-from reference_impl.vectors import Mat3, Quat, Vec3, compiled
+from reference_impl.vectors import Mat3, Quat, Vec3, compiled, transpose
 
 
 @compiled
@@ -25,7 +25,7 @@ def conjugate(q):
 @compiled
 def normalise(q):
     """Eq 3: back to unit length."""
-    return q / math.sqrt((q.x * q.x + q.y * q.y) + (q.z * q.z + q.w * q.w))
+    return q / math.sqrt(_square(q))
 
 
 @compiled
@@ -53,3 +53,23 @@ def rotation_matrix(q):
         Vec3(2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
         Vec3(2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
     )
+
+
+@compiled
+def to_world(q, a):
+    """R a, from the body's frame to the world's.
+
+    Divided by q·q, which rounding leaves a little off 1, always to the same side: a spin that went to and fro at every step would drift.
+    """
+    return (rotation_matrix(q) @ a) / _square(q)
+
+
+@compiled
+def to_body(q, a):
+    """Rᵀ a, from the world's frame to the body's."""
+    return (transpose(rotation_matrix(q)) @ a) / _square(q)
+
+
+@compiled
+def _square(q):
+    return (q.x * q.x + q.y * q.y) + (q.z * q.z + q.w * q.w)

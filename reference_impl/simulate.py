@@ -1,11 +1,12 @@
 """The Python boundary: flat float64 arrays in and out, value types in between."""
 
 import math
+import operator
 import os
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from reference_impl import lanes
 from reference_impl.body import Body, World
 from reference_impl.kernels import Parts, blocks, config, recording_kernel
 from reference_impl.methods import Methods
-from reference_impl.parameters import checked, ensemble_size, is_finite, pack
+from reference_impl.parameters import FRICTION, checked, ensemble_size, is_finite, pack
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,8 @@ def step(
     """Advance one state, or an ensemble of them, by one step of the note's Algorithm 1.
 
     Args:
-        states: Position [m], orientation [x, y, z, w], velocity [m/s], angular velocity [rad/s], shape (13,) or (B, 13).
+        states: Position [m], orientation [x, y, z, w] (brought to length 1), velocity [m/s], angular velocity [rad/s], shape (13,) or
+            (B, 13).
         body: The body, or an ensemble of B.
         world: What acts on it.
         dt: Time step [s], one for all or shape (B,).
@@ -78,7 +80,8 @@ def simulate(
         steps: Number of steps.
         every: Steps between two rows of the result. Left-over steps at the end are not taken.
         methods: As in `step`.
-        threads: How many threads share an ensemble. None: as many as this process may use processors.
+        threads: How many threads share an ensemble. None: as many as this process may use processors, where that saves time. Ctrl-C
+            takes effect between blocks of bodies; one body runs to its end.
 
     Returns:
         The states, the start first, shape (1 + steps // every, 13) or (B, 1 + steps // every, 13).
@@ -91,7 +94,7 @@ def simulate(
     """
     simulator = Simulator(body, world, dt, methods)
     rows = simulator.run(states, steps, every, threads=threads)
-    _warn_if_unsolved(simulator, rows, steps)
+    _warn_if_unsolved(simulator, rows, steps - steps % every)
     return rows
 
 
@@ -109,10 +112,10 @@ class Simulator:
         self._methods = methods or Methods()
         self._parameters = pack(body, world, dt)
         if world.floor is not None:
-            _assert_law_fits(self._methods, world.floor.friction)
+            _assert_law_fits(self._methods, self._parameters.columns[:, FRICTION])
         self._world = world
         self._upright_ball = _falls_upright(body, world)
-        self._packed_blocks = cache(lambda width: [blocks(given, width) for given in self._parameters[:2]])
+        self._packed: dict[int, list[Array]] = {}
         self.unsolved_steps = 0
 
     def run(self, states: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None, threads: int | None = None) -> Array:
@@ -120,12 +123,11 @@ class Simulator:
         columns, points, is_ensemble = self._parameters
         starts = checked("state", states, (13,), "finite numbers, the orientation not the zero quaternion", _is_state)
         on_vertices = None if forces is None else checked("forces", forces, points.shape[1:], "finite numbers, in N", is_finite)
-        if steps < 0 or every < 1:
-            raise ValueError(f"steps and every: got {steps} and {every}; must be at least 0 and at least 1")
-        if threads is not None and threads < 1:
-            raise ValueError(f"threads: got {threads}; must be at least 1, or None for all of this process's processors")
+        steps, every = _whole("steps", steps, 0), _whole("every", every, 1)
+        threads = None if threads is None else _whole("threads", threads, 1)
         given = {"state": starts, "body, world and dt": columns} | ({} if on_vertices is None else {"forces": on_vertices})
         size = ensemble_size(given)
+        starts = _with_unit_orientation(starts)
         if len(starts) < size:
             starts = np.broadcast_to(starts, (size, 13))
         turning = on_vertices is not None or not (self._upright_ball and _is_without_spin(starts, self._world))
@@ -133,9 +135,12 @@ class Simulator:
         parts = Parts(world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning)
         width = lanes.WIDTH if size > 1 and self._methods.go_side_by_side and not config.DISABLE_JIT else 1
         recorded = np.empty((size, 1 + steps // every, 13))
-        packed = (blocks(starts, width), *self._packed_blocks(width), None if on_vertices is None else blocks(on_vertices, width))
+        if width not in self._packed:
+            self._packed[width] = [blocks(columns, width), blocks(points, width)]
+        packed = (blocks(starts, width), *self._packed[width], None if on_vertices is None else blocks(on_vertices, width))
         kernel = recording_kernel(self._methods, parts, width)
-        self.unsolved_steps += _share_out(partial(kernel, recorded, *packed, every), -(-size // width), threads)
+        work = steps * width
+        self.unsolved_steps += _share_out(partial(kernel, recorded, *packed, every), -(-size // width), work, threads)
         is_alone = not is_ensemble and np.ndim(states) == 1 and (forces is None or np.ndim(forces) == 2)
         return recorded[0] if is_alone else recorded
 
@@ -145,16 +150,18 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-MOST_BLOCKS = 64
-"""Blocks a thread takes at a time: few enough to share the work evenly, and to stop soon at Ctrl-C."""
+AT_A_TIME = 3_000_000
+"""Steps, of all its bodies, that a thread takes at a time: few enough to share the work evenly, and to stop soon at Ctrl-C."""
+WORTH_A_THREAD = 300_000
+"""Steps, of all bodies, below which starting threads takes longer than they save."""
 
 
-def _share_out(fill: Callable[[int, int], int], count: int, threads: int | None) -> int:
-    """Fill all blocks, some at a time, and add up what the kernel counted."""
+def _share_out(fill: Callable[[int, int], int], count: int, work: int, threads: int | None) -> int:
+    """Fill all blocks, each of so much work, some at a time, and add up what the kernel counted."""
     if count == 1:
         return fill(0, 1)
-    threads = threads or usable_cores()
-    each = min(MOST_BLOCKS, -(-count // threads))
+    threads = threads or (usable_cores() if count * work > WORTH_A_THREAD else 1)
+    each = min(max(1, AT_A_TIME // max(work, 1)), -(-count // threads))
     firsts = range(0, count, each)
     lasts = [min(first + each, count) for first in firsts]
     if threads == 1:
@@ -174,8 +181,30 @@ def _is_state(states: Array) -> NDArray[np.bool_]:
     return is_finite(states) & states[:, 3:7].any(axis=1)
 
 
-def _assert_law_fits(methods: Methods, friction: float | Array) -> None:
-    between = np.extract((np.asarray(friction) > 0.0) & np.isfinite(friction), friction)
+def _with_unit_orientation(states: Array) -> Array:
+    """The states with quaternions of length 1; those that are, to rounding, stay as they are to the last bit."""
+    q = states[:, 3:7]
+    with np.errstate(over="ignore"):
+        if np.all(np.abs(np.sum(q * q, axis=1) - 1.0) < 1e-14):
+            return states
+    largest = np.abs(q).max(axis=1, keepdims=True)  # first, so that no square is beyond what a number holds
+    scaled = q / largest
+    states[:, 3:7] = scaled / np.sqrt(np.sum(scaled * scaled, axis=1, keepdims=True))
+    return states
+
+
+def _whole(name: str, value: int, least: int) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number < 2**62:
+        raise ValueError(f"{name}: got {value!r}; must be a whole number, at least {least}")
+    return number
+
+
+def _assert_law_fits(methods: Methods, friction: Array) -> None:
+    between = np.extract((friction > 0.0) & np.isfinite(friction), friction)
     if len(between) and methods.law not in ("normal", "coulomb"):
         raise ValueError(f"law {methods.law!r} knows friction 0 and infinity, got {between[0]:g}; use law='coulomb'")
 

@@ -137,7 +137,7 @@ def select(mask, a, b):
     """`a` where the mask holds, else `b`.
 
     With `any_`, this is how kernels decide: both sides are worked out, so that one text serves a body alone and many side by side.
-    Of numbers, vectors or quaternions.
+    Of numbers or vectors.
     """
     return a if mask else b
 
@@ -212,17 +212,11 @@ def _select3(mask: bool, a: "Vec3", b: "Vec3") -> "Vec3":
     return Vec3(select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z))
 
 
-def _select4(mask: bool, a: "Quat", b: "Quat") -> "Quat":
-    return Quat(select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z), select(mask, a.w, b.w))
-
-
 @overload(select, strict=False)
 def _select(mask, a, b):
     if isinstance(mask, types.Boolean):
         return lambda mask, a, b: a if mask else b
-    if _is(a, Vec3):
-        return _select3
-    return _select4 if _is(a, Quat) else None
+    return _select3 if _is(a, Vec3) else None
 
 
 @overload(any_)

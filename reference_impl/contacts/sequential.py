@@ -3,8 +3,9 @@
 Each submerged vertex shall separate at e times its approach; impulses add up, push only, and stay in the friction cone.
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); M. Jean, The non-smooth contact
 dynamics method, CMAME 177 (1999). Cost: some ten to some hundred sweeps over the vertices. Leaves no submerged vertex
-approaching faster than `TOLERANCE`. Sweeps are capped, and a step that did not converge says so; with infinite friction at several
-vertices there need not be a solution.
+approaching faster than `TOLERANCE`. Sweeps are capped, and a step that did not converge says so; with friction of about 1 and above at
+several vertices there need not be a solution. At restitution above 0 it can add a little energy: a vertex that was separating is held back
+by none of its neighbours' restitution.
 """
 
 import math

@@ -3,8 +3,9 @@
     stick   K j = -u - µ u_n N
     slip    j = j_n (N - f t),  t = u_t / |u_t|,  j_n = -(1 + µ) u_n / (N·K (N - f t))
 
-f is the coefficient of friction. The direction of slip is kept through the impact; a body that would turn it around within one
-impact, or jam, is beyond this law. With Newton's restitution it can add energy where eq 17 does.
+f is the coefficient of friction. A contact that does not slide yet starts where its impulse drives it, t along (K N)_t. Where slip would
+turn round within the impact or jam (N·K (N - f t) not above 0), friction has stopped it on the way: it sticks, with more tangential impulse
+than the cone allows. Slip never adds energy; sticking does where eq 17 does.
 Source: C. A. de Coulomb (1785); E. J. Routh, Elementary Rigid Dynamics (1905), section 187.
 """
 
@@ -17,12 +18,22 @@ from reference_impl.vectors import compiled, dot, select
 
 @compiled
 def impulse(K, u, mu, friction):
-    """The impulse j within the cone |j_t| <= f j_n."""
+    """The impulse j, with |j_t| <= f j_n where it slips."""
     v_normal = dot(u, N)
     stick = note.impulse(K, u, mu, friction)
-    holds = (math.sqrt(stick.x * stick.x + stick.z * stick.z) <= friction * stick.y) | (friction == math.inf)
-    sliding = u - v_normal * N
-    speed = math.sqrt(sliding.x * sliding.x + sliding.z * sliding.z)
+    holds = (_along_floor(stick) <= friction * stick.y) | (friction == math.inf)
+    driven = K @ N
+    slides = _along_floor(u) > 0.0
+    sliding = select(slides, u - v_normal * N, driven - driven.y * N)
+    speed = _along_floor(sliding)
     direction = N - (friction / select(speed > 0.0, speed, 1.0)) * sliding
-    slip = -(1.0 + mu) * v_normal / dot(N, K @ direction) * direction
-    return select(friction > 0.0, select(holds, stick, slip), normal.impulse(K, u, mu, friction))
+    response = dot(N, K @ direction)
+    slip = -(1.0 + mu) * v_normal / select(response > 0.0, response, 1.0) * direction
+    goes_on = (response > 0.0) & (dot(u + K @ slip, sliding) >= 0.0)
+    grips = select(holds | (speed == 0.0), stick, select(goes_on, slip, stick))
+    return select(friction > 0.0, grips, normal.impulse(K, u, mu, friction))
+
+
+@compiled
+def _along_floor(a):
+    return math.sqrt(a.x * a.x + a.z * a.z)

@@ -10,7 +10,7 @@ Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; E. T. Whittaker, A
 import math
 
 from reference_impl.elliptic import r_f, r_j, sn_cn_dn
-from reference_impl.quaternion import conjugate, from_matrix, normalise, product, rotation_matrix
+from reference_impl.quaternion import conjugate, from_matrix, normalise, product, to_body, to_world
 from reference_impl.vectors import Mat3, Quat, Vec3, compiled, cross, dot, transpose
 
 PARALLEL = 1e-15
@@ -21,7 +21,7 @@ PARALLEL = 1e-15
 def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
     q = product(q, body.axes)
-    spin = transpose(rotation_matrix(q)) @ w
+    spin = to_body(q, w)
     I = body.moments
     L = Vec3(I.x * spin.x, I.y * spin.y, I.z * spin.z)
     torque = cross(L, spin)
@@ -34,7 +34,7 @@ def turn(q, w, dt, body):
     relative = Quat(_component(turned, a, b, 0, sign), _component(turned, a, b, 1, sign), _component(turned, a, b, 2, sign), turned.w)
     spin = Vec3(_component(after, a, b, 0, sign), _component(after, a, b, 1, sign), _component(after, a, b, 2, sign))
     q = normalise(product(q, relative))
-    return product(q, conjugate(body.axes)), rotation_matrix(q) @ spin
+    return product(q, conjugate(body.axes)), to_world(q, spin)
 
 
 @compiled

@@ -6,15 +6,14 @@ Order 1. Gains energy at every step and blows up; usable for short times and |ω
 Source: L. Euler (1758); the explicit term as in many engines, for instance MuJoCo's Euler and Bullet's multibody.
 """
 
-from reference_impl.quaternion import rotation_matrix
+from reference_impl.quaternion import to_body, to_world
 from reference_impl.rotations import note
-from reference_impl.vectors import compiled, cross, transpose
+from reference_impl.vectors import compiled, cross
 
 
 @compiled
 def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
-    R = rotation_matrix(q)
-    spin = transpose(R) @ w
+    spin = to_body(q, w)
     spin = spin - dt * (body.inverse_inertia @ cross(spin, body.inertia @ spin))
-    return note.turn(q, R @ spin, dt, body)
+    return note.turn(q, to_world(q, spin), dt, body)

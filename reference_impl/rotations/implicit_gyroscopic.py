@@ -7,17 +7,16 @@ Source: E. Catto, Numerical Methods (GDC 2015), "Gyroscopic torque"; so do Bulle
 """
 
 from reference_impl.contacts.mean import cross_matrix
-from reference_impl.quaternion import rotation_matrix
+from reference_impl.quaternion import to_body, to_world
 from reference_impl.rotations import note
-from reference_impl.vectors import compiled, cross, solve, transpose
+from reference_impl.vectors import compiled, cross, solve
 
 
 @compiled
 def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
-    R = rotation_matrix(q)
-    spin = transpose(R) @ w
+    spin = to_body(q, w)
     momentum = body.inertia @ spin
     J = body.inertia + dt * (cross_matrix(spin) @ body.inertia - cross_matrix(momentum))
     spin = spin - solve(J, dt * cross(spin, momentum))
-    return note.turn(q, R @ spin, dt, body)
+    return note.turn(q, to_world(q, spin), dt, body)

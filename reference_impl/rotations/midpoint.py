@@ -2,14 +2,14 @@
 
     m' = m + dt m̄ × ω̄,   m̄ = (m + m')/2,   ω̄ = I⁻¹ m̄,   q' = q (dt ω̄/2, 1) / |…|
 
-Order 2. Keeps kinetic energy and L in space, to rounding and for ever. The equation is solved by Newton's method, which finds no root
+Order 2. Keeps kinetic energy and L in space, to the rounding of each step. The equation is solved by Newton's method, which finds no root
 beyond |ω| dt of about 3.
 Source: E. Hairer, C. Lubich & G. Wanner, Geometric Numerical Integration (2006), IV.8 and VII.5.
 """
 
 from reference_impl.contacts.mean import cross_matrix
-from reference_impl.quaternion import normalise, product, rotation_matrix
-from reference_impl.vectors import Mat3, Quat, Vec3, any_, compiled, cross, dot, select, solve, transpose
+from reference_impl.quaternion import normalise, product, to_body, to_world
+from reference_impl.vectors import Mat3, Quat, Vec3, any_, compiled, cross, dot, select, solve
 
 MOST_NEWTON_STEPS = 30
 IDENTITY = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
@@ -18,7 +18,7 @@ IDENTITY = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 @compiled
 def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
-    start = body.inertia @ (transpose(rotation_matrix(q)) @ w)
+    start = body.inertia @ to_body(q, w)
     m = start
     small = 1e-32 * dot(start, start)
     moving = True
@@ -34,4 +34,4 @@ def turn(q, w, dt, body):
             break
     half = (0.5 * dt) * (body.inverse_inertia @ (0.5 * (start + m)))
     q = normalise(product(q, Quat(half.x, half.y, half.z, 1.0)))
-    return q, rotation_matrix(q) @ (body.inverse_inertia @ m)
+    return q, to_world(q, body.inverse_inertia @ m)

@@ -6,21 +6,21 @@ Order 4. Keeps nothing exactly; energy and L drift at fifth order. Blows up beyo
 Source: W. Kutta, Z. Math. Phys. 46 (1901).
 """
 
-from reference_impl.quaternion import normalise, product, rotation_matrix
-from reference_impl.vectors import Quat, compiled, cross, transpose
+from reference_impl.quaternion import normalise, product, to_body, to_world
+from reference_impl.vectors import Quat, compiled, cross
 
 
 @compiled
 def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
-    spin = transpose(rotation_matrix(q)) @ w
+    spin = to_body(q, w)
     q1, s1 = _rates(q, spin, body)
     q2, s2 = _rates(q + 0.5 * dt * q1, spin + 0.5 * dt * s1, body)
     q3, s3 = _rates(q + 0.5 * dt * q2, spin + 0.5 * dt * s2, body)
     q4, s4 = _rates(q + dt * q3, spin + dt * s3, body)
     q = normalise(q + (dt / 6.0) * (q1 + 2.0 * q2 + 2.0 * q3 + q4))
     spin = spin + (dt / 6.0) * (s1 + 2.0 * s2 + 2.0 * s3 + s4)
-    return q, rotation_matrix(q) @ spin
+    return q, to_world(q, spin)
 
 
 @compiled

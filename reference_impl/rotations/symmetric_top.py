@@ -10,8 +10,8 @@ body; M. Suzuki, Phys. Lett. A 146 (1990), for the composition.
 
 import math
 
-from reference_impl.quaternion import conjugate, normalise, product, rotation_matrix
-from reference_impl.vectors import Quat, Vec3, compiled, dot, select, transpose
+from reference_impl.quaternion import conjugate, normalise, product, to_body, to_world
+from reference_impl.vectors import Quat, Vec3, compiled, dot, select
 
 OUTER = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
 INNER = 1.0 - 4.0 * OUTER
@@ -21,7 +21,7 @@ INNER = 1.0 - 4.0 * OUTER
 def turn(q, w, dt, body):
     """Orientation and angular velocity (q, ω) after dt."""
     q = product(q, body.axes)  # work along the principal axes
-    spin = transpose(rotation_matrix(q)) @ w
+    spin = to_body(q, w)
     I = body.moments
     m = Vec3(I.x * spin.x, I.y * spin.y, I.z * spin.z)
     for part in range(5):
@@ -30,7 +30,7 @@ def turn(q, w, dt, body):
         q, m = _symmetric_top(q, m, h, I)
         q, m = _about_second(q, m, 0.5 * h, I)
     q = normalise(q)
-    w = rotation_matrix(q) @ Vec3(m.x / I.x, m.y / I.y, m.z / I.z)
+    w = to_world(q, Vec3(m.x / I.x, m.y / I.y, m.z / I.z))
     return product(q, conjugate(body.axes)), w
 
 

@@ -67,7 +67,7 @@ def test_the_limit_is_within_its_uncertainty(second, share, sign):
 
 @given(st.floats(0.1, 1.0), st.sampled_from([1.0, -1.0]))
 def test_an_error_that_grows_or_saturates_within_a_step_is_no_model_error(rate, sense):
-    """An error e^(±ah) - 1, as of methods that gain or lose energy, with a times the coarsest step up to 2: all powers of the step at once."""
+    """An error e^(±ah) - 1, as of methods that gain or lose energy, a times the coarsest step up to 2: all powers of the step."""
     found = apart(np.expm1(sense * rate * H / 2e-3))
     assert found.cause in ("discretisation", "unresolved")
 

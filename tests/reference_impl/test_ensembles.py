@@ -124,7 +124,7 @@ def test_balls_are_turned_if_one_of_them_has_to_be():
         ),
         (lambda: run(body=Body("heavy", BOX.inertia, POINTS)), "mass: got 'heavy'; must be a number above 0"),
         (lambda: run(body=Body(1.0, np.triu(np.ones((3, 3))) + 2 * np.eye(3), POINTS)), "inertia: got .* must be a symmetric"),
-        (lambda: run(threads=0), "threads: got 0; must be at least 1"),
+        (lambda: run(threads=0), "threads: got 0; must be a whole number, at least 1"),
     ],
 )
 def test_what_is_refused_says_whose_it_is(attempt, message):

@@ -109,9 +109,9 @@ print(rows[-1, 8], sum(kernel.stats.cache_hits.values()), numba.config.CACHE_DIR
 """
 
 
-def fall(folder, **environment):
+def fall(folder, program=FALL, **environment):
     done = subprocess.run(
-        [sys.executable, "-c", FALL], cwd=folder, env=os.environ | environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", program], cwd=folder, env=os.environ | environment, capture_output=True, text=True, check=True
     )
     return done.stdout.split()
 
@@ -125,6 +125,37 @@ def test_an_edited_source_is_never_served_old(tmp_path):
     step.write_text(step.read_text().replace("v = v + dt * gravity", "v = v + (2.0 * dt) * gravity"))
     assert fall(tmp_path) == ["-2.0", "0", "True"]
     assert fall(tmp_path) == ["-2.0", "1", "True"]
+    law = tmp_path / "reference_impl" / "laws" / "note.py"
+    law.write_text(law.read_text() + "# in a folder of the package\n")
+    assert fall(tmp_path) == ["-2.0", "0", "True"]
+
+
+def test_an_edit_after_the_import_is_not_filed_under_the_new_text(tmp_path):
+    """Old code, imported before an edit, must not serve the processes that import the edited source."""
+    shutil.copytree(PACKAGE, tmp_path / "reference_impl", ignore=shutil.ignore_patterns("__pycache__"))
+    program = FALL.replace("body = r.Body", "edit()\nbody = r.Body").replace(
+        "import numba, sys",
+        "import numba, sys, pathlib\n"
+        "def edit():\n"
+        "    step = pathlib.Path(r.__file__).parent / 'step.py'\n"
+        "    step.write_text(step.read_text().replace('v = v + dt * gravity', 'v = v + (2.0 * dt) * gravity'))\n",
+    )
+    assert fall(tmp_path, program)[0] == "-1.0"
+    assert fall(tmp_path)[:2] == ["-2.0", "0"]
+
+
+def test_the_users_cache_setting_survives_first_use_in_many_threads():
+    """Kernels declared at once by several threads leave numba's setting as it was."""
+    program = (
+        "import sys, numba\nsys.setswitchinterval(1e-6)\nfrom concurrent.futures import ThreadPoolExecutor\n"
+        "from reference_impl.kernels import Parts, recording_kernel\nfrom reference_impl import Methods\nbefore = numba.config.CACHE_DIR\n"
+        "parts = Parts(True, False, False, True, True)\n"
+        "with ThreadPoolExecutor(8) as pool:\n"
+        "    list(pool.map(lambda law: recording_kernel(Methods(law=law), parts, 1), ['note', 'normal', 'poisson', 'coulomb'] * 8))\n"
+        "print(numba.config.CACHE_DIR == before)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True"]
 
 
 def test_settings_of_numba_are_part_of_the_key(tmp_path):

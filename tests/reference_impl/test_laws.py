@@ -49,7 +49,7 @@ def supremum(mu, rho, sticking):
     ],
 )  # fmt: skip
 def test_note_s_energy_gain_has_the_known_supremum(mu, solid, friction, published):
-    """A search over shapes, attitudes and motions through the note's own law finds the supremum to 4 digits, and never more."""
+    """A search over shapes, attitudes and motions through the note's own law finds the supremum to 4 digits, never more (measured to 8)."""
     assert supremum(mu, 7 if solid else 3, friction == STICKS) == pytest.approx(published, abs=2e-4)
 
     def gain(p):
@@ -66,7 +66,7 @@ def test_note_s_energy_gain_has_the_known_supremum(mu, solid, friction, publishe
     bounds = [(-4, 2), (-4, 2), (-3.2, 3.2), (-3.2, 3.2), (-3.2, 3.2), (-6, 6), (-6, 6)]
     found = differential_evolution(gain, bounds, seed=2, maxiter=150, popsize=12, tol=1e-8, polish=False)
     found = minimize(gain, found.x, method="Nelder-Mead", options={"maxiter": 8000, "xatol": 1e-9, "fatol": 1e-12})
-    assert -found.fun == pytest.approx(published, abs=1e-3 * published)
+    assert -found.fun == pytest.approx(supremum(mu, 7 if solid else 3, friction == STICKS), rel=5e-5)
     assert -found.fun <= supremum(mu, 7 if solid else 3, friction == STICKS) * (1 + 1e-9)
 
 
@@ -105,6 +105,52 @@ def test_laws_that_never_add_energy(law, friction):
     assert worst(inverse, r, u, mu, friction) <= 1e-12
 
 
+@pytest.mark.parametrize("friction", [0.3, 1.0, 1.5, 5.0])
+def test_coulomb_adds_no_energy_but_where_eq_17_does(friction):
+    """6,000 random impacts, jamming ones among them: where it slips it loses energy; at restitution 0 it never gains any."""
+    rng = np.random.default_rng(8)
+    for _ in range(6000):
+        K, u = response(int(rng.integers(1 << 30))), Vec3(*map(float, rng.normal(size=3) - [0.0, 1.0, 0.0]))
+        if u.y < 0.0:
+            j = coulomb.impulse(K, u, 0.0, friction)
+            gained = 0.5 * dot(j, K @ j) + dot(u, j)
+            assert gained <= 1e-12 * dot(u, solve(K, u))
+
+
+def test_coulomb_drives_a_contact_that_does_not_slide_yet():
+    """A tilted rod that falls straight: friction of .3 acts against the slip that its landing drives, on the cone or enough to stop it."""
+    c, s = float(np.cos(np.radians(40))), float(np.sin(np.radians(40)))
+    K = impulse_response(Vec3(c, -s, 0.0), mat3(np.eye(3) * 3.0), 1.0)
+    j = coulomb.impulse(K, Vec3(0.0, -1.0, 0.0), 0.0, 0.3)
+    driven, after = (K @ Vec3(0.0, 1.0, 0.0)).x, K @ j
+    assert abs(driven) > 0.1
+    assert j.x * driven < 0
+    assert abs(j.x) == pytest.approx(0.3 * j.y, rel=1e-12)
+    assert after.x * driven > 0
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("mu", [0.0, 0.4, 0.9])
+def test_what_each_law_prescribes(seed, mu):
+    """Normal: u_n+ = -µ u_n, straight up. Poisson: µ times compression. Clamped: eq 17 where that adds no energy."""
+    K, u = response(seed), Vec3(*map(float, [*np.random.default_rng(seed).normal(size=3)]))
+    u = Vec3(u.x, -abs(u.y), u.z)
+    up = Vec3(0.0, 1.0, 0.0)
+    j = normal.impulse(K, u, mu, 0.0)
+    assert (j.x, j.z) == (0.0, 0.0)
+    assert (u + K @ j).y == pytest.approx(-mu * u.y, rel=1e-12)
+    for law in (poisson, clamped, coulomb, note):
+        if law is not note:
+            assert law.impulse(K, u, mu, 0.0) == j  # without friction they are one
+    compression = -np.array(solve(K, u))
+    after = np.array(u + K @ poisson.impulse(K, u, mu, STICKS))
+    share = mu * max(compression[1], 0.0) / solve(K, up).y
+    np.testing.assert_allclose(after, [0, share, 0], rtol=0, atol=1e-12)
+    newton = note.impulse(K, u, mu, STICKS)
+    if 0.5 * dot(newton, K @ newton) + dot(u, newton) <= 0.0:
+        np.testing.assert_allclose(np.array(clamped.impulse(K, u, mu, STICKS)), np.array(newton), rtol=1e-12)
+
+
 def response(seed=0):
     rng = np.random.default_rng(seed)
     R = Rotation.random(rng=rng).as_matrix()
@@ -112,9 +158,9 @@ def response(seed=0):
     return impulse_response(Vec3(*map(float, R @ [0.3, 0.4, 0.5])), mat3(inverse), 1.0)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_coulomb_stays_in_its_cone(seed):
-    """Sticks inside the cone; on it otherwise, against the sliding; separates at µ times the approach either way."""
+@pytest.mark.parametrize("seed", range(40))
+def test_coulomb_slips_in_its_cone_or_sticks(seed):
+    """Sticks, or slips on the cone and against the sliding, which goes on; separates at µ times the approach either way."""
     K, u = response(seed), Vec3(*map(float, [*np.random.default_rng(seed).normal(size=3)]))
     u = Vec3(u.x, -abs(u.y), u.z)
     for friction in (0.05, 0.3, 1.0, 50.0):
@@ -123,14 +169,16 @@ def test_coulomb_stays_in_its_cone(seed):
         after = u + K @ j
         assert after.y == pytest.approx(-0.5 * u.y, rel=1e-12)
         stuck = np.hypot(after.x, after.z) <= 1e-12
-        if not stuck and j.y > 0:
+        if not stuck:
+            assert j.y > 0
             assert sideways == pytest.approx(friction * j.y, rel=1e-12)
             assert j.x * u.x + j.z * u.z <= 0
+            assert after.x * u.x + after.z * u.z >= 0
     assert coulomb.impulse(K, u, 0.5, 0.0) == normal.impulse(K, u, 0.5, 0.0)
 
 
 def test_published_impacts():
-    """A tilted box of corner masses that gains a third of its energy under eq 11, a fifth under eq 17 (to 5 digits)."""
+    """A box of corner masses gains a third of its energy under eq 11, a fifth under eq 17 (to 2e-3: three digits of attitude)."""
     half = np.array([0.1, 0.4, 0.8])
     points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
     inertia = reference_impl.vertex_inertia(points, np.full(8, 0.125))
@@ -184,13 +232,33 @@ def test_mean_contact_leaves_vertices_approaching():
     assert left / several > 0.2
 
 
+@pytest.mark.parametrize("friction", [0.2, 1.0])
+def test_sequential_friction_of_one_contact(friction):
+    """A ball that slides: Δv_t = -f (1 + e) |u_n| t, to 1e-10 in each direction, until that would turn it round."""
+    ball = Body(2.0, reference_impl.solid_sphere_inertia(2.0, 0.1), np.zeros((1, 3)), 0.1)
+    state = np.array([0, 0.1 - 1e-6, 0, 0, 0, 0, 1, 6.0, -1.0, 8.0, 0, 0, 0])
+    for e, threshold in ((0.5, 0.0), (0.0, 2.0)):  # below the threshold there is no restitution
+        floor = Floor(0.5, friction, threshold)
+        after = reference_impl.step(state, ball, World(floor=floor), 1e-9, methods=Methods(law="coulomb", contact="sequential"))
+        lost = friction * (1 + e)
+        np.testing.assert_allclose(after[7:10], [6.0 - 0.6 * lost, e, 8.0 - 0.8 * lost], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("law", "friction"), [("normal", 0.0), ("coulomb", 0.4), ("coulomb", 1.0)])
-def test_sequential_leaves_none(law, friction):
-    """No submerged vertex approaches faster than 1e-9 m/s, and no energy is added at restitution 0."""
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.filterwarnings("ignore:.*not solved")
+def test_sequential_leaves_none(law, friction, e):
+    """No submerged vertex approaches faster than 1e-9 m/s in a step that settled, and no energy is added at restitution 0."""
     methods = Methods(law=law, contact="sequential")
     for body, state in random_contacts(200):
-        after = reference_impl.step(state, body, World(floor=Floor(0.0, friction)), 1e-9, methods=methods)
+        simulator = reference_impl.Simulator(body, World(floor=Floor(e, friction)), 1e-9, methods)
+        after = simulator.run(state, 1)[1]
+        if simulator.unsolved_steps:
+            assert e > 0.0  # at restitution 0 all settle
+            continue
         assert approach_left_over(state, after, body) <= 1e-9
+        if e > 0.0:
+            continue
         R = Rotation.from_quat(state[3:7]).as_matrix()
         tensor = R @ body.inertia @ R.T
         energies = [0.5 * s[7:10] @ s[7:10] + 0.5 * s[10:13] @ tensor @ s[10:13] for s in (state, after)]
@@ -235,21 +303,25 @@ def test_projection_holds_a_cube_at_rest():
 
 
 def test_dropped_cube_sinks_without_projection():
-    """Known fault: a tilted cube dropped at restitution 0 goes on sinking, 0.03 m and more after 300 s at 1/60 s."""
+    """Known fault: a tilted cube dropped at restitution 0 goes on sinking, 0.03 m and more after 300 s at 1/60 s.
+
+    Projection keeps it from sinking, not from rocking: at this step it does so for ever, by 5e-3 m.
+    """
     body, world = cube(0.5), World(G, Floor(0.0, STICKS))
     q = Rotation.from_rotvec([0.1, 0.05, 0.2]).as_quat()
     state = np.concatenate([[0, 1.0, 0], q, np.zeros(6)])
     depth = {}
     for correction in ("none", "projection"):
         rows = reference_impl.simulate(state, body, world, 1 / 60, 18_000, 100, Methods(correction=correction))
-        depth[correction] = 0.5 - rows[-1, 1]
-    assert depth["none"] > 0.03
-    assert depth["projection"] <= 1e-6
+        depth[correction] = 0.5 - rows[-60:, 1]
+    assert depth["none"].min() > 0.03
+    assert depth["projection"].max() <= 1e-6
+    assert 1e-3 < -depth["projection"].min() < 1e-2
 
 
 @pytest.mark.parametrize("mu", [0.6, 0.8, 0.9, 0.95])
 def test_limit_cycle_of_a_lively_ball(mu):
-    """Known fault: for µ above 1/2 the literal bouncer never rests but strikes at u* = g h / (1 - µ), to 1 %."""
+    """Known fault: for µ above 1/2 the literal bouncer never rests but strikes at u* = g h / (1 - µ), to 2 %."""
     h = 1 / 60
     ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
     state = np.array([0, 1.1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
@@ -275,6 +347,29 @@ def test_sliding_flat_box_stops_and_turns_at_once():
     share = 1 / (1 + 1.0 * 0.25 / body.inertia[2, 2])
     assert after[7] == pytest.approx(3.0 * (1 - share), rel=1e-9)
     assert after[7] + 0.5 * after[12] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_eq_17_can_pull():
+    """Known fault: in a tenth of random sticking impacts of a box, the less the livelier, the floor pulls the corner down."""
+    shares = []
+    for mu in (0.0, 0.5, 0.9):
+        rng = np.random.default_rng(1)
+        pulled = 0
+        for seed in range(2000):
+            u = rng.normal(size=3)
+            pulled += note.impulse(response(seed), Vec3(float(u[0]), -abs(float(u[1])), float(u[2])), mu, STICKS).y <= 0.0
+        shares.append(pulled / 2000)
+    assert 0.05 < shares[0] < 0.25
+    assert shares[0] > shares[1] > shares[2] > 0.0
+
+
+def test_a_fast_small_body_is_swallowed_by_the_floor():
+    """Known fault: a cube of 10 cm dropped from 5 m at 1/60 s is wholly below the floor after one step, and stays there."""
+    body = cube(0.05)
+    state = np.array([0, 5.04, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
+    heights = reference_impl.simulate(state, body, World(G, Floor(0.0, STICKS)), 1 / 60, 600)[:, 1]
+    assert heights[-1] < -0.05
+    assert np.ptp(heights[-60:]) < 1e-2
 
 
 def test_damping_factors_per_step_have_no_limit():

@@ -129,3 +129,108 @@ def test_state_of_the_wrong_shape_is_refused():
     """The boundary says what it wants."""
     with pytest.raises(ValueError, match=r"shape \(13,\) or \(B, 13\), got \(7,\)"):
         reference_impl.step(np.zeros(7), BODY, World(), 1e-3)
+
+
+def test_eq7_and_eq9_in_a_body_that_is_turned():
+    """Forces on the vertices of a tilted box: Δω = h R I⁻¹ Rᵀ Σ R p × f, by NumPy."""
+    rng = np.random.default_rng(3)
+    q = np.array([0.4, -0.2, 0.5, 0.7])
+    q /= np.linalg.norm(q)
+    forces = rng.normal(size=(8, 3))
+    after = reference_impl.step(state(q=q), BODY, World(), 1e-3, forces=forces)
+    from scipy.spatial.transform import Rotation
+
+    R = Rotation.from_quat(q).as_matrix()
+    torque = np.cross(POINTS @ R.T, forces).sum(axis=0)
+    np.testing.assert_allclose(after[10:13], 1e-3 * R @ np.linalg.solve(BODY.inertia, R.T @ torque), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("motion", "turns"),
+    [({}, False), ({"v": (0, 0, 1)}, True), ({"v": (1, 0, 0)}, True), ({"w": (0, 1e-3, 0)}, True), ({"q": (0.6, 0, 0, 0.8)}, False)],
+)
+@pytest.mark.parametrize("sideways", [(0, 0, 0), (0.1, 0, 0), (0, 0, 0.1)])
+def test_a_ball_is_turned_wherever_something_turns_it(motion, turns, sideways):
+    """On a floor that grips: spin, sliding, or gravity along the floor, in x and in z. Otherwise its attitude stays to the last bit."""
+    ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
+    start = state(x=(0, 0.2, 0), **motion)
+    rows = reference_impl.simulate(start, ball, World(G + np.array(sideways), Floor(0.5, np.inf)), 1e-3, 400)
+    turned = bool(np.any(rows[-1, 3:7] != rows[0, 3:7]))
+    assert turned == (turns or any(sideways))
+
+
+def test_orientations_are_brought_to_unit_length():
+    """As scene files do it: twice the quaternion is the same attitude, however large or small; one of unit length stays as it is."""
+    q = np.array([0.1, 0.2, -0.3, 0.9]) / np.linalg.norm([0.1, 0.2, -0.3, 0.9])
+    rows = [
+        reference_impl.simulate(state(x=(0, 0.4, 0), q=scale * q), BODY, World(G, Floor(0.5, np.inf)), 1e-3, 100)
+        for scale in (1.0, 2.0, 1e-170, 1e200)
+    ]
+    for other in rows[1:]:
+        np.testing.assert_allclose(other, rows[0], rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(rows[0][0, 3:7], q)
+
+
+def test_what_a_simulator_was_given_may_change_afterwards():
+    """It holds copies; and it can be sent to another process."""
+    import pickle
+
+    points = POINTS.copy()
+    simulator = reference_impl.Simulator(Body(1.0, BODY.inertia, points), World(G, Floor(0.5, np.inf)), 1e-3)
+    start = state(x=(0, 0.5, 0))
+    before = simulator.run(start, 400)
+    points *= 3.0
+    np.testing.assert_array_equal(simulator.run(start, 400), before)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(simulator)).run(start, 400), before)
+
+
+def test_inside_nothing_raises():
+    """Division by 0 and overflow give inf and NaN in compiled code, whatever the state."""
+    for rotation in ("note", "gyroscopic", "implicit-gyroscopic", "midpoint", "rk4", "symmetric-top", "exact"):
+        rows = reference_impl.simulate(state(w=(1e200, 1e200, 0)), BODY, World(), 1.0, 5, methods=reference_impl.Methods(rotation=rotation))
+        assert rows.shape == (6, 13)
+
+
+@pytest.mark.parametrize(
+    ("attempt", "message"),
+    [
+        (lambda: go(steps=np.uint8(255)), None),
+        (lambda: go(steps=2.5), "steps: got 2.5; must be a whole number, at least 0"),
+        (lambda: go(steps=-1), "steps: got -1"),
+        (lambda: go(every=2**63), "every: got 9223372036854775808"),
+        (lambda: go(every=None), "every: got None"),
+        (lambda: go(body=Body(1.0, BODY.inertia, None)), "points: got None"),
+        (lambda: go(body=Body(1.0, BODY.inertia, 3.0)), "points: must have shape"),
+        (lambda: go(body=Body(1.0, BODY.inertia, [])), "points: "),
+        (lambda: go(body=Body(1.0, BODY.inertia, [[1, 2, 3], [1, 2]])), "points: got"),
+        (lambda: go(body=Body(1.0, BODY.inertia, POINTS[0])), "points: must have shape"),
+        (lambda: go(body=Body(1.0, np.diag([1.0, 1.0, 1e-14]), POINTS)), "inertia: got .* positive definite"),
+        (lambda: go(body=Body(1.0, np.diag([1e-320, 1.0, 1.0]), POINTS)), "inertia: got"),
+        (lambda: go(world=World(damping=(-1e6, 0.0))), "linear damping: got -1000000.0; must be 0 or more"),
+        (lambda: go(world=World(damping=(0.1, 0.1, 0.1))), "damping: got .*; must be two rates"),
+        (lambda: go(world=World(floor=Floor(0.5, "inf"))), "friction: got 'inf'"),
+        (lambda: go(dt=True), "dt: got True"),
+        (lambda: go(start=state().astype(complex)), "state: got"),
+    ],
+)
+def test_odd_arguments(attempt, message):
+    """One clear ValueError, or the right answer; never a crash."""
+    if message is None:
+        assert attempt().shape == (256, 13)
+    else:
+        with pytest.raises(ValueError, match=message):
+            attempt()
+
+
+def go(steps=1, every=1, body=BODY, world=None, dt=1e-3, start=None):
+    return reference_impl.simulate(state() if start is None else start, body, world or World(), dt, steps, every)
+
+
+def test_collinear_points_have_no_inertia():
+    """Whatever sign rounding gives the moment about their line."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        points = np.outer(rng.normal(size=4), rng.normal(size=3))
+        inertia = reference_impl.vertex_inertia(points - points.mean(axis=0), np.ones(4))
+        with pytest.raises(ValueError, match="positive definite"):
+            go(body=Body(4.0, inertia, points))

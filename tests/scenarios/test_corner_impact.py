@@ -222,7 +222,7 @@ def test_an_edge_strikes_as_one_point_at_its_middle(friction):
     u = impact.before[8]
     M, moment = scene.body.mass, scene.body.inertia_tensor[2, 2]
     if friction == "none":
-        j = np.array([0.0, -(1 + 0.5) * u / (1 / M + r[0] ** 2 / I)])
+        j = np.array([0.0, -(1 + 0.5) * u / (1 / M + r[0] ** 2 / moment)])
     else:
         K = np.eye(2) / M + np.array([[r[1] ** 2, -r[0] * r[1]], [-r[0] * r[1], r[0] ** 2]]) / moment
         j = np.linalg.solve(K, [0.0, -(1 + 0.5) * u])

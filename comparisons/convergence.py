@@ -44,7 +44,7 @@ SAME_ORDER = 0.05
 TOO_FAR_FOR_CHANCE = 10.0
 """Errors no larger than rounding may still follow a power of the step, if they fall by so much."""
 GROWTH = 1.25
-"""An error that is larger by this factor at the finest step than at any coarser one grows as the step shrinks."""
+"""An error that is larger by this factor at the finest step, than at any coarser one or at the end of a rise, grows as the step shrinks."""
 PLATEAU = 0.1
 """An error that changes by a smaller share over the steps does not depend on them."""
 
@@ -195,7 +195,8 @@ def _without_a_power(h: Array, e: Array, small: Array, untold: tuple[tuple[float
     if settles and spread <= PLATEAU * abs(limit) + small[-1] and abs(limit) > spread:
         return Convergence("model", math.nan, (), untold, limit, spread, "does not depend on the step")
     coarser = float(np.max(np.abs(e[:-1])))
-    if abs(limit) > GROWTH * coarser + small[-1]:
+    grows = bool((np.diff(np.abs(e[-3:])) > small[-1]).all()) and abs(limit) > GROWTH * abs(e[-3]) + small[-1]
+    if grows or abs(limit) > GROWTH * coarser + small[-1]:
         return Convergence("model", math.nan, (), untold, limit, 0.0, "grows as the step shrinks")
     if abs(limit) <= coarser * math.sqrt(h[-1] / h[0]) + small[-1]:
         return Convergence("discretisation", math.nan, (), untold, limit, abs(limit) + small[-1], "shrinks, but as no power of the step")

@@ -7,6 +7,7 @@ import math
 
 from reference_impl.vectors import compiled
 
+TINY = 1e-100  # where sn is as small as this it is its own tangent, and the square of cn/sn would overflow
 MOST_ROUNDS = 40  # each round gains a factor of 4 in accuracy; arguments 1e-300 and 1e300 apart take 500 halvings of the exponent
 
 
@@ -21,8 +22,8 @@ def sn_cn_dn(u, m1):
         c = 0.5 * (a + b)
         rounds += 1
     sine, cosine = math.sin(c * u), math.cos(c * u)
-    if sine == 0.0:
-        return 0.0, cosine, 1.0
+    if abs(sine) < TINY:
+        return sine / c, cosine, 1.0
     ratio, dn = cosine / sine, 1.0
     c = c * ratio
     for done in range(rounds, -1, -1):

@@ -13,6 +13,7 @@ from scipy.special import elliprf, elliprj
 Array = NDArray[np.float64]
 
 
+TINY = 1e-100  # where sn is as small as this it is its own tangent, and the square of cn/sn would overflow
 CONVERGED = 1e-8  # the arithmetic-geometric mean squares its error: one more mean reaches the last digit
 
 
@@ -42,7 +43,7 @@ def jacobi(u: Array, m1: float) -> Jacobi:
         steps.append((a, b))
     mean = 0.5 * (a + b)
     sine, cosine = np.sin(mean * u), np.cos(mean * u)
-    at_zero = sine == 0.0
+    at_zero = np.abs(sine) < TINY
     ratio = cosine / np.where(at_zero, 1.0, sine)
     c, dn = mean * ratio, np.ones_like(ratio)
     for a, b in reversed(steps):
@@ -50,7 +51,7 @@ def jacobi(u: Array, m1: float) -> Jacobi:
         dn = (b + ratio) / (a + ratio)
         ratio = c / a
     sn = np.copysign(1.0 / np.sqrt(c * c + 1.0), sine)
-    return Jacobi(np.where(at_zero, 0.0, sn), np.where(at_zero, cosine, c * sn), np.where(at_zero, 1.0, dn))
+    return Jacobi(np.where(at_zero, sine / mean, sn), np.where(at_zero, cosine, c * sn), np.where(at_zero, 1.0, dn))
 
 
 def quarter_period(m1: float) -> float:

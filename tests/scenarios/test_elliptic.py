@@ -58,3 +58,13 @@ def test_integral(m1, n):
             exact = float(mpmath.sign(u) * mpmath.quad(integrand, [*corners, abs(mpmath.mpf(float(u)))]))
         found = integral_of_sn2(np.array([u]), jacobi(np.array([u]), m1), n, m1)
         assert found[0] == pytest.approx(exact, rel=1e-13)
+
+
+def test_next_to_a_zero_of_sn():
+    """Where cn/sn is beyond what a number holds: sn is u itself, to the last digit; for the truths and for the kernels."""
+    from reference_impl.elliptic import sn_cn_dn
+
+    for u in (1e-110, 1e-160, 1e-300, -1e-200):
+        found = jacobi(np.array([u]), 0.3)
+        assert (found.sn[0], found.cn[0], found.dn[0]) == (pytest.approx(u, rel=1e-14), 1.0, 1.0)
+        assert sn_cn_dn(u, 0.3) == (pytest.approx(u, rel=1e-14), 1.0, 1.0)

@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: report test test-slow bench lint clean
+.PHONY: report test test-slow faults bench lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
@@ -13,6 +13,9 @@ test: $(VENV)/.installed-dev          ## set up, run the whole test suite
 
 test-slow: $(VENV)/.installed-dev     ## the studies that take minutes
 	$(BIN)/python -m pytest -m slow
+
+faults: $(VENV)/.installed-dev        ## engines with one planted fault each against the core catalogue: docs/faults.md
+	$(BIN)/python tests/fault_suite.py
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py

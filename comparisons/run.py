@@ -137,6 +137,7 @@ class _Attempt:
     """What came of one engine on one scene at one step."""
 
     label: str
+    discretisation: str | None = None
     verdict: str = ""
     reason: str = ""
     motion: Trajectory | None = None
@@ -157,8 +158,8 @@ def _contestant(chosen: str | Engine) -> _Contestant:
 
 
 def _attempt(contestant: _Contestant, scene: Scenario, dt: float, phases: list[Scenario]) -> _Attempt:
-    attempt = _Attempt(contestant.label)
     engine = contestant.engine
+    attempt = _Attempt(contestant.label, engine.discretisation(scene) if engine else None)
     if engine is None:
         attempt.verdict, attempt.reason = "missing", contestant.missing
         return attempt
@@ -243,6 +244,8 @@ def _agreement_rows(
     ]
     shared: Row = {"scene": scene.name, "engine": first.label, "dt": dt, "kind": "agreement", "truth": second.label}
     shared["steps"] = scene.steps(dt)
+    if first.discretisation is not None and first.discretisation == second.discretisation:
+        shared["reason"] = f"no evidence: both are {first.discretisation}"
     rows = []
     for metric in METRICS.values():
         if not (metric.agreement and metric.applies(scene, phases[0][1] or _as_truth(second.phases[0]))):
@@ -250,7 +253,7 @@ def _agreement_rows(
         try:
             found: Row = {"value": metric.average(cases).value}
         except Unresolved as error:
-            found = {"cause": "unresolved", "reason": str(error)}
+            found = {"cause": "unresolved", "reason": "; ".join(filter(None, [shared.get("reason"), str(error)]))}
         rows.append(shared | {"metric": metric.name, "unit": metric.unit, "verdict": "measured"} | found)
     return rows
 

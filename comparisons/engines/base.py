@@ -89,6 +89,17 @@ class Simulation:
         self.close()
 
 
+SEMI_IMPLICIT_EULER = "semi-implicit Euler"
+EXPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term explicit"
+IMPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term implicit"
+
+
+def may_tumble(scene: Scenario) -> bool:
+    """Whether a body of unequal moments spins at the start, or may after an impact: only then do gyroscopic terms matter."""
+    moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
+    return bool(np.ptp(moments) > 1e-12 * moments[-1]) and (any(scene.start.angular_velocity) or scene.floor is not None)
+
+
 @dataclass(frozen=True)
 class Engine:
     """An engine with its options.
@@ -129,6 +140,13 @@ class Engine:
     def order_in(self, scene: Scenario) -> float | None:
         """The order claimed for a scene's errors: `order` in free flight, none where there is a floor to hit."""
         return self.order if scene.floor is None else None
+
+    def discretisation(self, scene: Scenario) -> str | None:
+        """The discretisation of a scene's motion, by the name it is known by; None if it is not known.
+
+        Two engines of the same one make the same errors: that they agree is no evidence that either is right.
+        """
+        return None
 
     def declines(self, scene: Scenario) -> str | None:
         """Why this engine cannot run a scene as meant, or None: it can."""

@@ -7,7 +7,17 @@ from typing import ClassVar
 import numpy as np
 
 import reference_impl
-from comparisons.engines.base import Array, AsBuilt, Engine, Simulation, version
+from comparisons.engines.base import (
+    EXPLICIT_GYROSCOPIC,
+    IMPLICIT_GYROSCOPIC,
+    SEMI_IMPLICIT_EULER,
+    Array,
+    AsBuilt,
+    Engine,
+    Simulation,
+    may_tumble,
+    version,
+)
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from scenarios import DropspinError, Scenario
 from scenarios.body import Body, Box, Sphere, Vertices
@@ -43,6 +53,12 @@ class Document(Engine):
         if rotation is None or scene.floor is not None:
             return None
         return rotation if scene.gravity is None else min(rotation, 1.0)
+
+    def discretisation(self, scene: Scenario) -> str | None:
+        """Of the rotation, where it matters; the translation is the note's with all of them."""
+        known = {"gyroscopic": EXPLICIT_GYROSCOPIC, "implicit-gyroscopic": IMPLICIT_GYROSCOPIC}
+        rotation = self.option("rotation")
+        return known.get(rotation, rotation) if may_tumble(scene) else SEMI_IMPLICIT_EULER
 
     def declines(self, scene: Scenario) -> str | None:
         """Most laws know no friction between none and infinite."""

@@ -12,7 +12,18 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, version
+from comparisons.engines.base import (
+    EXPLICIT_GYROSCOPIC,
+    IMPLICIT_GYROSCOPIC,
+    SEMI_IMPLICIT_EULER,
+    Array,
+    AsBuilt,
+    Diverged,
+    Engine,
+    Simulation,
+    may_tumble,
+    version,
+)
 from scenarios import Scenario
 from scenarios.body import Box, Sphere
 from scenarios.rotations import conjugate, rotate
@@ -39,6 +50,15 @@ class MuJoCo(Engine):
     def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
         """Order of accuracy that the manual claims for the integrator."""
         return 4.0 if self.option("integrator") == "rk4" else 1.0
+
+    def discretisation(self, scene: Scenario) -> str | None:
+        """Of the integrator; they differ in the gyroscopic term."""
+        integrator = self.option("integrator")
+        if integrator == "rk4":
+            return "classical Runge-Kutta"
+        if not may_tumble(scene):
+            return SEMI_IMPLICIT_EULER
+        return EXPLICIT_GYROSCOPIC if integrator == "euler" else IMPLICIT_GYROSCOPIC
 
     def declines(self, scene: Scenario) -> str | None:
         """What calibration cannot map."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt, Engine, Simulation, version
+from comparisons.engines.base import IMPLICIT_GYROSCOPIC, SEMI_IMPLICIT_EULER, Array, AsBuilt, Engine, Simulation, may_tumble, version
 from scenarios import Scenario
 from scenarios.body import Box, Sphere
 
@@ -26,6 +26,10 @@ class PyBullet(Engine):
 
     name = "pybullet"
     order = 1.0
+
+    def discretisation(self, scene: Scenario) -> str | None:
+        """Maximal coordinates solve the gyroscopic term implicitly, by one Newton step."""
+        return IMPLICIT_GYROSCOPIC if may_tumble(scene) else SEMI_IMPLICIT_EULER
 
     def declines(self, scene: Scenario) -> str | None:
         """What calibration cannot map."""

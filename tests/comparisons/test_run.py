@@ -344,3 +344,26 @@ def test_unsolved_contacts_are_told():
     assert len(limited) == 1
     assert re.fullmatch(r"the contact was not solved in \d+ of 2000 steps", limited["reason"].iloc[0])
     assert found.exit_code() == 0
+
+
+@pytest.mark.parametrize(
+    ("scene", "first", "second", "same"),
+    [
+        ("spin-asymmetric", "mujoco[integrator=implicitfast]", "pybullet", True),
+        ("spin-asymmetric", "mujoco", "document[rotation=gyroscopic]", True),
+        ("spin-asymmetric", "mujoco", "pybullet", False),
+        ("spin-asymmetric", "document", "pybullet", False),
+        ("spin-asymmetric", "mujoco[integrator=rk4]", "document[rotation=rk4]", False),
+        ("fall-spin", "mujoco", "pybullet", True),
+        ("drop-box-corner", "mujoco", "pybullet", False),
+    ],
+)
+def test_agreement_of_one_discretisation_is_no_evidence(scene, first, second, same):
+    """Pairs that solve the same difference equations are marked; where they are, they agree far better than either with the truth."""
+    found = comparisons.run([scenarios.load(scene)], [first, second], [8e-3])
+    pairs = found.frame[found.frame["kind"] == "agreement"]
+    assert pairs["reason"].str.startswith("no evidence: both are").all() == same
+    if same:
+        apart = pairs[pairs["metric"] == "energy_error"]["value"].abs().max()
+        wrong = found.measurements[found.measurements["metric"] == "energy_error"]["value"].abs().min()
+        assert apart < 0.05 * wrong

@@ -227,9 +227,9 @@ def _float_lanes(a):
 def side_by_side(array: Array) -> Array:
     """Rows of bodies, shape (B, …, k), as blocks of lanes, shape (blocks, …, k * WIDTH); the last body fills up the last block."""
     blocks = -(-len(array) // WIDTH)
-    filled = array[np.minimum(np.arange(blocks * WIDTH), len(array) - 1)]
-    lanes_last = np.moveaxis(filled.reshape(blocks, WIDTH, *array.shape[1:]), 1, -1)
-    return np.ascontiguousarray(lanes_last).reshape(blocks, *array.shape[1:-1], -1)
+    filled = array if blocks * WIDTH == len(array) else array[np.minimum(np.arange(blocks * WIDTH), len(array) - 1)]
+    lanes_last = filled.reshape(blocks, WIDTH, *array.shape[1:]).transpose(0, *range(2, array.ndim + 1), 1)
+    return lanes_last.reshape(blocks, *array.shape[1:-1], -1)
 
 
 @compiled

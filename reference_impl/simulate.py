@@ -184,9 +184,8 @@ def _is_state(states: Array) -> NDArray[np.bool_]:
 def _with_unit_orientation(states: Array) -> Array:
     """The states with quaternions of length 1; those that are, to rounding, stay as they are to the last bit."""
     q = states[:, 3:7]
-    with np.errstate(over="ignore"):
-        if np.all(np.abs(np.sum(q * q, axis=1) - 1.0) < 1e-14):
-            return states
+    if (np.abs(np.einsum("ij,ij->i", q, q) - 1.0) < 1e-14).all():
+        return states
     largest = np.abs(q).max(axis=1, keepdims=True)  # first, so that no square is beyond what a number holds
     scaled = q / largest
     states[:, 3:7] = scaled / np.sqrt(np.sum(scaled * scaled, axis=1, keepdims=True))

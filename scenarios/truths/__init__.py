@@ -3,6 +3,7 @@
 from scenarios.model import Scenario
 from scenarios.truths.bounce import bounce_ladder
 from scenarios.truths.corner_impact import corner_impact
+from scenarios.truths.coulomb_slide import coulomb_slide
 from scenarios.truths.flight import flight
 from scenarios.truths.truth import Impact, Truth
 
@@ -15,7 +16,7 @@ def truth_for(scene: Scenario) -> Truth | None:
     Returns:
         A callable of times [s] that gives a `Trajectory`, with the impacts in `events` and its limit in `horizon`.
     """
-    for problem in (flight, bounce_ladder, corner_impact):
+    for problem in (flight, bounce_ladder, corner_impact, coulomb_slide):
         truth = problem(scene)
         if truth is not None:
             return truth

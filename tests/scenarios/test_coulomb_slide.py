@@ -1,0 +1,60 @@
+"""A sliding box: Coulomb's law of even slowing, and where it is no longer the truth."""
+
+import numpy as np
+import pytest
+
+from scenarios import load, truth_for
+
+
+def sliding(friction=0.3, velocity=(3.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), height=0.1, half=(0.3, 0.1, 0.2), **more):
+    return load(
+        {
+            "name": "sliding",
+            "duration": 2.0,
+            "body": {"shape": "box", "half_extents": list(half), "mass": 2.0},
+            "start": {"position": [1.0, height, 2.0], "velocity": list(velocity), "angular_velocity": list(spin)},
+            "gravity": {"acceleration": [0.0, -9.8, 0.0]},
+            "floor": {"restitution": 0.0, "friction": friction},
+        }
+        | more
+    )
+
+
+@pytest.mark.parametrize("velocity", [(3.0, 0.0, 0.0), (0.0, 0.0, -2.0), (-1.2, 0.0, 1.6)])
+def test_it_stops_where_its_energy_is_spent(velocity):
+    """After v²/(2 f g), at v/(f g), to 1e-15; on the way kinetic energy and the work of friction add up, to 1e-14."""
+    scene = sliding(velocity=velocity)
+    truth = truth_for(scene)
+    assert truth.name == "coulomb-slide"
+    speed = np.linalg.norm(velocity)
+    end = truth([speed / (0.3 * 9.8), 2.0])
+    way = speed**2 / (2 * 0.3 * 9.8) * np.array(velocity) / speed
+    np.testing.assert_allclose(end.position, np.tile(scene.start.position + way, (2, 1)), rtol=0, atol=1e-15 * 4)
+    np.testing.assert_allclose(end.velocity, 0.0, atol=1e-15 * speed)
+    motion = truth(np.linspace(0, 2, 101))
+    gone = np.linalg.norm(motion.position - scene.start.position, axis=1)
+    np.testing.assert_allclose(0.5 * np.sum(motion.velocity**2, axis=1) + 0.3 * 9.8 * gone, 0.5 * speed**2, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        sliding(friction=3.1),  # tips over its leading edge: f times its height is more than its reach
+        sliding(friction="infinite"),
+        sliding(spin=(0.0, 1.0, 0.0)),
+        sliding(height=0.2),
+        sliding(velocity=(0.0, 0.0, 0.0)),
+        sliding(damping={"linear": 0.1}),
+        sliding(gravity={"acceleration": [1.0, -9.8, 0.0]}),
+    ],
+)
+def test_what_it_is_not_valid_for(scene):
+    """Tipping, sticking, spin, a fall, rest, damping, a slope."""
+    truth = truth_for(scene)
+    assert truth is None or truth.name != "coulomb-slide"
+
+
+def test_it_is_valid_up_to_where_the_box_would_tip():
+    """F h = b is the limit."""
+    assert truth_for(sliding(friction=2.99)).name == "coulomb-slide"
+    assert truth_for(sliding(friction=3.01)) is None

@@ -23,8 +23,9 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a sign gets a question mark, not a traceback
-    # Like Ctrl-C, so that nothing unfinished is left behind.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # SIGTERM like Ctrl-C, so that nothing unfinished is left behind.
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, _interrupt)
     try:
         sys.exit(_run())
     except (click.Abort, KeyboardInterrupt):
@@ -40,6 +41,20 @@ def main() -> None:
         click.echo("dropspin: an error of dropspin's own; please report what follows.", err=True)
         traceback.print_exc()
         sys.exit(OWN_ERROR)
+
+
+_interrupts: list[int] = []
+
+
+def _interrupt(number: int, frame: object) -> None:
+    _interrupts.append(number)
+    raise KeyboardInterrupt
+
+
+def _stop_if_interrupted() -> None:
+    """Raise the interrupt again: one that arrives within a callback of an engine or of the compiler is swallowed there."""
+    if _interrupts:
+        raise KeyboardInterrupt
 
 
 def _run() -> int:
@@ -93,7 +108,7 @@ def run(scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...
     SCENE is a name of the catalogue or the path of a TOML file. Without arguments: the core catalogue, three engines, three
     steps.
 
-    Exit code: 0 nothing failed, 1 an expectation failed, 2 bad input, 3 an engine broke down or one named is missing.
+    Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
     """
     import comparisons
     import reports
@@ -107,7 +122,13 @@ def run(scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...
     steps = dts or comparisons.DEFAULT_DTS
     with run_folder(output) as folder:
         with progress_bar(len(loaded) * len(chosen) * len(steps)) as progress:
-            results = comparisons.run(loaded, chosen, steps, progress)
+
+            def told(scene: str, engine: str, dt: float) -> None:
+                _stop_if_interrupted()
+                progress(scene, engine, dt)
+
+            results = comparisons.run(loaded, chosen, steps, told)
+        _stop_if_interrupted()
         if not json_output:
             reports.print_table(results)
         with status("writing the report"):

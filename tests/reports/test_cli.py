@@ -165,6 +165,18 @@ def test_interrupted_runs_leave_nothing(how, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_interrupt_that_is_swallowed_still_stops_the_run(tmp_path, monkeypatch):
+    """A callback of an engine or of the compiler may eat the exception; the next step of the run notices."""
+    from click.testing import CliRunner
+
+    from reports import cli
+
+    monkeypatch.setattr(cli, "_interrupts", [signal.SIGINT])
+    done = CliRunner().invoke(cli.dropspin, ["run", "spin-principal", "-e", "document", "--dt", "0.01", "-o", str(tmp_path / "out")])
+    assert done.exit_code != 0
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_output_that_cannot_be_written_to(tmp_path):
     """A full device: one line and exit code 2, not 1."""
     with Path("/dev/full").open("w") as full:

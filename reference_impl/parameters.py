@@ -16,8 +16,6 @@ Test = Callable[[Array], NDArray[np.bool_]]
 
 # The first column of each quantity: `pack` writes them in this order, the readers at the end of this file read them.
 STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, RADIUS, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 36
-
-
 FRICTION = FLOOR + 1
 
 
@@ -74,7 +72,8 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
     if world.damping is not None and len(world.damping) != 2:
         raise ValueError(f"damping: got {world.damping!r}; must be two rates, of velocity and of angular velocity, in 1/s")
     linear, angular = world.damping or (0.0, 0.0)
-    vertices = max(1, *_numbers("points", body.points, "finite numbers, in m").shape[-2:-1], 1)
+    points = _numbers("points", body.points, "finite numbers, in m")
+    vertices = max((1, *points.shape[-2:-1]))
     return {
         "dt": (dt, (), "a number above 0, in s", _is_above_zero),
         "gravity": (gravity, (3,), "finite numbers, in m/s²", is_finite),
@@ -85,7 +84,7 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
         "rest_speed": (floor.rest_speed, (), "0 or more, in m/s", _is_not_negative),
         "mass": (body.mass, (), "a number above 0, in kg", _is_above_zero),
         "inertia": (body.inertia, (3, 3), "a symmetric, positive definite 3 x 3 matrix, in kg m²", _is_inertia),
-        "points": (body.points, (vertices, 3), "finite numbers, in m, for one vertex at least", is_finite),
+        "points": (points, (vertices, 3), "finite numbers, in m, for one vertex at least", is_finite),
         "radius": (body.radius, (), "0 or more, in m", _is_not_negative),
     }
 

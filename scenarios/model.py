@@ -10,6 +10,9 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
 from scenarios.rotations import rotate
 
+TOUCHING = 1e-9
+"""Of the body's size: how near to the floor counts as on it."""
+
 
 def _unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
     length = math.hypot(*quaternion)
@@ -123,7 +126,7 @@ class Scenario(Table):
 
     @model_validator(mode="after")
     def _starts_above_the_floor(self) -> Self:
-        if self.floor is not None and self.clearance < -1e-9 * self.body.size:
+        if self.floor is not None and self.clearance < -TOUCHING * self.body.size:
             start = list(self.start.position)
             raise ValueError(f"start.position: got {start}; there the body is {-self.clearance:.3g} m below the floor; raise it")
         return self

@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.body import Sphere
-from scenarios.model import Floor, Scenario
+from scenarios.model import TOUCHING, Floor, Scenario
 from scenarios.rotations import rotate, unrotate
 from scenarios.truths.flight import flight_states
 from scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 
-TOUCHING = 1e-9  # of the body's size: how near to the floor counts as on it, as in the scene's own check
 MOST_BOUNCES = 100_000
 SHORTEST_FLIGHT = 1e-12
 """Flights shorter than this share of the first fall count as rest: their apexes are below 1e-24 of the drop's."""

@@ -21,7 +21,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from scenarios.body import Sphere
 from scenarios.mechanics import lowest_height
-from scenarios.model import Floor, Scenario
+from scenarios.model import TOUCHING, Floor, Scenario
 from scenarios.rotations import rotate, unrotate
 from scenarios.trajectory import Trajectory
 from scenarios.truths.flight import flight_states
@@ -34,7 +34,6 @@ CHUNK = 4000  # samples of the height at a time, in search of an impact
 FINEST_ANGLE = 0.02  # rad between two samples: a corner moves by less than 1e-4 of the body's size off a straight line
 MOST_CHUNKS = 1000
 ONE_CORNER = 1e-9  # of the body's size: how far above the corner that touches another one touches too
-TOUCHING = 1e-9  # of the body's size: how near to the floor counts as on it, as in the scene's own check
 MOST_IMPACTS = 10
 SHORTEST_FLIGHT = 1e-7  # s; impacts that come faster pile up, as at Zeno's time
 DISTURBANCE = 1e-10  # rad/s, of the start

@@ -12,13 +12,11 @@ coefficient above 0; gravity straight down, no damping. Restitution does not mat
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import Scenario
+from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import rotate
 from scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
-
-TOUCHING = 1e-9  # of the body's size: how near to the floor counts as on it, as in the scene's own check
 
 
 def coulomb_slide(scene: Scenario) -> Truth | None:

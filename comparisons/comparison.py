@@ -68,11 +68,14 @@ class Comparison:
 
     @cached_property
     def flights(self) -> list[Rows]:
-        """Rows in the inner half of each flight; the first one counts from the start, the last one to the end."""
+        """Rows in the inner half of each flight; the first one counts from the start, the last one to the end.
+
+        Without a reference only the flight up to the first contact is one.
+        """
         rows = np.arange(len(self.motion if self.reference is None else self.reference))
         times = self.motion.t[rows]
         if not self.impacts:
-            contact = self.first_contact
+            contact = self.first_contact if self.reference is None else None
             return [rows if contact is None else rows[: contact[0] + 1]]
         edges = [0.0, *self.impacts, times[-1]]
         inner = []
@@ -89,7 +92,7 @@ class Comparison:
     def energy_scale(self) -> float:
         """The energy the scene plays with [J]: M g H down to the floor or the start's kinetic energy, whichever is larger.
 
-        Without a floor it is the reference's largest kinetic energy; for a body that lies still, M g times its size.
+        H is the body's size for one that starts on the floor. Without a floor it is the reference's largest kinetic energy.
 
         Raises:
             Unresolved: There is no energy at all.
@@ -98,8 +101,8 @@ class Comparison:
         if self.scene.floor is None and self.reference is not None:
             scale = float(kinetic_energy(self.scene, self.reference).max())
         else:
-            scale = max(weight * self.scene.clearance, float(kinetic_energy(self.scene, self.motion[:1])[0]))
-        scale = scale or weight * self.scene.body.size  # a body that lies still
+            height = self.scene.clearance if self.scene.starts_above_floor else self.scene.body.size
+            scale = max(weight * height, float(kinetic_energy(self.scene, self.motion[:1])[0]))
         if scale == 0.0:
             raise Unresolved("nothing moves and nothing pulls: there is no energy to measure by")
         return scale

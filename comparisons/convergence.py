@@ -37,6 +37,7 @@ PLAIN_SERIES = 2.0
 """A sum of powers of the step whose terms add up to more than this many times their sum explains an error by cancellation only."""
 SAFETY = 3.0
 LOWEST_ORDER, HIGHEST_ORDER = 0.5, 8.0
+HIGHEST_WITHOUT_CLAIM = 2.0
 SAME_SLOPE = 0.3
 """Slopes between neighbouring steps that differ by less belong to one power of the step."""
 SAME_ORDER = 0.05
@@ -166,7 +167,8 @@ def _limit(h: Array, e: Array, noise: Array, claimed: float | None) -> tuple[flo
         return math.nan, math.nan, math.nan
     observed = float(brentq(excess, LOWEST_ORDER, HIGHEST_ORDER))
     nearest = min(MIXED_WITH, key=lambda p: abs(p - observed))
-    could_hide_lower_powers = nearest > 1.0 and nearest != claimed and _is_a_plain_series(h, e)
+    # A high order that nobody claims is more likely a coarsest step in trouble of its own.
+    could_hide_lower_powers = nearest != claimed and (nearest > HIGHEST_WITHOUT_CLAIM or (nearest > 1.0 and _is_a_plain_series(h, e)))
     if abs(nearest - observed) > NEAR_AN_ORDER or could_hide_lower_powers:
         return math.nan, math.nan, math.nan
 

@@ -1,4 +1,4 @@
-"""The metrics: each takes a motion beside its reference to a number, or to one for each flight.
+"""The metrics: each takes a motion beside its reference to a number, or to one or two for each flight.
 
 Flights are kept apart so that errors are averaged over start phases before the largest is picked, not after.
 """
@@ -16,6 +16,7 @@ from scenarios.mechanics import angular_momentum, energy, lowest_height
 from scenarios.rotations import angle_between_orientations, angle_between_vectors
 
 Array = NDArray[np.float64]
+LANDING = 3  # steps, within which every engine is done with an impact
 Measure = Callable[[Comparison], float | Array]
 
 
@@ -31,7 +32,7 @@ class Metric:
         definition: One sentence.
         needs: What a scene must have, in words.
         applies: Whether a scene, with its truth, has that.
-        measure: From a comparison to the number, or one a flight; raises `Unresolved` where the step is too coarse.
+        measure: From a comparison to the number, or to those of each flight; raises `Unresolved` where the step is too coarse.
         agreement: Whether two engines are held against each other by it.
         first_flight: Whether it looks no farther than the first impact and the flight after it.
     """
@@ -48,7 +49,7 @@ class Metric:
     first_flight: bool = False
 
     def average(self, cases: Sequence[Comparison]) -> "Average":
-        """Over start phases, and of several flights the largest in size, with its sign.
+        """Over start phases.
 
         Raises:
             Unresolved: The time step is too coarse to tell.
@@ -56,22 +57,28 @@ class Metric:
         measured = [np.atleast_1d(self.measure(case)) for case in cases]
         flights = min(map(len, measured))
         phases = np.array([values[:flights] for values in measured])
-        means = phases.mean(axis=0)
-        worst = int(np.argmax(np.abs(means)))
-        over_later_impacts = worst > 1 or (flights == 1 and not self.first_flight and len(cases[0].impacts) > 1)
-        if over_later_impacts:
-            # The phases are even at the first impact only; what they draw at later ones is correlated, hardly better than one draw.
-            return Average(float(means[worst]), float(phases[:, worst].std()))
         # Each quarter of the phases, evenly spread as all of them are, gives a mean of its own.
-        quarters = [phases[first::4, worst].mean() for first in range(min(4, len(phases)))]
-        return Average(float(means[worst]), float(0.5 * np.ptp(quarters)))
+        quarters = [phases[first::4].mean(axis=0) for first in range(min(4, len(phases)))]
+        resolutions = 0.5 * np.ptp(quarters, axis=0)
+        # The phases are even at the first impact only; what they draw at later ones is correlated, hardly better than one draw.
+        later = 2 if flights > 1 or self.first_flight or len(cases[0].impacts) < 2 else 0
+        resolutions[later:] = phases[:, later:].std(axis=0)
+        return Average(phases.mean(axis=0), resolutions)
 
 
 class Average(NamedTuple):
-    """A metric's mean over start phases, and how finely these phases resolve it."""
+    """A metric's means over start phases and how finely these phases resolve them.
 
-    value: float
-    resolution: float
+    One for each flight, shape (flights,), or for each flight the largest and the least, shape (flights, 2).
+    """
+
+    parts: Array
+    resolutions: Array
+
+    @property
+    def value(self) -> float:
+        """The part of largest size, with its sign."""
+        return float(self.parts.flat[np.argmax(np.abs(self.parts))])
 
 
 METRICS: dict[str, Metric] = {}
@@ -107,12 +114,18 @@ def _has_truth(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def _spins(scene: Scenario, truth: Truth | None) -> bool:
-    states = [] if truth is None else [scene.initial_state, *(event.after for event in truth.events)]
-    return any(np.any(state[10:13] != 0.0) for state in states)
+    if truth is None:
+        return False
+    sampled = truth(np.linspace(0.0, min(scene.duration, truth.horizon), 9))
+    return bool(sampled.angular_velocity.any()) or any(event.after[10:13].any() for event in truth.events)
 
 
 def _has_impact(scene: Scenario, truth: Truth | None) -> bool:
-    return truth is not None and len(truth.events) > 0 and scene.clearance > 0.0
+    return truth is not None and len(truth.events) > 0 and scene.starts_above_floor
+
+
+def _lands(scene: Scenario, truth: Truth | None) -> bool:
+    return truth is not None and not _starts_in_flight(scene) and len(truth.events) > 0 and bool(truth.events[0].before[10:13].any())
 
 
 def _has_apex(scene: Scenario, truth: Truth | None) -> bool:
@@ -127,6 +140,18 @@ def _keeps_energy(scene: Scenario, truth: Truth | None) -> bool:
     return scene.damping is None
 
 
+def _keeps_energy_in_flight(scene: Scenario, truth: Truth | None) -> bool:
+    return scene.damping is None and _starts_in_flight(scene)
+
+
+def _spins_in_flight(scene: Scenario, truth: Truth | None) -> bool:
+    return _starts_in_flight(scene) and _spins(scene, truth)
+
+
+def _starts_in_flight(scene: Scenario) -> bool:
+    return scene.floor is None or scene.starts_above_floor
+
+
 def _keeps_horizontal_momentum(scene: Scenario, truth: Truth | None) -> bool:
     upright = scene.acceleration[0] == 0.0 and scene.acceleration[2] == 0.0
     return upright and scene.damping is None and scene.floor is not None and scene.floor.friction == "none"
@@ -136,17 +161,17 @@ def _keeps_horizontal_momentum(scene: Scenario, truth: Truth | None) -> bool:
 def energy_error(case: Comparison) -> Array:
     """Largest difference of energy from the truth in flight, velocity synchronised with position, over the scene's energy."""
     found = energy(case.scene, case.compared) - energy(case.scene, case.exact)
-    return _largest_of_each_flight(found, case) / case.energy_scale
+    return _extremes_of_each_flight(found, case) / case.energy_scale
 
 
 @_metric("1", "truth", "a truth", _has_truth, signed=True)
 def energy_error_raw(case: Comparison) -> Array:
     """The same from the state as it stands: what a user sees who does not know that velocity lags by half a step."""
     found = energy(case.scene, case.compared, synchronised=False) - energy(case.scene, case.exact)
-    return _largest_of_each_flight(found, case) / case.energy_scale
+    return _extremes_of_each_flight(found, case) / case.energy_scale
 
 
-@_metric("1", "invariant", "no damping", _keeps_energy, signed=True, first_flight=True)
+@_metric("1", "invariant", "no damping, a start in flight", _keeps_energy_in_flight, signed=True, first_flight=True)
 def energy_drift(case: Comparison) -> float:
     """Change of energy from the start to the end of the first flight, over the scene's energy."""
     rows = case.flights[0]
@@ -187,6 +212,17 @@ def restitution_error(case: Comparison) -> float:
     return -separation / approach - meant
 
 
+@_metric("1", "truth", "a truth that turns on the floor before its first impact", _lands, signed=True, first_flight=True)
+def landing_error(case: Comparison) -> float:
+    """Angular speed three steps after over three steps before the first landing, minus the truth's."""
+    rows = np.searchsorted(case.motion.t, case.impacts[0]) + np.array([-LANDING, LANDING])
+    if rows[1] >= len(case.exact):
+        raise Unresolved("the landing falls into the last three steps")
+    axis = case.exact.angular_velocity[rows[0]]
+    found, exact = (motion.angular_velocity[rows] @ axis for motion in (case.compared, case.exact))
+    return float(found[1] / found[0] - exact[1] / exact[0])
+
+
 @_metric("1", "truth", "a truth with spin", _spins, agreement=True)
 def angular_momentum_error(case: Comparison) -> Array:
     """Largest difference of angular momentum from the truth in flight, over the truth's largest."""
@@ -197,7 +233,7 @@ def angular_momentum_error(case: Comparison) -> Array:
     return _largest_of_each_flight(np.linalg.norm(found - exact, axis=1), case) / scale
 
 
-@_metric("rad", "truth", "a truth with spin", _spins)
+@_metric("rad", "truth", "a truth with spin, a start in flight", _spins_in_flight)
 def angular_momentum_direction_error(case: Comparison) -> Array:
     """Largest angle in flight between the angular momentum and the truth's."""
     found, exact = (angular_momentum(case.scene, motion) for motion in (case.compared, case.exact))
@@ -237,5 +273,10 @@ def _apex(scene: Scenario, motion: Trajectory) -> Array:
 
 
 def _largest_of_each_flight(values: Array, case: Comparison) -> Array:
-    """The value of largest size in each flight, with its sign."""
-    return np.array([values[rows][np.argmax(np.abs(values[rows]))] for rows in case.flights])
+    """The largest in each flight of values that are not negative, shape (flights,)."""
+    return np.array([values[rows].max() for rows in case.flights])
+
+
+def _extremes_of_each_flight(values: Array, case: Comparison) -> Array:
+    """The largest and the least value in each flight, shape (flights, 2): each of them shrinks with the step by a law of its own."""
+    return np.array([(values[rows].max(), values[rows].min()) for rows in case.flights])

@@ -13,7 +13,7 @@ from comparisons.building import assert_built_as_meant, sound_record
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Diverged, Engine, EngineMissing
 from comparisons.engines.registry import engine as engine_named
-from comparisons.metrics import METRICS, Metric, metrics_for
+from comparisons.metrics import METRICS, Average, Metric, metrics_for
 from comparisons.phases import start_phases
 from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
@@ -218,10 +218,11 @@ def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: lis
     """A metric's mean over the start phases, judged."""
     try:
         with np.errstate(all="ignore"):  # an engine may say 1e300; what comes of it is inf or NaN, and judged as such
-            value, resolution = metric.average(cases)
+            average = metric.average(cases)
         unresolved = ""
     except Unresolved as error:
-        value, resolution, unresolved = float("nan"), float("nan"), str(error)
+        average, unresolved = Average(np.array([np.nan]), np.array([np.nan])), str(error)
+    value = average.value
     judgement = judge(scene, label, dt, metric, value)
     reason = "; ".join(filter(None, [unresolved, judgement.reason]))
     # What should be a number and is none is a failure, expected or not; what the step cannot resolve fails only what was expected.
@@ -230,7 +231,7 @@ def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: lis
         reason = "not a number: what is measured here never happened"
     cause = "unresolved" if unresolved else ""
     measurement = {"value": value, "lower": judgement.lower, "upper": judgement.upper, "verdict": verdict, "cause": cause, "reason": reason}
-    return measurement | {"resolution": resolution}
+    return measurement | {"average": average}
 
 
 def _agreement_rows(

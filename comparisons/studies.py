@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from comparisons.convergence import Convergence, says_something, take_apart
 from comparisons.engines.base import Engine
-from comparisons.metrics import METRICS
+from comparisons.metrics import METRICS, Average
 from comparisons.verdicts import Verdict, known_fault
 from scenarios import Scenario
 
@@ -58,8 +58,15 @@ def _metrics(rows: Iterable[Row]) -> list[str]:
 
 
 def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row]) -> tuple[Array, Array, Array, Array]:
-    dts, errors, resolutions, steps = (
-        np.array([row[name] for row in measured], dtype=float) for name in ("dt", "value", "resolution", "steps")
+    """Steps, errors, how finely these are resolved and what rounding may do; of the part that is worst at the finest step."""
+    dts, steps = (np.array([row[name] for row in measured], dtype=float) for name in ("dt", "steps"))
+    averages: list[Average] = [row["average"] for row in measured]
+    told = [average for average in averages if np.isfinite(average.parts).all()]
+    shape = min((average.parts.shape for average in told), default=(1,))
+    finest = averages[int(np.argmin(dts))].parts[: shape[0]]
+    worst = np.unravel_index(np.argmax(np.abs(finest)), finest.shape)
+    errors, resolutions = (
+        np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both]) for both in zip(*averages, strict=True)
     )
     scale = scene.body.size + float(np.linalg.norm(scene.start.position)) if METRICS[metric].unit == "m" else 1.0
     rounding = scale * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(engine.precision).eps) * steps)

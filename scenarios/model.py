@@ -144,6 +144,11 @@ class Scenario(Table):
         return self.start.position[1] + float(heights.min()) - self.body.rounding
 
     @property
+    def starts_above_floor(self) -> bool:
+        """Whether the body has to fall to touch the floor; False without one."""
+        return self.floor is not None and self.clearance > TOUCHING * self.body.size
+
+    @property
     def acceleration(self) -> Array:
         """Gravity [m/s²], shape (3,); zero where the scene has none."""
         return np.zeros(3) if self.gravity is None else np.array(self.gravity.acceleration)

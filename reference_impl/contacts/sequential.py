@@ -64,8 +64,11 @@ def _improve(j, K, u, wanted, friction):
     normal = max(j.y + (wanted - u.y) / K.row2.y, 0.0)
     if friction == 0.0:
         return Vec3(0.0, normal, 0.0)
-    x = j.x - u.x / K.row1.x
-    z = j.z - u.z / K.row3.z
+    # One scale for both directions, so that where it slips friction is opposite to the slip: that of the direction that gives way most.
+    half_difference = 0.5 * (K.row1.x - K.row3.z)
+    softest = 0.5 * (K.row1.x + K.row3.z) + math.sqrt(half_difference * half_difference + K.row1.z * K.row1.z)
+    x = j.x - u.x / softest
+    z = j.z - u.z / softest
     length = math.sqrt(x * x + z * z)
     most = friction * normal if normal > 0.0 else 0.0
     scale = 1.0 if length <= most else most / length

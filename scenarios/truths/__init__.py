@@ -4,7 +4,10 @@ from scenarios.model import Scenario
 from scenarios.truths.bounce import bounce_ladder
 from scenarios.truths.corner_impact import corner_impact
 from scenarios.truths.coulomb_slide import coulomb_slide
+from scenarios.truths.coulomb_turn import coulomb_turn
 from scenarios.truths.flight import flight
+from scenarios.truths.rocking import rocking
+from scenarios.truths.slipping import slipping
 from scenarios.truths.truth import Impact, Truth
 
 __all__ = ["Impact", "Truth", "truth_for"]
@@ -16,7 +19,7 @@ def truth_for(scene: Scenario) -> Truth | None:
     Returns:
         A callable of times [s] that gives a `Trajectory`, with the impacts in `events` and its limit in `horizon`.
     """
-    for problem in (flight, bounce_ladder, corner_impact, coulomb_slide):
+    for problem in (flight, bounce_ladder, rocking, slipping, corner_impact, coulomb_slide, coulomb_turn):
         truth = problem(scene)
         if truth is not None:
             return truth

@@ -25,21 +25,21 @@ class Jacobi(NamedTuple):
     dn: Array
 
 
-def jacobi(u: Array, m1: float) -> Jacobi:
-    """sn, cn and dn of u for the complementary parameter m₁ = 1 - k² in [0, 1].
+def jacobi(u: Array, m1: float | Array) -> Jacobi:
+    """sn, cn and dn of u for the complementary parameter m₁ = 1 - k² in [0, 1], or for one in (0, 1] for each u.
 
     By Gauss's transformation, on cn/sn rather than on the amplitude: the amplitude would lose half the digits where sn is
     near 1, which is nearly everywhere on a motion near the separatrix.
 
     Source: R. Bulirsch, Numerische Mathematik 7 (1965), 78-90, procedure sncndn.
     """
-    if m1 == 0.0:
+    if not np.any(m1):
         sech = 1.0 / np.cosh(u)
         return Jacobi(np.tanh(u), sech, sech)
-    a, b = 1.0, math.sqrt(m1)
+    a, b = np.ones_like(m1), np.sqrt(m1)
     steps = [(a, b)]
-    while abs(a - b) > CONVERGED * a:
-        a, b = 0.5 * (a + b), math.sqrt(a * b)
+    while np.any(np.abs(a - b) > CONVERGED * a):
+        a, b = 0.5 * (a + b), np.sqrt(a * b)
         steps.append((a, b))
     mean = 0.5 * (a + b)
     sine, cosine = np.sin(mean * u), np.cos(mean * u)

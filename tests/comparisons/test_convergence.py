@@ -79,6 +79,13 @@ def test_without_a_claim_a_higher_power_may_hide_a_lower_one():
     assert apart(errors, floor=1e-30, claimed=2.0).cause == "model"
 
 
+def test_a_coarsest_step_in_trouble_of_its_own_is_no_high_order():
+    """Two finer steps that halve and a coarse one far off fit order 4 with a limit; without a claim that is not believed."""
+    errors = [4.035e-3, 4.522e-4, 2.321e-4]  # PyBullet's first contact of a box that turns
+    assert apart(errors).cause == "discretisation"
+    assert apart(errors, claimed=4.0).cause == "model"
+
+
 def test_an_order_that_changes_from_step_to_step_is_not_asymptotic():
     """Only an order that stays may be held against a claim."""
     assert apart(H).is_asymptotic

@@ -38,7 +38,8 @@ def test_the_shipped_catalogue_passes(core):
     failed = core.frame[core.frame["verdict"].isin(["failed", "crashed", "diverged", "no_truth"])]
     assert failed.empty, failed.to_string()
     declined = core.frame[core.frame["verdict"] == "declined"]
-    assert set(zip(declined["scene"], declined["engine"], strict=True)) == {("slide-box", "document"), ("slide-box", "mujoco")}
+    rough = {(scene, engine) for scene in ("slide-box", "turn-box-rough") for engine in ("document", "mujoco")}
+    assert set(zip(declined["scene"], declined["engine"], strict=True)) == rough
     assert core.exit_code() == 0
     assert (core.frame["verdict"] == "passed").sum() > 200
 

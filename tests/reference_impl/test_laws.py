@@ -283,6 +283,16 @@ def test_sequential_says_when_it_did_not_settle():
     assert 0 < unsettled < 10
 
 
+def test_sequential_friction_is_opposite_to_the_slip():
+    """A flat box that turns on four corners: the moment of friction is f M g ρ to 1e-9, though a corner gives way unequally to x and z."""
+    points = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.1, 0.1) for z in (-0.2, 0.2)])
+    body = Body(1.0, reference_impl.solid_box_inertia(1.0, np.array([0.3, 0.1, 0.2])), points)
+    state = np.array([0, 0.1 - 1e-6, 0, 0, 0, 0, 1, 0, 0, 0, 0, 10.0, 0], dtype=float)
+    after = reference_impl.step(state, body, World(G, Floor(0.0, 0.3)), 1e-3, methods=Methods(law="coulomb", contact="sequential"))
+    slowing = 0.3 * 9.8 * np.hypot(0.3, 0.2) / body.inertia[1, 1]
+    np.testing.assert_allclose(after[10:13], [0.0, 10.0 - 1e-3 * slowing, 0.0], atol=1e-9)
+
+
 def test_sequential_falls_flat_as_one():
     """Four corners at once, restitution 0.5: straight up, no turn."""
     body = cube(0.1)

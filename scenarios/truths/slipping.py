@@ -1,0 +1,104 @@
+"""A box on one edge falls over on a frictionless floor: the edge slips, the centre of mass comes straight down.
+
+ψ is the angle at the edge between the vertical and the centre of mass, R their distance, k = I/(M R²); energy is kept:
+
+    (k + sin²ψ) ψ'² = 2 (g/R) (cos ψ_rest - cos ψ)
+
+With sin(ψ/2) = √s cosh u, s = sin²(ψ_rest/2), the time since rest is the integral of a smooth function,
+
+    dt/du = √((k + sin²ψ) R/g) / cos(ψ/2)
+
+which is no elliptic integral: it is taken of its Chebyshev series, and inverted by Newton's method.
+
+Source: the integrals of energy and of horizontal momentum; C. W. Clenshaw & A. R. Curtis, Numerische Mathematik 2 (1960), for the time.
+Valid for: a box that stands on one edge, at rest, sliding evenly or turning about the edge too slowly to pass the top; a frictionless
+floor; gravity straight down, no damping; until the box lands. The floor never has to pull.
+"""
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.polynomial import Chebyshev
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from scenarios.model import TOUCHING, Scenario
+from scenarios.rotations import about, multiply
+from scenarios.truths.stand import LEAST_LEVEL, UP, Stand, on_one_edge
+from scenarios.truths.truth import Truth
+
+Array = NDArray[np.float64]
+
+FIRST_DEGREE, LAST_DEGREE = 16, 512
+NEGLIGIBLE = 1e-15
+GUESSES = 500  # of the cubic, good for 1e-9 and so for the square of that after Newton
+
+
+def slipping(scene: Scenario) -> Truth | None:
+    """The truth of a box whose edge slips."""
+    floor = scene.floor
+    if floor is None or floor.friction != "none" or scene.damping is not None:
+        return None
+    stand = on_one_edge(scene)
+    if stand is None or abs(scene.initial_state[8] + stand.speed * stand.radius * math.sin(stand.angle)) > TOUCHING * abs(stand.speed):
+        return None
+    at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.flat) ** 2
+    level = at_start - 0.25 * (stand.share + math.sin(stand.angle) ** 2) * stand.radius / stand.gravity * stand.speed**2
+    if level < LEAST_LEVEL:
+        return None
+    since_rest = _time_since_rest(stand, level, at_end)
+    rest = math.copysign(float(since_rest(math.acosh(math.sqrt(max(at_start / level, 1.0))))), -stand.speed)
+    lands = rest + float(since_rest(since_rest.domain[1]))
+
+    inverse = _inverse(since_rest, partial(_pace, stand, level))
+
+    def states(t: Array) -> Array:
+        u = inverse(t - rest)
+        half_sine = math.sqrt(level) * np.cosh(u)
+        angle = 2.0 * np.arcsin(half_sine)
+        speed = 2.0 * math.sqrt(level) * np.sinh(u) / np.sqrt(1.0 - half_sine**2) / _pace(stand, level, u)
+        return _states(scene, stand, t, angle, speed)
+
+    statement = "integrals of energy and of horizontal momentum; time by a Chebyshev series (Clenshaw & Curtis 1960)"
+    return Truth("slipping", statement, states, horizon=min(lands, scene.duration))
+
+
+def _pace(stand: Stand, level: float, u: Array) -> Array:
+    """dt/du [s]."""
+    square = level * np.cosh(u) ** 2
+    return np.sqrt((stand.share + 4.0 * square * (1.0 - square)) * stand.radius / (stand.gravity * (1.0 - square)))
+
+
+def _time_since_rest(stand: Stand, level: float, at_end: float) -> Chebyshev:
+    """Time since rest [s] over u, from rest to landing."""
+    degree, end = FIRST_DEGREE, math.acosh(math.sqrt(at_end / level))
+    while True:
+        pace = Chebyshev.interpolate(partial(_pace, stand, level), degree, domain=[0.0, end])
+        if degree == LAST_DEGREE or np.abs(pace.coef[-4:]).max() < NEGLIGIBLE * np.abs(pace.coef).max():
+            return pace.integ(lbnd=0.0)
+        degree *= 2
+
+
+def _inverse(since_rest: Chebyshev, pace: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """The function from times since rest [s] to u: one step of Newton's from a cubic; before rest as after it, but for the sign."""
+    u = np.linspace(0.0, since_rest.domain[1], GUESSES)
+    guess = CubicHermiteSpline(since_rest(u), u, 1.0 / pace(u))
+
+    def inverse(times: Array) -> Array:
+        u = guess(np.abs(times))
+        return np.copysign(u - (since_rest(u) - np.abs(times)) / pace(u), times)
+
+    return inverse
+
+
+def _states(scene: Scenario, stand: Stand, t: Array, angle: Array, speed: Array) -> Array:
+    """Angles ψ [rad] and speeds ψ' [rad/s] at times [s], shapes (n,), as states, shape (n, 13)."""
+    start, t_ = scene.initial_state, t[:, None]
+    sideways = start[7:10] * np.array([1.0, 0.0, 1.0])
+    position = start[0:3] + sideways * t_
+    position[:, 1] = stand.pivot[1] + stand.radius * np.cos(angle)
+    velocity = sideways - (stand.radius * np.sin(angle) * speed)[:, None] * UP
+    orientation = multiply(about(stand.falling, angle - stand.angle), start[3:7])
+    return np.hstack([position, orientation, velocity, speed[:, None] * stand.falling])

@@ -1,0 +1,61 @@
+"""A box that turns flat on a rough floor: Coulomb's law of even slowing, and where it is no longer the truth."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from scenarios import load, truth_for
+from scenarios.rotations import rotate
+
+HALF = np.array([0.3, 0.1, 0.2])
+
+
+def turning(spin=(0.0, -8.0, 0.0), orientation=(0.0, 0.3, 0.0, 0.9), height=0.1, friction=0.3, **more):
+    return load(
+        {
+            "name": "turning",
+            "duration": 1.0,
+            "body": {"shape": "box", "half_extents": HALF.tolist(), "mass": 2.0, "inertia": [0.05, 0.06, 0.07]},
+            "start": {"position": [1.0, height, 2.0], "orientation": list(orientation), "angular_velocity": list(spin)},
+            "gravity": {"acceleration": [0.0, -9.8, 0.0]},
+            "floor": {"restitution": 0.4, "friction": friction},
+        }
+        | more
+    )
+
+
+@pytest.mark.parametrize(("upright", "moment"), [(0, 0.05), (1, 0.06), (2, 0.07)])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_friction_at_the_corners_spends_the_energy(upright, moment, direction):
+    """On any face: the work of f M g/4 at each corner along its path of ρ φ is what is lost, and nothing is left; to 1e-14."""
+    axis = np.roll([1.0, 0.0, 0.0], upright)
+    quaternion = {0: [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)], 1: [0.0, 0.0, 0.0, 1.0], 2: [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]}[upright]
+    assert abs(rotate(np.array(quaternion), axis)[1]) == pytest.approx(1.0)
+    scene = turning((0.0, 8.0 * direction, 0.0), quaternion, HALF[upright])
+    truth = truth_for(scene)
+    assert truth.name == "coulomb-turn"
+    motion = truth(np.linspace(0.0, 1.0, 401))
+    angle = np.unwrap((Rotation.from_quat(motion.orientation) * Rotation.from_quat(quaternion).inv()).as_rotvec()[:, 1])
+    lever = np.sqrt(np.sum(HALF**2) - HALF[upright] ** 2)
+    left = 0.5 * moment * motion.angular_velocity[:, 1] ** 2
+    np.testing.assert_allclose(left, 0.5 * moment * 64.0 - 0.3 * 2.0 * 9.8 * lever * np.abs(angle), atol=1e-13)
+    assert left[-1] == 0.0
+    assert np.sign(motion.angular_velocity[0, 1]) == np.sign(angle[-1]) == direction
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"friction": "infinite"},
+        {"height": 0.2},
+        {"spin": (0.1, 3.0, 0.0)},
+        {"spin": (0.0, 0.0, 0.0)},
+        {"orientation": (0.1, 0.0, 0.0, 1.0), "height": 0.3},
+        {"damping": {"angular": 0.1}},
+        {"body": {"shape": "sphere", "radius": 0.1, "mass": 2.0}},
+    ],
+)
+def test_what_it_is_not_valid_for(change):
+    """Sticking, a fall, wobble, rest, a tilt, damping, a ball."""
+    truth = truth_for(turning(**change))
+    assert truth is None or truth.name != "coulomb-turn"

@@ -4,7 +4,8 @@ from comparisons.engines.base import AsBuilt, Diverged, Engine, EngineMissing, S
 from comparisons.engines.registry import engine, engine_names
 from comparisons.metrics import METRICS
 from comparisons.results import Results
-from comparisons.run import DEFAULT_DTS, measure, run, simulate
+from comparisons.run import DEFAULT_DTS, measure, run
+from comparisons.simulating import simulate
 
 __all__ = [
     "DEFAULT_DTS",

@@ -29,6 +29,8 @@ SHORT_OF_ORDER = 0.25
 """How far three steps may find an order below the one claimed."""
 LOST = 0.9 * math.pi
 """An angle that has come near half a turn cannot grow on: how wrong it is can no longer be told."""
+OUT_OF_STEP = 0.5
+"""Of the height of the drop: a bouncing body that is so far off is in another flight, and how wrong that is can no longer be told."""
 
 
 def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row]:
@@ -72,6 +74,8 @@ def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row
     rounding = scale * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(engine.precision).eps) * steps)
     if METRICS[metric].unit == "rad":
         errors[np.abs(errors) > LOST] = math.nan
+    if metric == "position_error" and scene.starts_above_floor:
+        errors[np.abs(errors) > OUT_OF_STEP * scene.clearance] = math.nan
     return dts, errors, resolutions, rounding
 
 

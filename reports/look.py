@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from comparisons import METRICS, EngineMissing, engine, engine_names, simulate
 from comparisons.building import assert_built_as_meant
 from comparisons.provenance import processor, versions
-from comparisons.run import assert_step_fits
+from comparisons.simulating import assert_step_fits
 from comparisons.verdicts import assert_expectations_can_be_judged
 from reports.html import left_out, modelled
 from reports.numbers import bound

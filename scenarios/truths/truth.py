@@ -1,7 +1,7 @@
 """What a truth is: the exact motion, the impacts in it, and until when it holds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,6 +49,11 @@ class Truth:
     def covers(self, t: Array) -> NDArray[np.bool_]:
         """Which times [s] are not past the horizon; the last of n dt may round past it."""
         return t <= self.horizon * (1.0 + 1e-9)
+
+    def after(self, delay: float) -> "Truth":
+        """The rest of the motion, from a moment on that is not beyond the first impact [s]."""
+        later = tuple(replace(event, time=event.time - delay) for event in self.events)
+        return replace(self, states=lambda t: self.states(t + delay), events=later, horizon=self.horizon - delay)
 
     def __call__(self, times: ArrayLike) -> Trajectory:
         """The motion at times [s] from 0 to `horizon`, shape (n,).

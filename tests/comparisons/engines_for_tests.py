@@ -1,10 +1,13 @@
-"""Engines made for tests: the exact motion, sampled, and the same with one fault each."""
+"""Engines made for tests: the exact motion, sampled, and the same with one fault each; and the scenes that take seconds."""
 
 import numpy as np
 
 from comparisons import Diverged, Engine, Simulation
-from scenarios import truth_for
+from scenarios import load, names, truth_for
 from scenarios.rotations import multiply
+
+SLOW = tuple(name for name in names() if "slow" in load(name).tags)
+QUICK = tuple(name for name in names() if name not in SLOW)
 
 
 class ExactSimulation(Simulation):

@@ -23,7 +23,7 @@ BALL = scenarios.load("drop-ball")
 @pytest.fixture(scope="module")
 def core():
     """The core catalogue through the three engines at the default steps: what `dropspin run` does."""
-    return comparisons.run([scenarios.load(name) for name in scenarios.names()], ["document", "mujoco", "pybullet"])
+    return comparisons.run([scenarios.load(name) for name in made.QUICK], ["document", "mujoco", "pybullet"])
 
 
 def value(results, scene, engine, metric, dt=1e-3):
@@ -35,13 +35,26 @@ def value(results, scene, engine, metric, dt=1e-3):
 
 def test_the_shipped_catalogue_passes(core):
     """No expectation fails, nothing breaks down, the exit code is 0, and most rows are judged."""
-    failed = core.frame[core.frame["verdict"].isin(["failed", "crashed", "diverged", "no_truth"])]
-    assert failed.empty, failed.to_string()
+    assert core.frame[core.frame["verdict"].isin(["failed", "crashed", "diverged", "no_truth"])].empty, failures_of(core)
     declined = core.frame[core.frame["verdict"] == "declined"]
     rough = {(scene, engine) for scene in ("slide-box", "turn-box-rough") for engine in ("document", "mujoco")}
     assert set(zip(declined["scene"], declined["engine"], strict=True)) == rough
     assert core.exit_code() == 0
     assert (core.frame["verdict"] == "passed").sum() > 200
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", made.SLOW)
+def test_the_slow_scenes_pass_too(name):
+    """As above, one at a time; a thousand seconds in steps of the size that games take."""
+    dts = [1 / 60, 1 / 120, 1 / 240] if name == "rest-long" else [4e-3, 2e-3, 1e-3]
+    found = comparisons.run([scenarios.load(name)], ["document", "mujoco", "pybullet"], dts)
+    assert set(found.frame["verdict"]) <= {"passed", "measured"}, failures_of(found)
+    assert (found.frame["verdict"] == "passed").sum() > 30
+
+
+def failures_of(results):
+    return results.frame[results.frame["verdict"] == "failed"].to_string()
 
 
 def test_table(core):
@@ -127,7 +140,7 @@ def test_engines_are_held_against_each_other(core):
 
 def test_an_exact_engine_passes_everywhere():
     """A stranger without any error fails no expectation."""
-    found = comparisons.run([scenarios.load(name) for name in scenarios.names()], [made.Exact()], [1e-3])
+    found = comparisons.run([scenarios.load(name) for name in made.QUICK], [made.Exact()], [1e-3])
     failed = found.frame[found.frame["verdict"] == "failed"]
     assert failed.empty, failed.to_string()
 

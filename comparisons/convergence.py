@@ -80,7 +80,9 @@ def says_something(dts: Sequence[float]) -> bool:
     return len(dts) >= LEAST_STEPS and max(dts) / min(dts) >= SMALLEST_RANGE
 
 
-def take_apart(dts: Array, errors: Array, resolution: Array, rounding: Array, claimed: float | None = None) -> Convergence:
+def take_apart(
+    dts: Array, errors: Array, resolution: Array, rounding: Array, claimed: float | None = None, *, signed: bool = True
+) -> Convergence:
     """The order, limit and cause of one error.
 
     Args:
@@ -89,6 +91,7 @@ def take_apart(dts: Array, errors: Array, resolution: Array, rounding: Array, cl
         resolution: How finely each was measured (start phases are a sample), in the same unit.
         rounding: What rounding alone may have brought about.
         claimed: The order that the method is known to have, if it is; else lower powers of the step may hide behind a higher one.
+        signed: Whether the error can be negative; one that cannot has no negative limit either, however it looks from three steps.
     """
     coarsest_first = np.argsort(-dts)
     h, e, noise, floor = (values[coarsest_first] for values in (dts, errors, resolution, rounding))
@@ -111,7 +114,7 @@ def take_apart(dts: Array, errors: Array, resolution: Array, rounding: Array, cl
         return Convergence("discretisation", math.nan, (), untold, float(e[-1]), float(noise[-1] + floor[-1]), told)
     finest = slice(window.stop - 3, window.stop) if steps else slice(len(h) - 3, len(h))
     observed, limit, uncertainty = _limit(h[finest], e[finest], noise[finest], claimed)
-    uncertainty += float(floor[-1])
+    uncertainty = max(uncertainty + float(floor[-1]), 0.0 if signed else -limit)
     if math.isnan(observed) and steps:
         told = f"shrinks as step^{order:.2f}; its limit cannot be told"
         most = float(abs(e[-1]) + noise[-1] + floor[-1])

@@ -44,7 +44,7 @@ def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row
     for metric in _metrics(rows):
         measured = [row for row in rows if row.get("metric") == metric]
         dts, errors, resolutions, rounding = _series(scene, engine, metric, measured)
-        found = take_apart(dts, errors, resolutions, rounding, engine.order_in(scene))
+        found = take_apart(dts, errors, resolutions, rounding, engine.order_in(scene), signed=METRICS[metric].signed)
         for row in measured:
             row["cause"] = row["cause"] or found.cause
         shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}

@@ -6,19 +6,27 @@ from scenarios.truths.corner_impact import corner_impact
 from scenarios.truths.coulomb_slide import coulomb_slide
 from scenarios.truths.coulomb_turn import coulomb_turn
 from scenarios.truths.flight import flight
+from scenarios.truths.impact_laws import LAWS, Law
 from scenarios.truths.rocking import rocking
 from scenarios.truths.slipping import slipping
 from scenarios.truths.truth import Impact, Truth
 
-__all__ = ["Impact", "Truth", "truth_for"]
+__all__ = ["LAWS", "Impact", "Law", "Truth", "truth_for"]
 
 
-def truth_for(scene: Scenario) -> Truth | None:
+def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     """The exact motion of a scene, or None where there is no closed form for it.
+
+    Args:
+        scene: The scene.
+        law: An impact law to take in the place of the floor's own, for bodies that strike with a corner, an edge or as a ball: what an
+            engine must converge to that has this law.
 
     Returns:
         A callable of times [s] that gives a `Trajectory`, with the impacts in `events` and its limit in `horizon`.
     """
+    if law is not None:
+        return corner_impact(scene, law)
     for problem in (flight, bounce_ladder, rocking, slipping, corner_impact, coulomb_slide, coulomb_turn):
         truth = problem(scene)
         if truth is not None:

@@ -1,14 +1,13 @@
 """A body falls and strikes the floor with a corner, an edge or as a ball, again and again: flight, one impulse, flight.
 
-With r from the centre of mass to the corner, v_c = v + ω × r, and K = 1/M - r* I⁻¹ r* (the note's eq 15):
-
-    frictionless   j = -(1 + e) v_n / (N·K N) N             the impulse is normal
-    sticking       K j = -v_c - e v_n N                     the note's eq 17, Newton's restitution
+The impulse is that of `impact_laws`: normal without friction, the note's eq 17 where the floor grips, Coulomb's for a ball; or that of the
+law asked for.
 
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
 Valid for: one corner alone touches, or the two of an edge that meet the floor at once and with one velocity, before and after; a ball with
-any spin; no damping; from the start to the tenth impact at most, to an impact that is not of this kind, to one after which the body stays
-on the floor, or to where a disturbance of 1e-10 rad/s at the start has grown to 1e-6, whichever comes first.
+any spin; a Coulomb coefficient for a ball only, or by the law asked for; no damping; from the start to the tenth impact at most, to an
+impact that is not of this kind, to one after which the body stays on the floor, or to where a disturbance of 1e-10 rad/s at the start has
+grown to 1e-6, whichever comes first.
 """
 
 import math
@@ -21,10 +20,11 @@ from scipy.optimize import brentq, minimize_scalar
 
 from scenarios.body import Sphere
 from scenarios.mechanics import lowest_height
-from scenarios.model import TOUCHING, Floor, Scenario
+from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import rotate, unrotate
 from scenarios.trajectory import Trajectory
 from scenarios.truths.flight import flight_states
+from scenarios.truths.impact_laws import Law, law_of, velocities_after
 from scenarios.truths.truth import Impact, States, Truth
 
 Array = NDArray[np.float64]
@@ -41,30 +41,46 @@ SPIN_OF_ONE = np.array([0.0] * 10 + [0.48, -0.6, 0.64])
 MOST_GROWTH = 1e4  # of a disturbance: beyond it 1e-10 has become 1e-6, and no engine could be told wrong from unlucky
 
 
+WORDS = {
+    "normal": "normal impulse",
+    "poisson": "Poisson's restitution",
+    "clamped": "restitution that adds no energy",
+    "coulomb": "Coulomb's friction",
+}
+
+
 class TooLong(Exception):
     """So many turns before the impact that it is not looked for."""
 
 
-def corner_impact(scene: Scenario) -> Truth | None:
-    """The truth of a drop on a corner, an edge or as a ball, impact after impact, as far as it can be trusted."""
+def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
+    """The truth of a drop on a corner, an edge or as a ball, impact after impact, as far as it can be trusted.
+
+    Args:
+        scene: The scene.
+        law: The impact law; the floor's own by default.
+    """
     floor = scene.floor
-    if floor is None or scene.damping is not None or not isinstance(floor.friction, str):
+    if floor is None or scene.damping is not None:
         return None
+    if law is None and not isinstance(floor.friction, str) and not isinstance(scene.body, Sphere):
+        return None
+    law = law or law_of(floor)
     try:
-        course = _follow(scene, scene.initial_state)
+        course = _follow(scene, scene.initial_state, law)
         if len(course.events) > 1:
-            course = _trusted(course, _follow(scene, scene.initial_state + DISTURBANCE * SPIN_OF_ONE))
+            course = _trusted(course, _follow(scene, scene.initial_state + DISTURBANCE * SPIN_OF_ONE, law))
     except TooLong:
         return None
     if course.horizon == 0.0 or (not course.events and course.horizon < scene.duration):
         return None  # it stays in contact from the start, or the first impact is not of this kind
     if not course.events:
         return Truth("flight", "free flight that ends above the floor", course.states, horizon=course.horizon)
-    law = "normal impulse" if floor.friction == "none" else "sticking impulse, eq 17"
+    meant = WORDS[law] if law != "note" else "eq 15" if floor.friction == "none" else "sticking impulse, eq 17"
     points = len(_touching(scene, course.events[0].before))
     where = "ball" if isinstance(scene.body, Sphere) else "corner" if points == 1 else "edge"
     count = "one" if len(course.events) == 1 else str(len(course.events))
-    statement = f"free rotor and parabola, {count} {where} impact{'s' if len(course.events) > 1 else ''} ({law})"
+    statement = f"free rotor and parabola, {count} {where} impact{'s' if len(course.events) > 1 else ''} ({meant})"
     return Truth(f"{where}-impact", statement, course.states, course.events, course.horizon)
 
 
@@ -87,7 +103,7 @@ class _Course:
         return rows
 
 
-def _follow(scene: Scenario, start: Array) -> _Course:
+def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
     """From impact to impact, until the scene ends, the body stays on the floor, or an impact is not of this kind."""
     assert scene.floor is not None
     inertia, g = scene.body.inertia_tensor, scene.acceleration
@@ -102,7 +118,7 @@ def _follow(scene: Scenario, start: Array) -> _Course:
         now, before = now + wait, flights[-1](np.array([wait]))[0]
         touching = _touching(scene, before)
         after = before.copy()
-        after[7:13] = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor)
+        after[7:13] = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor, law)
         if not (_move_alike(touching, before) and _move_alike(touching, after)):
             return _Course(tuple(flights), tuple(events), now)
         events.append(Impact(now, before, after))
@@ -121,22 +137,6 @@ def _trusted(course: _Course, disturbed: _Course) -> _Course:
         if number > 0 and apart > MOST_GROWTH * DISTURBANCE:
             return _Course(course.flights[: number + 1], course.events[:number], event.time)
     return course
-
-
-def velocities_after(state: Array, corner: Array, mass: float, inertia: Array, floor: Floor) -> Array:
-    """Velocity and angular velocity, shape (6,), after the impact of one corner, offset `corner` in the world frame."""
-    q, v, w = state[3:7], state[7:10], state[10:13]
-    axes = rotate(q, np.eye(3))  # rows: the body's axes in the world
-    inverse = axes.T @ np.linalg.inv(inertia) @ axes
-    arm = np.cross(np.eye(3), corner)  # as a matrix: arm @ j = corner × j
-    response = np.eye(3) / mass - arm @ inverse @ arm
-    approach = v + np.cross(w, corner)
-    e = 0.0 if abs(approach[1]) < floor.rest_speed else floor.restitution
-    if floor.friction == "none":
-        impulse = -(1.0 + e) * approach[1] / response[1, 1] * UP
-    else:
-        impulse = np.linalg.solve(response, -approach - e * approach[1] * UP)
-    return np.concatenate([v + impulse / mass, w + inverse @ np.cross(corner, impulse)])
 
 
 def _next_impact(scene: Scenario, start: Array, states: States, duration: float) -> float | None:

@@ -79,6 +79,15 @@ def test_without_a_claim_a_higher_power_may_hide_a_lower_one():
     assert apart(errors, floor=1e-30, claimed=2.0).cause == "model"
 
 
+def test_what_is_never_negative_has_no_negative_limit():
+    """Three sizes that point below 0 have not reached their power of the step."""
+    errors = np.array([1.139, 0.5737, 0.2783])
+    found = take_apart(H, errors, np.zeros(3), np.full(3, 1e-12), signed=False)
+    assert found.cause == "discretisation"
+    assert found.limit == pytest.approx(-0.017, abs=2e-3)
+    assert take_apart(H, np.array([1.0, 0.9, 0.85]), np.zeros(3), np.full(3, 1e-12), signed=False).cause == "model"
+
+
 def test_a_coarsest_step_in_trouble_of_its_own_is_no_high_order():
     """Two finer steps that halve and a coarse one far off fit order 4 with a limit; without a claim that is not believed."""
     errors = [4.035e-3, 4.522e-4, 2.321e-4]  # PyBullet's first contact of a box that turns

@@ -2,6 +2,7 @@
 
 from comparisons.engines.base import AsBuilt, Diverged, Engine, EngineMissing, Simulation
 from comparisons.engines.registry import engine, engine_names
+from comparisons.ensembles import ENSEMBLE_METRICS
 from comparisons.metrics import METRICS
 from comparisons.results import Results
 from comparisons.run import DEFAULT_DTS, measure, run
@@ -9,6 +10,7 @@ from comparisons.simulating import simulate
 
 __all__ = [
     "DEFAULT_DTS",
+    "ENSEMBLE_METRICS",
     "METRICS",
     "AsBuilt",
     "Diverged",

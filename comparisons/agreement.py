@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.comparison import Comparison, Unresolved
+from comparisons.ensembles import difference_rows
 from comparisons.metrics import METRICS
 from comparisons.phases import Phase
 from comparisons.simulating import Attempt
@@ -24,7 +25,7 @@ def agreement_rows(written: Phase, dt: float, first: Attempt, second: Attempt, p
     shared["steps"] = scene.steps(dt)
     if first.discretisation is not None and first.discretisation == second.discretisation:
         shared["reason"] = f"no evidence: both are {first.discretisation}"
-    rows = []
+    rows: list[Row] = []
     for metric in METRICS.values():
         if not (metric.agreement and metric.applies(scene, truth or _as_truth(second.phases[0]))):
             continue
@@ -33,6 +34,8 @@ def agreement_rows(written: Phase, dt: float, first: Attempt, second: Attempt, p
         except Unresolved as error:
             found = {"cause": "unresolved", "reason": "; ".join(filter(None, [shared.get("reason"), str(error)]))}
         rows.append(shared | {"metric": metric.name, "unit": metric.unit, "verdict": "measured"} | found)
+    if first.outcome is not None and second.outcome is not None:
+        rows += difference_rows(scene, dt, (first.label, second.label), (first.outcome, second.outcome))
     return rows
 
 

@@ -250,7 +250,7 @@ def contact_momentum_error(case: Comparison) -> float:
 @_metric("1", "truth", "a truth that comes to rest", _comes_to_rest, signed=True)
 def rest_time_error(case: Comparison) -> float:
     """When the speed last exceeded twice what gravity gives in a step, minus when the truth's did, over the latter."""
-    found, exact = (_last_time_in_motion(case, motion) for motion in (case.compared, case.exact))
+    found, exact = (last_time_in_motion(case.scene, motion) for motion in (case.compared, case.exact))
     if exact == 0.0:
         raise Unresolved(f"it is never faster than gravity makes it in two steps of {case.dt:g} s")
     return (found - exact) / exact
@@ -318,11 +318,11 @@ def penetration(case: Comparison) -> float:
     return float(np.max(np.maximum(-lowest_height(case.scene, case.motion), 0.0)))
 
 
-def _last_time_in_motion(case: Comparison, motion: Trajectory) -> float:
+def last_time_in_motion(scene: Scenario, motion: Trajectory) -> float:
     """The last time [s] at which M v²/2 + ω·L/2 is above M (2 g dt)²/2, and above a millionth of M g times the body's size."""
-    g = float(np.linalg.norm(case.scene.acceleration))
-    still = case.scene.body.mass * max(2.0 * (g * case.dt) ** 2, 1e-6 * g * case.scene.body.size)
-    moving = np.flatnonzero(kinetic_energy(case.scene, motion) > still)
+    g, dt = float(np.linalg.norm(scene.acceleration)), float(motion.t[1] - motion.t[0])
+    still = scene.body.mass * max(2.0 * (g * dt) ** 2, 1e-6 * g * scene.body.size)
+    moving = np.flatnonzero(kinetic_energy(scene, motion) > still)
     return float(motion.t[moving[-1]]) if len(moving) else 0.0
 
 

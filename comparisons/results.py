@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from comparisons.ensembles import Outcome
 from comparisons.verdicts import BREAKDOWNS, FAILURES
 from scenarios import Scenario, Trajectory
 
@@ -41,6 +42,7 @@ class Results:
         scenes: The scenes, by name, in the order they were run.
         engines: The engines' labels, in order.
         trajectories: By (scene, engine, dt): the scene as written, every step.
+        ensembles: By (scene, engine, dt): what became of each start, where the scene has an ensemble.
         provenance: What was asked, versions, machine, settings per engine and scene.
     """
 
@@ -48,6 +50,7 @@ class Results:
     scenes: Mapping[str, Scenario]
     engines: tuple[str, ...]
     trajectories: Mapping[TrajectoryKey, Trajectory]
+    ensembles: Mapping[TrajectoryKey, Outcome] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 from comparisons.agreement import agreement_rows
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Engine
+from comparisons.ensembles import Outcome, ensemble_rows
 from comparisons.metrics import Average, Metric, metrics_for
 from comparisons.phases import Phase, start_phases
 from comparisons.provenance import provenance
@@ -51,6 +52,7 @@ def run(
     stamp = provenance(asked)
     rows: list[Row] = []
     trajectories: dict[TrajectoryKey, Trajectory] = {}
+    ensembles: dict[TrajectoryKey, Outcome] = {}
     settings: dict[str, dict[str, Any]] = {}
     for scene, truth in zip(scenes, truths, strict=True):
         measured: dict[str, list[Row]] = {label: [] for label in labels}
@@ -64,6 +66,9 @@ def run(
                     settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
                 measured[contestant.label] += _truth_rows(Phase(scene, truth), dt, attempt, phases)
                 attempts.append(attempt)
+                if attempt.outcome is not None:
+                    ensembles[scene.name, contestant.label, dt] = attempt.outcome
+                    rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
                 progress(scene.name, contestant.label, dt)
             for first, second in combinations(attempts, 2):
                 rows += agreement_rows(Phase(scene, truth), dt, first, second, phases)
@@ -72,7 +77,7 @@ def run(
             if contestant.engine is not None:
                 rows += study_rows(scene, contestant.engine, measured[contestant.label])
     by_name = {scene.name: scene for scene in scenes}
-    return Results(as_frame(rows), by_name, tuple(labels), trajectories, stamp | {"settings": settings})
+    return Results(as_frame(rows), by_name, tuple(labels), trajectories, ensembles, stamp | {"settings": settings})
 
 
 def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:

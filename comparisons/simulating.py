@@ -11,6 +11,7 @@ import numpy as np
 from comparisons.building import assert_built_as_meant, sound_record
 from comparisons.engines.base import Diverged, Engine, EngineMissing
 from comparisons.engines.registry import engine as engine_named
+from comparisons.ensembles import Outcome, outcome_of
 from comparisons.phases import Phase
 from scenarios import DropspinError, Scenario, Trajectory
 
@@ -87,6 +88,7 @@ class Attempt:
     limits: Sequence[str] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     time_per_step: float = float("nan")
+    outcome: Outcome | None = None
 
 
 def contestant_named(chosen: str | Engine) -> Contestant:
@@ -118,6 +120,7 @@ def attempt_by(contestant: Contestant, scene: Scenario, dt: float, phases: Seque
             return attempt
         attempt.motion, attempt.limits = _motion(scene, engine, dt)
         attempt.phases = [attempt.motion] if len(phases) == 1 else [_motion(phase.scene, engine, dt)[0] for phase in phases]
+        attempt.outcome = None if scene.ensemble is None else outcome_of(engine, scene, dt)
         attempt.settings, attempt.time_per_step = _settings_and_time(engine, scene, dt)
     except Diverged as error:
         attempt.verdict, attempt.reason = "diverged", str(error)

@@ -1,27 +1,27 @@
-"""A run as a folder: `run.json`, `results.parquet`, `trajectories/*.npz`."""
+"""A run as a folder: `run.json`, `results.parquet`, `trajectories/*.npz`, `ensembles/*.npz`."""
 
 import json
 import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from comparisons.ensembles import Outcome
 from comparisons.results import COLUMNS, Results, TrajectoryKey
 from scenarios import DropspinError, Trajectory, load
 
 ARRAYS = ("t", "position", "orientation", "velocity", "angular_velocity", "velocity_lag")
+OUTCOME = tuple(field.name for field in fields(Outcome))
 
 
 def save(results: Results, folder: Path) -> None:
     """Write a run's data into a folder that exists."""
-    (folder / "trajectories").mkdir()
-    files = {}
-    for number, (key, motion) in enumerate(results.trajectories.items()):
-        scene, engine, dt = key
-        path = f"trajectories/{number:03d}-{_file_name(scene)}-{_file_name(engine)}-{dt:g}.npz"
-        np.savez_compressed(folder / path, allow_pickle=False, **{name: getattr(motion, name) for name in ARRAYS})
-        files[path] = {"scene": scene, "engine": engine, "dt": dt}
+    trajectories = _save_arrays(folder, "trajectories", results.trajectories, ARRAYS)
+    ensembles = _save_arrays(folder, "ensembles", results.ensembles, OUTCOME)
     scenes = {name: scene.model_dump(mode="json", exclude={"name"}, exclude_defaults=True) for name, scene in results.scenes.items()}
     digests = {name: scene.digest for name, scene in results.scenes.items()}
     content = {
@@ -29,7 +29,8 @@ def save(results: Results, folder: Path) -> None:
         "engines": results.engines,
         "scenes": scenes,
         "digests": digests,
-        "trajectories": files,
+        "trajectories": trajectories,
+        "ensembles": ensembles,
     }
     (folder / "run.json").write_text(json.dumps(content, indent=1, default=str), encoding="utf-8")
     results.frame.to_parquet(folder / "results.parquet", index=False)
@@ -46,14 +47,30 @@ def restore(folder: Path) -> Results:
         frame = pd.read_parquet(folder / "results.parquet").astype(COLUMNS)
     except (OSError, json.JSONDecodeError) as error:
         raise DropspinError(f"{folder}: not the folder of a run ({error}); give the folder that dropspin run -o wrote.") from None
-    trajectories: dict[TrajectoryKey, Trajectory] = {}
-    for path, key in content["trajectories"].items():
-        with np.load(folder / path, allow_pickle=False) as arrays:
-            motion = {name: arrays[name] for name in ARRAYS}
-        motion["velocity_lag"] = float(motion["velocity_lag"])
-        trajectories[key["scene"], key["engine"], key["dt"]] = Trajectory(**motion)
+    trajectories = {
+        key: Trajectory(**arrays | {"velocity_lag": float(arrays["velocity_lag"])})
+        for key, arrays in _restored_arrays(folder, content["trajectories"], ARRAYS)
+    }
+    ensembles = {key: Outcome(**arrays) for key, arrays in _restored_arrays(folder, content["ensembles"], OUTCOME)}
     scenes = {name: load({"name": name, **scene}) for name, scene in content["scenes"].items()}
-    return Results(frame, scenes, tuple(content["engines"]), trajectories, content["provenance"])
+    return Results(frame, scenes, tuple(content["engines"]), trajectories, ensembles, content["provenance"])
+
+
+def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """One file an item; the files' paths, and which scene, engine and step each is of."""
+    (folder / kind).mkdir()
+    files = {}
+    for number, ((scene, engine, dt), item) in enumerate(items.items()):
+        path = f"{kind}/{number:03d}-{_file_name(scene)}-{_file_name(engine)}-{dt:g}.npz"
+        np.savez_compressed(folder / path, allow_pickle=False, **{name: getattr(item, name) for name in names})
+        files[path] = {"scene": scene, "engine": engine, "dt": dt}
+    return files
+
+
+def _restored_arrays(folder: Path, files: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Iterator[tuple[TrajectoryKey, Any]]:
+    for path, key in files.items():
+        with np.load(folder / path, allow_pickle=False) as arrays:
+            yield (key["scene"], key["engine"], key["dt"]), {name: arrays[name] for name in names}
 
 
 def _file_name(text: str) -> str:

@@ -13,7 +13,7 @@ from comparisons.store import save
 from reports.html import PLOTS, html_report, markdown_report, svg_plots
 from scenarios import DropspinError
 
-OURS = frozenset({"run.json", "results.parquet", "results.csv", "report.html", "report.md", "plots", "trajectories"})
+OURS = frozenset({"run.json", "results.parquet", "results.csv", "report.html", "report.md", "plots", "trajectories", "ensembles"})
 
 
 def write(results: Results, folder: str | Path) -> Path:
@@ -118,8 +118,8 @@ def _files_of_run(folder: Path) -> set[str]:
     """Everything that a run wrote into its folder, as far as it can be told; nothing if no run is there."""
     try:
         content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        trajectories, scenes = set(content["trajectories"]), content["scenes"]
+        arrays, scenes = {*content["trajectories"], *content["ensembles"]}, content["scenes"]
     except (OSError, ValueError, TypeError, KeyError):
         return set()
     plots = {f"plots/{number:02d}-{kind}.svg" for number in range(len(scenes)) for kind in PLOTS}
-    return {*OURS, *trajectories, *plots}
+    return {*OURS, *arrays, *plots}

@@ -9,15 +9,15 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from comparisons import METRICS, Results
+from comparisons import ENSEMBLE_METRICS, METRICS, Results
 from reports import numbers
 from reports.colours import engine_colours
 from reports.findings import NEGLIGIBLE, STUDIES, counts, failures, finding_sentences, model_errors, verdict_sentence, worst_verdicts
-from reports.plots import convergence_figure, time_figure
+from reports.plots import convergence_figure, ensemble_figure, time_figure
 from reports.svg import svg
 from scenarios import Scenario, truth_for
 
-PLOTS = ("time", "convergence")
+PLOTS = ("time", "convergence", "ensemble")
 
 
 @cache
@@ -57,6 +57,9 @@ def svg_plots(results: Results) -> Iterator[tuple[str, str]]:
         figure = convergence_figure(results, scene)
         if figure is not None:
             yield f"{number:02d}-convergence", svg(figure, f"s{number:02d}-convergence")
+        figure = ensemble_figure(results, scene)
+        if figure is not None:
+            yield f"{number:02d}-ensemble", svg(figure, f"s{number:02d}-ensemble")
 
 
 def _markdown_cell(text: str) -> str:
@@ -78,6 +81,7 @@ def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
         "failures": [_row(row) for row in failures(results).itertuples()],
         "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
+        "ensemble_metrics": ENSEMBLE_METRICS,
         "provenance": results.provenance,
         "settings": _settings(results),
     }
@@ -103,8 +107,10 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         "trends": _trends(studies),
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
         "agreement": _agreement(frame, min(dts)),
+        "ensemble": _ensemble(frame, min(dts)),
         "time_plot": Markup(plots.get(f"{number:02d}-time", "")),  # our own SVG; its text is escaped by matplotlib
         "convergence_plot": Markup(plots.get(f"{number:02d}-convergence", "")),
+        "ensemble_plot": Markup(plots.get(f"{number:02d}-ensemble", "")),
     }
 
 
@@ -119,13 +125,14 @@ def modelled(scene: Scenario) -> list[str]:
         parts.append(f"a floor of restitution {scene.floor.restitution:g} and {grip}")
     if scene.damping is not None:
         parts.append(f"damping of {scene.damping.linear:g} and {scene.damping.angular:g} per second")
+    if scene.ensemble is not None:
+        parts.append(f"{scene.ensemble.size} starts drawn around the scene's own")
     return parts
 
 
 def left_out(scene: Scenario) -> list[str]:
-    """What a scene does not model, so that no engine pays for it, and what of it is not run."""
-    parts = [part for part in ("gravity", "floor", "damping") if getattr(scene, part) is None]
-    return parts + ([] if scene.ensemble is None else ["the ensemble: the scene's own start alone is run"])
+    """What a scene does not model, so that no engine pays for it."""
+    return [part for part in ("gravity", "floor", "damping") if getattr(scene, part) is None]
 
 
 def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
@@ -148,8 +155,14 @@ def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
 
 
 def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
-    pairs = frame[(frame["kind"] == "agreement") & (frame["dt"] == dt)]
+    pairs = frame[(frame["kind"] == "agreement") & (frame["dt"] == dt) & ~frame["metric"].isin(list(ENSEMBLE_METRICS))]
     return [_row(row) for row in pairs.itertuples()]
+
+
+def _ensemble(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
+    """The means over the ensemble, then the differences between engines, metric by metric."""
+    rows = frame[(frame["dt"] == dt) & frame["metric"].isin(list(ENSEMBLE_METRICS))]
+    return [_row(row) for metric in ENSEMBLE_METRICS for row in rows[rows["metric"] == metric].itertuples()]
 
 
 def _row(row: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 
-from comparisons import METRICS, EngineMissing, engine, engine_names, simulate
+from comparisons import ENSEMBLE_METRICS, METRICS, EngineMissing, engine, engine_names, simulate
 from comparisons.building import assert_built_as_meant
 from comparisons.provenance import processor, versions
 from comparisons.simulating import assert_step_fits
@@ -41,9 +41,14 @@ def engine_rows() -> Rows:
 
 def metric_rows() -> Rows:
     """The metrics."""
-    return [
+    of_one = [
         {"metric": metric.name, "unit": metric.unit, "needs": metric.needs, "definition": metric.definition} for metric in METRICS.values()
     ]
+    of_many = [
+        {"metric": name, "unit": metric.unit, "needs": "an ensemble", "definition": f"Mean. {metric.definition}"}
+        for name, metric in ENSEMBLE_METRICS.items()
+    ]
+    return of_one + of_many
 
 
 def description(scene: Scenario) -> Rows:

@@ -122,6 +122,45 @@ def _draw_fit(results: Results, scene_name: str, metric: str, engine: str, dts: 
     axes.loglog(h, np.maximum(curve, ROUNDING), color=engine_colours(results.engines)[engine], linewidth=0.8, linestyle=(0, (4, 3)))
 
 
+def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw the energy left in an ensemble over time at the finest step: each engine's median, and between which values eight of ten lie."""
+    colours = engine_colours(results.engines)
+    finest = min(dt for name, _, dt in results.ensembles if name == scene_name)
+    for number, engine in enumerate(results.engines):
+        outcome = results.ensembles.get((scene_name, engine, finest))
+        if outcome is not None:
+            low, middle, high = np.quantile(outcome.energy, [0.1, 0.5, 0.9], axis=0)
+            axes.fill_between(outcome.t, low, high, color=colours[engine], alpha=0.15, linewidth=0.0)
+            axes.plot(outcome.t, middle, color=colours[engine], linewidth=_thinner(3.8, 1.2, number, results), label=engine)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("energy left")
+
+
+def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw at the finest step which share of an ensemble is at rest by when."""
+    colours = engine_colours(results.engines)
+    finest = min(dt for name, _, dt in results.ensembles if name == scene_name)
+    for number, engine in enumerate(results.engines):
+        outcome = results.ensembles.get((scene_name, engine, finest))
+        if outcome is not None:
+            width = _thinner(3.8, 1.2, number, results)
+            axes.ecdf(outcome.rest_time, color=colours[engine], linewidth=width, label=engine)
+    axes.set_xlim(0.0, results.scenes[scene_name].duration)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("share at rest")
+
+
+def ensemble_figure(results: Results, scene_name: str) -> "Figure | None":
+    """The energy left in an ensemble and the share of it at rest, over time; None if nothing has an outcome."""
+    if not any(name == scene_name for name, _, _ in results.ensembles):
+        return None
+    with _figure(2) as (figure, panels):
+        plot_energy_of_ensemble(results, scene_name, panels[0])
+        plot_rest_of_ensemble(results, scene_name, panels[1])
+        _add_legend(figure, panels)
+    return figure
+
+
 def time_figure(results: Results, scene_name: str) -> "Figure":
     """Height or tilt, energy and |L| over time, side by side."""
     shown = quantities(results.scenes[scene_name])

@@ -27,6 +27,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
         for first in range(0, len(results.engines), at_once):
             out.print(_scene_table(results, name, results.engines[first : first + at_once]))
         _print_trends(results, name, out)
+        _print_ensemble(results, name, out)
         _print_remarks(results, name, out)
         out.print()
     _print_failures(results, out)
@@ -81,6 +82,18 @@ def _print_trends(results: Results, name: str, out: Console) -> None:
         ]
         if told:
             out.print(Text(f"as dt → 0, {engine}: {', '.join(told)}", style="dim"))
+
+
+def _print_ensemble(results: Results, name: str, out: Console) -> None:
+    """The means over the scene's starts at the finest step, each with half its confidence interval."""
+    frame = results.frame[(results.frame["scene"] == name) & (results.frame["kind"] == "ensemble")]
+    finest = frame[frame["dt"] == frame["dt"].min()]
+    for metric, rows in finest.groupby("metric", sort=False):
+        unit = "" if rows["unit"].iloc[0] == "1" else f" {rows['unit'].iloc[0]}"
+        means = [f"{row.engine} {row.value:.3g} ± {row.upper - row.value:.1g}{unit}" for row in rows.itertuples()]
+        spread = results.scenes[name].ensemble
+        assert spread is not None
+        out.print(Text(f"over {spread.size} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
 
 
 def _print_remarks(results: Results, name: str, out: Console) -> None:

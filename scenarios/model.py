@@ -63,10 +63,18 @@ class Damping(Table):
 
 
 class Ensemble(Table):
-    """Starts drawn from a spread around the scene's own."""
+    """Starts drawn from a spread around the scene's own.
+
+    `turn` is the largest rotation from the scene's own attitude [rad]: all those by up to it are equally likely, all attitudes by default.
+    `velocity` [m/s] and `angular_velocity` [rad/s] are spread evenly by up to so much to either side. The height above the floor is the
+    scene's own.
+    """
 
     size: Annotated[int, Field(strict=True, ge=2, le=10_000_000)]
     seed: Annotated[int, Field(strict=True, ge=0)]
+    turn: Annotated[NotNegative, Field(le=math.pi)] = math.pi
+    velocity: Annotated[tuple[NotNegative, ...], Field(min_length=3, max_length=3)] = (0.0, 0.0, 0.0)
+    angular_velocity: Annotated[tuple[NotNegative, ...], Field(min_length=3, max_length=3)] = (0.0, 0.0, 0.0)
 
 
 class Expectation(Table):

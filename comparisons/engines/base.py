@@ -155,3 +155,11 @@ class Engine:
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         """Build a scene at a time step [s], start included."""
         raise NotImplementedError
+
+    def record_ensemble(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
+        """Record one scene from many starts, shape (len(members), 1 + steps, 13); default loops; override with a native one."""
+        motions = []
+        for member in members:
+            with self.prepare(member, dt) as simulation:
+                motions.append(simulation.record(steps))
+        return np.array(motions)

@@ -1,6 +1,7 @@
 """The engine `document`: the note, literally."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import ClassVar
 
@@ -71,6 +72,12 @@ class Document(Engine):
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return DocumentSimulation(scene, dt, self.methods())
+
+    def record_ensemble(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
+        """All side by side."""
+        scene = members[0]
+        simulator = reference_impl.Simulator(_body(scene.body), _world(scene), dt, self.methods())
+        return simulator.run(np.array([member.initial_state for member in members]), steps)
 
 
 class DocumentSimulation(Simulation):

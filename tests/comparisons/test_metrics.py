@@ -21,7 +21,8 @@ FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 def exact_motion(name, dt=DT, **changes):
     scene = scenarios.load(name)
-    motion = truth_for(scene)(dt * np.arange(scene.steps(dt) + 1))
+    truth, t = truth_for(scene), dt * np.arange(scene.steps(dt) + 1)
+    motion = truth(t[truth.covers(t)])
     return scene, Trajectory(**{field: changes.get(field, getattr(motion, field)) for field in motion.__dataclass_fields__})
 
 

@@ -1,0 +1,122 @@
+"""Ensembles: past the horizon no single trajectory can be compared, but what becomes of many can.
+
+Every engine runs the same starts. What is compared are means over them, each with the interval that holds the true mean in 95 of 100 draws
+(Student's t). The differences between two engines are taken start by start, so that what they have in common is no noise.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from comparisons.building import sound_record
+from comparisons.comparison import Comparison
+from comparisons.engines.base import Diverged, Engine
+from comparisons.metrics import last_time_in_motion
+from scenarios import Scenario, Trajectory, members
+from scenarios.mechanics import energy
+
+Array = NDArray[np.float64]
+Row = dict[str, Any]
+
+MARKS = 41
+"""Times at which the energy is kept, the start and the end among them."""
+AT_ONCE = 32
+"""Members whose every step is held in memory at a time."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of each member of an ensemble.
+
+    Attributes:
+        t: Times [s], shape (MARKS,).
+        energy: Share of its energy at the start that each has left at these times, shape (size, MARKS).
+        rebound: How high each rises after it first touched the floor, over how high it started, shape (size,).
+        rest_time: When each was last in motion [s], shape (size,).
+    """
+
+    t: Array
+    energy: Array
+    rebound: Array
+    rest_time: Array
+
+
+@dataclass(frozen=True)
+class EnsembleMetric:
+    """A mean over an ensemble: its unit, its definition, and the figure of each member."""
+
+    unit: str
+    definition: str
+    of_each: Callable[[Outcome], Array]
+
+
+ENSEMBLE_METRICS = {
+    "energy_halfway": EnsembleMetric(
+        "1", "Energy left halfway through the scene, over the scene's energy.", lambda o: o.energy[:, MARKS // 2]
+    ),
+    "energy_at_end": EnsembleMetric("1", "Energy left at the end, over the scene's energy.", lambda o: o.energy[:, -1]),
+    "rebound_height": EnsembleMetric(
+        "1", "Highest that the centre of mass rises after the first contact, over its start.", lambda o: o.rebound
+    ),
+    "rest_time": EnsembleMetric("s", "When it was last in motion; the scene's end if it still is.", lambda o: o.rest_time),
+}
+
+
+def outcome_of(engine: Engine, scene: Scenario, dt: float) -> Outcome:
+    """Run an ensemble through an engine.
+
+    Raises:
+        Diverged: A start ended in numbers that are not finite.
+    """
+    steps = scene.steps(dt)
+    t = dt * np.arange(steps + 1, dtype=float)
+    marks = np.round(np.linspace(0.0, steps, MARKS)).astype(int)
+    with engine.prepare(scene, dt) as simulation:
+        lag = 0.5 * dt if simulation.staggered else 0.0
+    energies, rebounds, rest_times = [], [], []
+    starts = members(scene)
+    for first in range(0, len(starts), AT_ONCE):
+        some = starts[first : first + AT_ONCE]
+        for member, states in zip(some, engine.record_ensemble(some, dt, steps), strict=True):
+            motion = Trajectory.from_states(t, sound_record(states, steps + 1), lag)
+            if motion.first_bad_row is not None:
+                raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
+            case = Comparison(member, motion)
+            contact = case.first_contact
+            energies.append(energy(member, motion[marks]) / case.energy_scale)
+            rebounds.append(np.nan if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1])
+            rest_times.append(last_time_in_motion(member, motion))
+    return Outcome(t[marks], np.array(energies), np.array(rebounds), np.array(rest_times))
+
+
+def ensemble_rows(scene: Scenario, label: str, dt: float, outcome: Outcome) -> list[Row]:
+    """Each mean over an engine's ensemble, between the ends of its confidence interval."""
+    shared: Row = {"scene": scene.name, "engine": label, "dt": dt, "steps": scene.steps(dt), "kind": "ensemble"}
+    return [
+        shared | {"metric": name, "unit": metric.unit, "verdict": "measured", "cause": "chaotic"} | _mean(metric.of_each(outcome))
+        for name, metric in ENSEMBLE_METRICS.items()
+    ]
+
+
+def difference_rows(scene: Scenario, dt: float, labels: tuple[str, str], outcomes: tuple[Outcome, Outcome]) -> list[Row]:
+    """By how much the means of two engines differ, start by start, and whether that can be told from chance."""
+    shared: Row = {"scene": scene.name, "engine": labels[0], "truth": labels[1], "dt": dt, "steps": scene.steps(dt), "kind": "agreement"}
+    rows = []
+    for name, metric in ENSEMBLE_METRICS.items():
+        first, second = (metric.of_each(outcome) for outcome in outcomes)
+        mean = _mean(first - second)
+        told = "cannot be told from chance" if mean["lower"] <= 0.0 <= mean["upper"] else "differ by more than chance"
+        reason = f"{told}, over {len(first)} starts"
+        rows.append(shared | {"metric": name, "unit": metric.unit, "verdict": "measured", "cause": "chaotic", "reason": reason} | mean)
+    return rows
+
+
+def _mean(values: Array) -> Row:
+    mean, error = float(np.mean(values)), float(stats.sem(values))
+    half = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(values) - 1)) * error
+    return {"value": mean, "lower": mean - half, "upper": mean + half}

@@ -12,6 +12,7 @@ from comparisons.engines.base import Engine
 from comparisons.ensembles import Outcome, ensemble_rows
 from comparisons.metrics import Average, Metric, metrics_for
 from comparisons.phases import Phase, start_phases
+from comparisons.predictions import prediction_rows
 from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
 from comparisons.simulating import Attempt, assert_step_fits, attempt_by, contestant_named
@@ -65,6 +66,8 @@ def run(
                     trajectories[scene.name, contestant.label, dt] = attempt.motion
                     settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
                 measured[contestant.label] += _truth_rows(Phase(scene, truth), dt, attempt, phases)
+                if contestant.engine is not None and attempt.motion is not None:
+                    rows += prediction_rows(contestant.engine, scene, truth, dt)
                 attempts.append(attempt)
                 if attempt.outcome is not None:
                     ensembles[scene.name, contestant.label, dt] = attempt.outcome

@@ -85,17 +85,23 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
 
 
 def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
-    """Draw the size of one error over the time step, logarithmic, with a dotted line of first order."""
+    """Draw the size of one error over the time step, logarithmic, with a dotted line of first order, and crosses where it was predicted."""
     colours, markers = engine_colours(results.engines), engine_markers(results.engines)
     frame = results.measurements
     mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric)]
-    largest = 0.0
+    largest, is_labelled = 0.0, False
     for number, engine in enumerate(results.engines):
         rows = mine[(mine["engine"] == engine) & mine["value"].notna()].sort_values("dt")
         sizes = np.maximum(rows["value"].abs().to_numpy(), ROUNDING)
         largest = max([largest, *sizes])
         style: Any = {"marker": markers[engine], "markerfacecolor": "none", "linewidth": 1.5, "color": colours[engine]}
         axes.loglog(rows["dt"], sizes, markersize=_thinner(8.0, 4.0, number, results), label=engine, **style)
+        foreseen = results.frame[(results.frame["kind"] == "prediction") & (results.frame["engine"] == engine)]
+        foreseen = foreseen[(foreseen["scene"] == scene_name) & (foreseen["metric"] == metric) & (foreseen["value"].abs() > ROUNDING)]
+        if not foreseen.empty:
+            label = None if is_labelled else "predicted"
+            is_labelled = True
+            axes.loglog(foreseen["dt"], foreseen["value"].abs(), color=INK, linestyle="none", marker="x", markersize=5.0, label=label)
         _draw_fit(results, scene_name, metric, engine, rows["dt"].to_numpy(), rows["value"].to_numpy(), axes)
     dts = np.sort(mine["dt"].unique())
     if len(dts) > 1 and largest > 0.0:
@@ -218,5 +224,6 @@ def _figure(panels: int) -> "Iterator[tuple[Figure, list[Axes]]]":
 
 
 def _add_legend(figure: "Figure", panels: "list[Axes]") -> None:
-    handles, labels = panels[0].get_legend_handles_labels()
+    named = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    handles, labels = list(named.values()), list(named)
     figure.legend(handles, labels, loc="outside upper left", ncols=len(labels), fontsize=9)

@@ -6,5 +6,18 @@ from scenarios.loading import load, names
 from scenarios.model import Scenario
 from scenarios.trajectory import Trajectory
 from scenarios.truths import Truth, truth_for
+from scenarios.truths.discrete_flight import discrete_flight
 
-__all__ = ["DropspinError", "Scenario", "SceneError", "Trajectory", "Truth", "UnknownName", "load", "members", "names", "truth_for"]
+__all__ = [
+    "DropspinError",
+    "Scenario",
+    "SceneError",
+    "Trajectory",
+    "Truth",
+    "UnknownName",
+    "discrete_flight",
+    "load",
+    "members",
+    "names",
+    "truth_for",
+]

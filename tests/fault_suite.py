@@ -469,9 +469,9 @@ SOUND = [
 
 
 def catches(number: int) -> list[tuple[str, str]]:
-    """The scenes and checks of the core catalogue that an engine fails."""
+    """The scenes and checks of the core catalogue that an engine fails, without the ensemble: its members have no exact motion."""
     engine = [*FAULTS, *SOUND][number]
-    core = [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags]
+    core = [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags and scene.ensemble is None]
     with np.errstate(all="ignore"):
         found = comparisons.run(core, [engine])
     bad = found.frame[found.frame["verdict"].isin(["failed", "crashed", "diverged"])]
@@ -503,7 +503,8 @@ def report(caught: list[list[tuple[str, str]]], alarms: list[list[tuple[str, str
     for title, checks in false.items():
         console.print(f"false alarm of {title!r}: {checks}")
     sound = "; ".join(engine.title for engine in SOUND)
-    head = "# What the core catalogue catches\n\nEach engine is exact but for one fault. Written by `make faults`.\n\n"
+    head = "# What the core catalogue catches\n\nEach engine is exact but for one fault. The ensemble is left out. "
+    head += "Written by `make faults`.\n\n"
     (ROOT / "docs" / "faults.md").write_text(head + "\n".join(lines) + f"\n\n{summary} The sound ones: {sound}.\n")
     return 1 if missed or false else 0
 

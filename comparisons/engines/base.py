@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import Scenario
+from scenarios import Scenario, Truth
 from scenarios.errors import DropspinError, UnknownName
 
 Array = NDArray[np.float64]
@@ -146,6 +146,10 @@ class Engine:
 
         Two engines of the same one make the same errors: that they agree is no evidence that either is right.
         """
+        return None
+
+    def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
+        """What the error of a metric must be by the way the engine works, or None: that is not known."""
         return None
 
     def declines(self, scene: Scenario) -> str | None:

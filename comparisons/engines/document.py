@@ -19,8 +19,9 @@ from comparisons.engines.base import (
     may_tumble,
     version,
 )
+from comparisons.predictions import bounce_error, flight_error
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
-from scenarios import DropspinError, Scenario
+from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Body, Box, Sphere, Vertices
 
 ORDERS = {"gyroscopic": 1.0, "implicit-gyroscopic": 1.0, "midpoint": 2.0, "rk4": 4.0, "symmetric-top": 4.0, "exact": math.inf}
@@ -60,6 +61,13 @@ class Document(Engine):
         known = {"gyroscopic": EXPLICIT_GYROSCOPIC, "implicit-gyroscopic": IMPLICIT_GYROSCOPIC}
         rotation = self.option("rotation")
         return known.get(rotation, rotation) if may_tumble(scene) else SEMI_IMPLICIT_EULER
+
+    def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
+        """The note's own flight, or an exact rotation about a fixed axis; a flat bounce, in which gravity acts before the impact."""
+        rotation = self.option("rotation")
+        if rotation in ("note", "exact") and scene.floor is None:
+            return flight_error(scene, truth, metric, dt, exact_rotation=rotation == "exact")
+        return bounce_error(scene, truth, metric, dt, gravity_first=True) if self.option("correction") == "none" else None
 
     def declines(self, scene: Scenario) -> str | None:
         """Most laws know no friction between none and infinite."""

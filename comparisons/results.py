@@ -58,10 +58,9 @@ class Results:
         """The rows that measure an engine against truth and conservation laws, at one step each."""
         return self.frame[self.frame["kind"].isin(["truth", "invariant"])]
 
-    @property
-    def model_errors(self) -> pd.DataFrame:
-        """The rows of errors whose limit as the step goes to 0 is not 0."""
-        return self.frame[(self.frame["kind"] == "model_error") & (self.frame["cause"] == "model")]
+    def lasting_errors(self, *causes: str) -> pd.DataFrame:
+        """The rows of errors whose limit as the step goes to 0 is not 0, by their causes: `model`, `setting`."""
+        return self.frame[(self.frame["kind"] == "model_error") & self.frame["cause"].isin(causes)]
 
     def exit_code(self, named: frozenset[str] = frozenset()) -> int:
         """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""

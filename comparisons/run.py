@@ -16,7 +16,7 @@ from comparisons.predictions import prediction_rows
 from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
 from comparisons.simulating import Attempt, assert_step_fits, attempt_by, contestant_named
-from comparisons.studies import study_rows
+from comparisons.studies import blame_settings, study_rows
 from comparisons.verdicts import assert_expectations_can_be_judged, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
@@ -75,10 +75,13 @@ def run(
                 progress(scene.name, contestant.label, dt)
             for first, second in combinations(attempts, 2):
                 rows += agreement_rows(Phase(scene, truth), dt, first, second, phases)
+        studies = {c.label: study_rows(scene, c.engine, measured[c.label]) for c in contestants if c.engine is not None}
         for contestant in contestants:
-            rows += measured[contestant.label]
-            if contestant.engine is not None:
-                rows += study_rows(scene, contestant.engine, measured[contestant.label])
+            own = measured[contestant.label] + studies.get(contestant.label, [])
+            twin = contestant.engine.calibrated_label if contestant.engine is not None else None
+            if twin in studies:
+                blame_settings(own, studies[twin])
+            rows += own
     by_name = {scene.name: scene for scene in scenes}
     return Results(as_frame(rows), by_name, tuple(labels), trajectories, ensembles, stamp | {"settings": settings})
 

@@ -53,6 +53,21 @@ def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row
     return studies
 
 
+def blame_settings(rows: Sequence[Row], calibrated: Sequence[Row]) -> None:
+    """Say that an error is a setting's where it stays as the step goes to 0, and the same engine, calibrated, does not have it.
+
+    Args:
+        rows: Measurements and studies of an engine with its default settings; their causes are changed.
+        calibrated: Studies of the calibrated engine.
+    """
+    cured = {row["metric"] for row in calibrated if row["kind"] == "model_error" and row["cause"] in ("discretisation", "rounding")}
+    for row in rows:
+        if row.get("cause") == "model" and row["metric"] in cured:
+            row["cause"] = "setting"
+            if row["kind"] == "model_error" and row["verdict"] == "failed":
+                row["reason"] += ", but the calibrated profile does: it is a setting"
+
+
 def _metrics(rows: Iterable[Row]) -> list[str]:
     return list(
         dict.fromkeys(row["metric"] for row in rows if row.get("kind") in ("truth", "invariant") and row["metric"] not in ARTEFACTS)

@@ -51,9 +51,10 @@ def failures(results: Results) -> pd.DataFrame:
     return results.frame[results.frame["verdict"].isin(FAILURES | BREAKDOWNS)]
 
 
-def model_errors(results: Results) -> dict[str, list[str]]:
-    """For each engine the scenes in which an error that is worth a word does not vanish with the step."""
-    worth = results.model_errors[results.model_errors["value"].abs() > NEGLIGIBLE]
+def lasting_errors(results: Results, cause: str) -> dict[str, list[str]]:
+    """For each engine the scenes in which an error that is worth a word, and of this cause, does not vanish with the step."""
+    lasting = results.lasting_errors(cause)
+    worth = lasting[lasting["value"].abs() > NEGLIGIBLE]
     return {
         engine: [scene for scene in results.scenes if ((worth["engine"] == engine) & (worth["scene"] == scene)).any()]
         for engine in results.engines
@@ -90,16 +91,21 @@ def finding_sentences(results: Results) -> list[str]:
     """What a reader should know first about each engine."""
     missing = results.frame[results.frame["verdict"] == "missing"].drop_duplicates("engine")
     sentences = [f"{row.reason}" for row in missing.itertuples()]
-    found = model_errors(results)
+    models, settings = lasting_errors(results, "model"), lasting_errors(results, "setting")
     limits = results.frame[results.frame["kind"] == "model_error"]
     studied = limits.groupby("engine")["scene"].nunique()
     for engine in results.engines:
-        stuck, total = found[engine], int(studied.get(engine, 0))
-        if total and stuck:
+        stuck, total = models[engine], int(studied.get(engine, 0))
+        if stuck:
             sentences.append(
                 f"{engine}: model error in {len(stuck)} of {total} scenes ({', '.join(stuck)}): an error that stays as the step goes to 0."
             )
-        elif total:
+        if settings[engine]:
+            sentences.append(
+                f"{engine}: wrong settings in {len(settings[engine])} of {total} scenes ({', '.join(settings[engine])}): "
+                "an error that stays as the step goes to 0, and that the calibrated profile does not have."
+            )
+        if total and not stuck and not settings[engine]:
             where = f"in all {total} scenes " if total > 1 else ""
             sentences.append(f"{engine}: {where}no error above {NEGLIGIBLE:g} stays as the step goes to 0.")
     return sentences

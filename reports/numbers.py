@@ -55,4 +55,4 @@ def trend(order: float, limit: float, cause: str) -> str:
     """What becomes of an error as the step goes to 0."""
     if cause == "discretisation":
         return "→ 0" if math.isnan(order) else f"order {order:.2f}"
-    return f"→ {written(limit)}" if cause == "model" else cause
+    return {"model": f"→ {written(limit)}", "setting": f"→ {written(limit)}, a setting"}.get(cause, cause)

@@ -122,7 +122,7 @@ def _draw_fit(results: Results, scene_name: str, metric: str, engine: str, dts: 
     if fitted.empty or limits.empty:
         return
     order = float(fitted["value"].iloc[0])
-    limit = float(limits["value"].iloc[0]) if limits["cause"].iloc[0] == "model" else 0.0
+    limit = float(limits["value"].iloc[0]) if limits["cause"].iloc[0] in ("model", "setting") else 0.0
     h = np.geomspace(dts.max(), 0.25 * dts.min(), 50)
     curve = np.abs(limit + (errors[0] - limit) * (h / dts[0]) ** order)
     axes.loglog(h, np.maximum(curve, ROUNDING), color=engine_colours(results.engines)[engine], linewidth=0.8, linestyle=(0, (4, 3)))

@@ -75,10 +75,10 @@ def _print_trends(results: Results, name: str, out: Console) -> None:
             if found is None
             else [f"order {found[0]:.2f}" if found[1] - found[0] < 0.005 else f"orders {found[0]:.2f} to {found[1]:.2f}"]
         )
-        wrong = mine[(mine["kind"] == "model_error") & (mine["cause"] == "model")]
+        wrong = mine[(mine["kind"] == "model_error") & mine["cause"].isin(["model", "setting"])]
         told += [
-            f"{metric.replace('_', ' ')} {trend(math.nan, value, 'model')}"
-            for metric, value in zip(wrong["metric"], wrong["value"], strict=True)
+            f"{metric.replace('_', ' ')} {trend(math.nan, value, cause)}"
+            for metric, value, cause in zip(wrong["metric"], wrong["value"], wrong["cause"], strict=True)
         ]
         if told:
             out.print(Text(f"as dt → 0, {engine}: {', '.join(told)}", style="dim"))

@@ -37,6 +37,17 @@ PrincipalMoments = Annotated[PositiveVector, AfterValidator(_possible)]
 class _Body(Table):
     mass: Positive
 
+    # By what was given; pydantic's own would compare the arrays that properties have kept as well.
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Body) and self._given == other._given
+
+    def __hash__(self) -> int:
+        return hash(self._given)
+
+    @property
+    def _given(self) -> tuple[Any, ...]:
+        return type(self), *(getattr(self, name) for name in type(self).model_fields)
+
     @property
     def vertices(self) -> Array:
         """The points that may touch the floor, from the centre of mass [m], shape (n, 3)."""

@@ -89,6 +89,9 @@ class Simulation:
         self.close()
 
 
+PROFILES = ("calibrated", "default")
+"""The scene as meant, by whatever settings that takes; and what a user gets who leaves all settings but the obvious."""
+
 SEMI_IMPLICIT_EULER = "semi-implicit Euler"
 EXPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term explicit"
 IMPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term implicit"
@@ -136,6 +139,13 @@ class Engine:
         """The canonical name: `name[option=value,…]`, options sorted, defaults left out."""
         listed = ",".join(f"{key}={value}" for key, value in self.options.items())
         return f"{self.name}[{listed}]" if listed else self.name
+
+    @property
+    def calibrated_label(self) -> str | None:
+        """The label of the same engine, calibrated, where this one has its defaults; else None."""
+        if self.options.get("profile") != "default":
+            return None
+        return type(self)({key: value for key, value in self.options.items() if key != "profile"}).label
 
     def order_in(self, scene: Scenario) -> float | None:
         """The order claimed for a scene's errors: `order` in free flight, none where there is a floor to hit."""

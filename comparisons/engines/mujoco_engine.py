@@ -1,4 +1,4 @@
-"""The engine `mujoco`, calibrated: the scene as meant, by settings MuJoCo has but does not default to.
+"""The engine `mujoco`: calibrated, the scene as meant, by settings MuJoCo has but does not default to; or with its defaults.
 
 MuJoCo has no coefficient of restitution. A contact is a damped spring whose reference acceleration is
 a_ref = -b v - k r; with k = 0 and b = (1 + e) / dt, one step of a one-stage integrator turns the normal velocity v into
@@ -15,6 +15,7 @@ import numpy as np
 from comparisons.engines.base import (
     EXPLICIT_GYROSCOPIC,
     IMPLICIT_GYROSCOPIC,
+    PROFILES,
     SEMI_IMPLICIT_EULER,
     Array,
     AsBuilt,
@@ -31,6 +32,7 @@ from scenarios.rotations import conjugate, rotate
 
 IMPEDANCE = 0.9999  # the largest that MuJoCo takes
 INFINITE_FRICTION = 1e6  # sound with elliptic cones up to 1e9
+DEFAULT_INFINITE_FRICTION = 10.0  # with the pyramidal cones of the default, 1e6 would be no friction and no contact at all
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
@@ -42,10 +44,10 @@ BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
 
 
 class MuJoCo(Engine):
-    """MuJoCo with exact restitution: one free body, one explicit contact pair with the floor."""
+    """MuJoCo with exact restitution: one free body, one explicit contact pair with the floor; or as it comes (profile=default)."""
 
     name = "mujoco"
-    choices: ClassVar = {"integrator": tuple(INTEGRATORS)}
+    choices: ClassVar = {"integrator": tuple(INTEGRATORS), "profile": PROFILES}
 
     @property
     def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
@@ -63,7 +65,7 @@ class MuJoCo(Engine):
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """Semi-implicit Euler about a fixed axis; a flat bounce that is noticed late, and loses (1 - d) g dt to the impedance."""
-        if self.option("integrator") == "rk4":
+        if self.option("integrator") == "rk4" or self.option("profile") == "default":
             return None
         flight = flight_error(scene, truth, metric, dt, exact_rotation=True)
         if flight is not None:
@@ -81,10 +83,12 @@ class MuJoCo(Engine):
             return "MuJoCo damps along the body's own axes; these are not principal axes"
         if floor is None:
             return None
-        if self.option("integrator") == "rk4":
-            return "RK4 has no restitution in one step: all its stages see the contact's damper; use integrator=euler on a floor"
         if not isinstance(body, (Sphere, Box)):
             return "only spheres and boxes are mapped onto a floor"
+        if self.option("profile") == "default":
+            return None
+        if self.option("integrator") == "rk4":
+            return "RK4 has no restitution in one step: all its stages see the contact's damper; use integrator=euler on a floor"
         if not isinstance(floor.friction, str):
             return "MuJoCo's convex friction cone adds normal velocity where a contact slips; friction is 'none' or 'infinite'"
         if floor.rest_speed > 0.0:
@@ -92,15 +96,16 @@ class MuJoCo(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return MuJoCoSimulation(scene, dt, self.option("integrator"))
+        return MuJoCoSimulation(scene, dt, self.option("integrator"), self.option("profile"))
 
 
 class MuJoCoSimulation(Simulation):
     """A compiled model and its data."""
 
-    def __init__(self, scene: Scenario, dt: float, integrator: str) -> None:
+    def __init__(self, scene: Scenario, dt: float, integrator: str, profile: str) -> None:
         self.staggered = integrator != "rk4"
-        self._model = _specification(scene, dt, integrator).compile()
+        calibrated = profile == "calibrated"
+        self._model = (_specification if calibrated else _default_specification)(scene, dt, integrator).compile()
         if scene.damping is not None:
             rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)
             rates[3:] *= np.diag(scene.body.inertia_tensor)
@@ -112,8 +117,8 @@ class MuJoCoSimulation(Simulation):
         self._data.qvel[0:3] = start[7:10]
         self._data.qvel[3:6] = rotate(conjugate(start[3:7]), start[10:13])
         self._steps = 0
-        self.settings = {"version": version("mujoco"), "profile": "calibrated", "integrator": integrator}
-        if scene.floor is not None:
+        self.settings = {"version": version("mujoco"), "profile": profile, "integrator": integrator}
+        if scene.floor is not None and calibrated:
             self.settings |= {
                 "solref": self._model.pair_solref[0].tolist(),
                 "solimp": self._model.pair_solimp[0].tolist(),
@@ -157,23 +162,45 @@ class MuJoCoSimulation(Simulation):
                 raise Diverged(f"MuJoCo's {kind.name} (a number beyond 1e10 or NaN) within the first {self._steps} steps")
 
 
-def _specification(scene: Scenario, dt: float, integrator: str) -> Any:
+def _free_body(scene: Scenario, dt: float, integrator: str) -> tuple[Any, Any]:
+    """What every profile sets: step, gravity, integrator, and a free body's mass and inertia; the specification and its body.
+
+    The automatic reset would put a simulation that broke down back to its start, unnoticed.
+    """
     spec = mujoco.MjSpec()
-    option = spec.option
-    option.timestep = dt
-    option.gravity = scene.acceleration
-    option.integrator = INTEGRATORS[integrator]
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    disable, enable = mujoco.mjtDisableBit, mujoco.mjtEnableBit
-    option.disableflags = disable.mjDSBL_AUTORESET | disable.mjDSBL_ISLAND
-    option.enableflags = enable.mjENBL_DIAGEXACT
+    spec.option.timestep = dt
+    spec.option.gravity = scene.acceleration
+    spec.option.integrator = INTEGRATORS[integrator]
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     body = spec.worldbody.add_body(name="body")
     body.add_freejoint()
     body.explicitinertial = True
     body.mass = scene.body.mass
     body.ipos = [0.0, 0.0, 0.0]
     body.inertia, body.iquat = _principal(scene.body.inertia_tensor)
+    return spec, body
+
+
+def _default_specification(scene: Scenario, dt: float, integrator: str) -> Any:
+    """What a user gets who sets friction on both surfaces and leaves the rest: MuJoCo has no restitution to set."""
+    spec, body = _free_body(scene, dt, integrator)
+    if scene.floor is not None:
+        known = {"none": 0.0, "infinite": DEFAULT_INFINITE_FRICTION}
+        friction = known[scene.floor.friction] if isinstance(scene.floor.friction, str) else scene.floor.friction
+        surface = {"friction": [friction, 0.005, 0.0001]}  # sliding; torsion and rolling as they come
+        _add_shape(body, scene, **surface)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **surface)
+    return spec
+
+
+def _specification(scene: Scenario, dt: float, integrator: str) -> Any:
+    spec, body = _free_body(scene, dt, integrator)
+    option = spec.option
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    disable, enable = mujoco.mjtDisableBit, mujoco.mjtEnableBit
+    option.disableflags |= disable.mjDSBL_ISLAND
+    option.enableflags = enable.mjENBL_DIAGEXACT
     if scene.floor is None:
         option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
     else:
@@ -199,11 +226,7 @@ def _is_diagonal(inertia: Array) -> bool:
 
 def _add_contact(spec: Any, body: Any, scene: Scenario, dt: float) -> None:
     assert scene.floor is not None
-    geom = {"name": "shape", "contype": 0, "conaffinity": 0}
-    if isinstance(scene.body, Sphere):
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[scene.body.radius, 0.0, 0.0], **geom)
-    elif isinstance(scene.body, Box):
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=scene.body.half_extents, **geom)
+    _add_shape(body, scene, name="shape", contype=0, conaffinity=0)
     spec.worldbody.add_geom(
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, contype=0, conaffinity=0
     )
@@ -217,6 +240,13 @@ def _add_contact(spec: Any, body: Any, scene: Scenario, dt: float) -> None:
         solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
         solreffriction=[0.0, -1.0 / dt],
     )
+
+
+def _add_shape(body: Any, scene: Scenario, **properties: Any) -> None:
+    if isinstance(scene.body, Sphere):
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[scene.body.radius, 0.0, 0.0], **properties)
+    elif isinstance(scene.body, Box):
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=scene.body.half_extents, **properties)
 
 
 def _to_world(rows: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The engine `pybullet`, calibrated: the scene as meant, by settings Bullet has but does not default to.
+"""The engine `pybullet`: calibrated, the scene as meant, by settings Bullet has but does not default to; or with its defaults.
 
 Maximal coordinates (btRigidBody) give v+ = -e v exactly, once the contact thresholds that start a collision early, the error
 reduction that adds penetration to the rebound, and the speed below which restitution is dropped are all set to 0.
@@ -9,36 +9,66 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from comparisons.engines.base import IMPLICIT_GYROSCOPIC, SEMI_IMPLICIT_EULER, Array, AsBuilt, Engine, Simulation, may_tumble, version
+from comparisons.engines.base import (
+    EXPLICIT_GYROSCOPIC,
+    IMPLICIT_GYROSCOPIC,
+    PROFILES,
+    SEMI_IMPLICIT_EULER,
+    Array,
+    AsBuilt,
+    Engine,
+    Simulation,
+    may_tumble,
+    version,
+)
 from comparisons.predictions import bounce_error, flight_error
-from scenarios import Scenario, Truth
+from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
 
 STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact there
+FASTEST = 1e12  # m/s and rad/s; Bullet clamps the speeds of a multibody to 100 by default
 LARGEST_TURN = np.pi / 4  # rad a step; Bullet turns by less than it should beyond
 FLOOR_HALF_SIZE = 1e3  # m; thick enough that nothing tunnels, and Bullet loses no digits to it
 
 
 class PyBullet(Engine):
-    """Bullet's rigid body in maximal coordinates, on a plane (ball) or a large box (anything with corners)."""
+    """Bullet's rigid body on a plane (ball) or a large box (anything with corners); or as it comes (profile=default)."""
 
     name = "pybullet"
     order = 1.0
+    choices: ClassVar = {"coordinates": ("maximal", "multibody"), "profile": PROFILES}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.is_default and "coordinates" in self.options:
+            raise DropspinError(f"engine {self.label!r}: profile=default has the coordinates of the default, multibody; leave them out.")
+
+    @property
+    def is_default(self) -> bool:
+        """Whether only the obvious is set."""
+        return self.option("profile") == "default"
+
+    @property
+    def is_multibody(self) -> bool:
+        """Whether the body is Bullet's btMultiBody, its default, rather than a btRigidBody."""
+        return self.is_default or self.option("coordinates") == "multibody"
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """Maximal coordinates solve the gyroscopic term implicitly, by one Newton step."""
-        return IMPLICIT_GYROSCOPIC if may_tumble(scene) else SEMI_IMPLICIT_EULER
+        """Maximal coordinates solve the gyroscopic term implicitly, by one Newton step; multibodies have it explicit."""
+        if not may_tumble(scene):
+            return SEMI_IMPLICIT_EULER
+        return EXPLICIT_GYROSCOPIC if self.is_multibody else IMPLICIT_GYROSCOPIC
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
-        """Semi-implicit Euler about a fixed axis; a flat bounce that is noticed late."""
-        if np.linalg.norm(scene.start.angular_velocity) * dt > LARGEST_TURN:
+        """Semi-implicit Euler about a fixed axis; a flat bounce, noticed late in maximal coordinates, after gravity in a multibody."""
+        if self.is_default or np.linalg.norm(scene.start.angular_velocity) * dt > LARGEST_TURN:
             return None
         flight = flight_error(scene, truth, metric, dt, exact_rotation=True)
-        return bounce_error(scene, truth, metric, dt) if flight is None else flight
+        return bounce_error(scene, truth, metric, dt, gravity_first=self.is_multibody) if flight is None else flight
 
     def declines(self, scene: Scenario) -> str | None:
         """What calibration cannot map."""
@@ -46,6 +76,8 @@ class PyBullet(Engine):
         if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
             return "PyBullet takes inertia along the body's own axes only; these are not principal axes"
         floor = scene.floor
+        if scene.damping is not None and self.is_multibody and not self.is_default:
+            return "Bullet's multibodies damp by a law of their own, k v (1 + |v|)"
         if floor is None:
             return None
         travel = np.linalg.norm(scene.start.position) + np.linalg.norm(scene.start.velocity) * scene.duration
@@ -58,7 +90,7 @@ class PyBullet(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return PyBulletSimulation(scene, dt)
+        return PyBulletSimulation(scene, dt, default=self.is_default, multibody=self.is_multibody)
 
 
 class PyBulletSimulation(Simulation):
@@ -66,65 +98,53 @@ class PyBulletSimulation(Simulation):
 
     staggered = True
 
-    def __init__(self, scene: Scenario, dt: float) -> None:
+    def __init__(self, scene: Scenario, dt: float, *, default: bool, multibody: bool) -> None:
         self._bullet = _import_quietly()
         self._client = self._bullet.connect(self._bullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet gave no connection")
         try:
-            self._build(scene, dt)
+            self._build(scene, dt, default, multibody)
         except BaseException:
             self.close()
             raise
 
-    def _build(self, scene: Scenario, dt: float) -> None:
+    def _build(self, scene: Scenario, dt: float, default: bool, multibody: bool) -> None:
         bullet, client = self._bullet, self._client
-        parameters = {
-            "fixedTimeStep": dt,
-            "numSubSteps": 0,
-            "solverResidualThreshold": 1e-14,
-            "erp": 0.0,
-            "contactERP": 0.0,
-            "frictionERP": 0.0,
-            "contactSlop": 0.0,
-            "restitutionVelocityThreshold": 0.0 if scene.floor is None else scene.floor.rest_speed,
-            "useSplitImpulse": 1,
-            "splitImpulsePenetrationThreshold": 0.0,
-            "enableConeFriction": 1,
-            "deterministicOverlappingPairs": 1,
-        }
+        parameters = {"fixedTimeStep": dt} if default else _parameters(scene, dt)
         bullet.setPhysicsEngineParameter(physicsClientId=client, **parameters)
         bullet.setGravity(*map(float, scene.acceleration), physicsClientId=client)
-        contact = {} if scene.floor is None else _contact_properties(scene)
+        contact = {} if scene.floor is None else _contact_properties(scene, default)
         if scene.floor is not None:
-            self._add_floor(scene, contact)
+            self._add_floor(scene, contact, default, multibody)
         self._body = bullet.createMultiBody(
             baseMass=scene.body.mass,
             baseCollisionShapeIndex=-1 if scene.floor is None else self._shape(scene),
             basePosition=scene.start.position,
             baseOrientation=scene.start.orientation,
-            useMaximalCoordinates=True,
+            useMaximalCoordinates=not multibody,
             physicsClientId=client,
         )
+        dynamics = contact | _damping(scene, default)
+        if not default:
+            dynamics["activationState"] = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
+        if multibody and not default:
+            dynamics["maxJointVelocity"] = FASTEST
         bullet.changeDynamics(
             self._body,
             -1,
             mass=scene.body.mass,
             localInertiaDiagonal=[float(moment) for moment in np.diag(scene.body.inertia_tensor)],
-            # Maximal coordinates damp as v (1 - k)^t: this k is the scene's exponential decay.
-            linearDamping=0.0 if scene.damping is None else -np.expm1(-scene.damping.linear),
-            angularDamping=0.0 if scene.damping is None else -np.expm1(-scene.damping.angular),
-            activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
             physicsClientId=client,
-            **contact,
+            **dynamics,
         )
         bullet.resetBaseVelocity(self._body, scene.start.velocity, scene.start.angular_velocity, physicsClientId=client)
         self.settings = {
             "version": version("pybullet"),
-            "profile": "calibrated",
-            "coordinates": "maximal",
+            "profile": "default" if default else "calibrated",
+            "coordinates": "multibody" if multibody else "maximal",
             **parameters,
-            **contact,
+            **dynamics,
         }
 
     def _shape(self, scene: Scenario) -> int:
@@ -134,15 +154,15 @@ class PyBulletSimulation(Simulation):
         assert isinstance(scene.body, Box)
         return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=scene.body.half_extents, physicsClientId=client))
 
-    def _add_floor(self, scene: Scenario, contact: dict[str, float]) -> None:
+    def _add_floor(self, scene: Scenario, contact: dict[str, float], default: bool, multibody: bool) -> None:
         bullet, client = self._bullet, self._client
-        if isinstance(scene.body, Sphere):
+        if default or isinstance(scene.body, Sphere):
             shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0], physicsClientId=client)
             top = 0.0
         else:  # on a plane, a box gets one contact point a step
             shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3, physicsClientId=client)
             top = FLOOR_HALF_SIZE
-        floor = bullet.createMultiBody(0, shape, basePosition=[0, -top, 0], useMaximalCoordinates=True, physicsClientId=client)
+        floor = bullet.createMultiBody(0, shape, basePosition=[0, -top, 0], useMaximalCoordinates=not multibody, physicsClientId=client)
         # Bullet multiplies the two bodies' coefficients; the floor's are 1, so the body's are the scene's.
         bullet.changeDynamics(floor, -1, **contact | {"restitution": 1.0, "lateralFriction": 1.0}, physicsClientId=client)
 
@@ -166,14 +186,39 @@ class PyBulletSimulation(Simulation):
         self._bullet.disconnect(self._client)
 
 
-def _contact_properties(scene: Scenario) -> dict[str, float]:
+def _parameters(scene: Scenario, dt: float) -> dict[str, float]:
+    """What calibration sets of the world."""
+    return {
+        "fixedTimeStep": dt,
+        "numSubSteps": 0,
+        "solverResidualThreshold": 1e-14,
+        "erp": 0.0,
+        "contactERP": 0.0,
+        "frictionERP": 0.0,
+        "contactSlop": 0.0,
+        "restitutionVelocityThreshold": 0.0 if scene.floor is None else scene.floor.rest_speed,
+        "useSplitImpulse": 1,
+        "splitImpulsePenetrationThreshold": 0.0,
+        "enableConeFriction": 1,
+        "deterministicOverlappingPairs": 1,
+    }
+
+
+def _damping(scene: Scenario, default: bool) -> dict[str, float]:
+    """Maximal coordinates damp as v (1 - k)^t: 1 - exp(-rate) is the scene's decay. Who leaves the defaults, leaves Bullet's own 0.04."""
+    if scene.damping is None:
+        return {} if default else {"linearDamping": 0.0, "angularDamping": 0.0}
+    linear, angular = scene.damping.linear, scene.damping.angular
+    if default:
+        return {"linearDamping": linear, "angularDamping": angular}
+    return {"linearDamping": float(-np.expm1(-linear)), "angularDamping": float(-np.expm1(-angular))}
+
+
+def _contact_properties(scene: Scenario, default: bool) -> dict[str, float]:
     assert scene.floor is not None
     friction = {"none": 0.0, "infinite": STRONGEST_FRICTION}.get(str(scene.floor.friction))
-    return {
-        "restitution": scene.floor.restitution,
-        "lateralFriction": float(scene.floor.friction) if friction is None else friction,
-        "contactProcessingThreshold": 0.0,
-    }
+    surface = {"restitution": scene.floor.restitution, "lateralFriction": float(scene.floor.friction) if friction is None else friction}
+    return surface if default else surface | {"contactProcessingThreshold": 0.0}
 
 
 def _import_quietly() -> Any:

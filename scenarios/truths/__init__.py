@@ -1,5 +1,7 @@
 """The exact answers. Each file is one problem: its formula, its source, what it is valid for."""
 
+from functools import lru_cache
+
 from scenarios.model import Scenario
 from scenarios.truths.bounce import bounce_ladder
 from scenarios.truths.corner_impact import corner_impact
@@ -14,6 +16,7 @@ from scenarios.truths.truth import Impact, Truth
 __all__ = ["LAWS", "Impact", "Law", "Truth", "truth_for"]
 
 
+@lru_cache(maxsize=128)  # a run, its tables and its plots all ask for it, and the course of a tumble takes a second
 def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     """The exact motion of a scene, or None where there is no closed form for it.
 

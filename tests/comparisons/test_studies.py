@@ -60,7 +60,7 @@ def test_lively_ball_converges_at_first_order_after_averaging_phases():
     orders = found.frame[(found.frame["kind"] == "order") & found.frame["metric"].isin(["bounce_height_error", "restitution_error"])]
     assert len(orders) == 5  # PyBullet's restitution is exact
     np.testing.assert_allclose(orders["value"], 1.0, atol=0.02)
-    assert found.model_errors.empty
+    assert found.lasting_errors("model").empty
 
 
 @pytest.mark.parametrize("more", [1.01, 1.003, 0.997])

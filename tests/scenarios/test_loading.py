@@ -112,3 +112,15 @@ def test_a_file_beside_a_catalogue_name_needs_a_path(tmp_path, monkeypatch):
     assert load("drop-ball").duration == 1.5
     assert load("drop-ball.toml").duration == 9.0
     assert load(Path("drop-ball.toml")).duration == 9.0
+
+
+def test_scenes_are_equal_by_what_was_given():
+    """Whatever has been asked of one of them in between."""
+    one, other = load("drop-box-corner"), load("drop-box-corner")
+    assert one.body.inertia_tensor.any()
+    assert one.clearance > 0.0
+    assert one == other
+    assert hash(one) == hash(other)
+    assert scenarios.truth_for(one) is scenarios.truth_for(other)
+    assert one != load("drop-box-sticking")
+    assert one.body != load("drop-ball").body

@@ -1,0 +1,101 @@
+"""Calibrated and default profiles: what the defaults get wrong is told from what the engine cannot do."""
+
+import math
+
+import numpy as np
+import pytest
+
+import comparisons
+from comparisons import engine, simulate
+from scenarios import DropspinError, load
+
+U = math.sqrt(2 * 9.81)
+
+
+def ball(e):
+    return load(
+        {
+            "name": "ball",
+            "duration": 1.0,
+            "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0},
+            "start": {"position": [0.0, 1.1, 0.0]},
+            "gravity": {"acceleration": [0.0, -9.81, 0.0]},
+            "floor": {"restitution": e, "friction": "none"},
+        }
+    )
+
+
+def apparent(name, e, dt):
+    """√(h₁/h₀) of a drop from 1 m: the restitution that a user sees."""
+    motion = simulate(ball(e), name, dt)
+    after = int(np.argmin(motion.velocity[:, 1])) + 1
+    return math.sqrt(max(motion.position[after:, 1].max() - 0.1, 0.0))
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.5, 0.8, 0.95])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1e-3, 1 / 4000])
+def test_multibody_restitution(e, dt):
+    """Bullet's multibody collides after gravity, as the note does: e (1 + g dt/u), to a step's phase; measured .5185 at e = .5, 1/60 s."""
+    motion = simulate(ball(e), "pybullet[coordinates=multibody]", dt)
+    last = int(np.argmin(motion.velocity[:, 1]))
+    down, up = motion.velocity[last : last + 2, 1]
+    assert -up / down == pytest.approx(e * (1 - 9.81 * dt / down), abs=1e-12)
+
+
+def test_pybullet_s_default_restitution_vanishes_with_the_step():
+    """A published table: .512 and less at 1/240 s, .1081 at 1 ms, .02 and less at 1/4000 s, for e = .5; of .95 .0319 is left."""
+    seen = [apparent("pybullet[profile=default]", 0.5, dt) for dt in (1 / 60, 1 / 240, 1e-3, 1 / 4000)]
+    np.testing.assert_allclose(seen[:3], [0.5143, 0.4963, 0.1081], atol=5e-5)
+    assert seen[3] < 0.03
+    assert apparent("pybullet[profile=default]", 0.95, 1 / 4000) < 0.04
+
+
+def test_mujoco_has_no_restitution_by_default():
+    """The same whatever is asked for, and next to none."""
+    for dt in (1 / 240, 1e-3):
+        assert len({apparent("mujoco[profile=default]", e, dt) for e in (0.0, 0.5, 0.95)}) == 1
+        assert apparent("mujoco[profile=default]", 0.95, dt) < 0.05
+
+
+def test_an_error_of_the_defaults_is_a_setting_s():
+    """It stays as the step goes to 0, and the calibrated profile does not have it; where that was not run it is the model's."""
+    both = comparisons.run([load("spin-asymmetric"), load("drop-ball")], ["pybullet", "pybullet[profile=default]"])
+    lasting = both.lasting_errors("setting")
+    assert set(lasting["engine"]) == {"pybullet[profile=default]"}
+    assert {"energy_error", "bounce_height_error"} <= set(lasting["metric"])
+    assert both.lasting_errors("model").empty
+    assert lasting["reason"].str.contains("it is a setting").all()
+    alone = comparisons.run([load("drop-ball")], ["pybullet[profile=default]"])
+    assert not alone.lasting_errors("model").empty
+    assert alone.lasting_errors("setting").empty
+
+
+def test_what_the_note_lacks_is_no_setting():
+    """An engine without profiles keeps its model errors."""
+    found = comparisons.run([load("spin-asymmetric")], ["document", "mujoco", "mujoco[profile=default]"])
+    assert set(found.lasting_errors("model")["engine"]) == {"document"}
+    assert found.lasting_errors("setting").empty  # free spin has no settings to get wrong in MuJoCo
+
+
+def test_profiles_and_coordinates():
+    """Labels, the calibrated twin, and what does not go together."""
+    assert engine("pybullet[profile=default]").calibrated_label == "pybullet"
+    assert engine("mujoco[integrator=implicitfast,profile=default]").calibrated_label == "mujoco[integrator=implicitfast]"
+    assert engine("mujoco").calibrated_label is None
+    assert engine("pybullet[profile=calibrated]").label == "pybullet"
+    with pytest.raises(DropspinError, match="profile=default has the coordinates of the default"):
+        engine("pybullet[coordinates=multibody,profile=default]")
+    assert "law of their own" in engine("pybullet[coordinates=multibody]").declines(load("fall-damped"))
+    for name in ("mujoco", "pybullet"):
+        with engine(f"{name}[profile=default]").prepare(ball(0.5), 1e-3) as simulation:
+            assert simulation.settings["profile"] == "default"
+
+
+def test_multibody_is_mujoco_s_euler_and_maximal_its_implicit():
+    """The same discretisation of a tumble, known by the same name: to 1e-9 of the angular momentum after a second."""
+    scene = load("spin-dzhanibekov")
+    scene = scene.model_copy(update={"duration": 1.0})
+    for one, other in (("pybullet[coordinates=multibody]", "mujoco"), ("pybullet", "mujoco[integrator=implicitfast]")):
+        assert engine(one).discretisation(scene) == engine(other).discretisation(scene)
+        first, second = (simulate(scene, name, 1e-3).angular_velocity for name in (one, other))
+        np.testing.assert_allclose(first, second, atol=1e-9 * 5)

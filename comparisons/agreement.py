@@ -14,6 +14,9 @@ from scenarios import Trajectory, Truth
 
 Row = dict[str, Any]
 
+NO_EVIDENCE = "no evidence"
+"""How the reason of a pair begins that agrees because both make the same errors."""
+
 
 def agreement_rows(written: Phase, dt: float, first: Attempt, second: Attempt, phases: Sequence[Phase]) -> list[Row]:
     """How far two engines are apart, by the metrics that mean something between engines."""
@@ -24,7 +27,7 @@ def agreement_rows(written: Phase, dt: float, first: Attempt, second: Attempt, p
     shared: Row = {"scene": scene.name, "engine": first.label, "dt": dt, "kind": "agreement", "truth": second.label}
     shared["steps"] = scene.steps(dt)
     if first.discretisation is not None and first.discretisation == second.discretisation:
-        shared["reason"] = f"no evidence: both are {first.discretisation}"
+        shared["reason"] = f"{NO_EVIDENCE}: both are {first.discretisation}"
     rows: list[Row] = []
     for metric in METRICS.values():
         if not (metric.agreement and metric.applies(scene, truth or _as_truth(second.phases[0]))):

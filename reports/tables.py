@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from comparisons import METRICS, Results
+from comparisons.agreement import NO_EVIDENCE
 from reports.findings import STUDIES, failures, finding_sentences, orders, verdict_sentence
 from reports.numbers import MARKS, bound, step, subject, trend, word, written
 
@@ -19,7 +20,7 @@ STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diver
 
 
 def print_table(results: Results, console: Console | None = None) -> None:
-    """Print a run at its finest step: every metric against truth, and the engines against each other."""
+    """Print a run at its finest step: every metric against truth, and how far independent engines are apart."""
     out = console or Console()
     at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
     for name, scene in results.scenes.items():
@@ -40,7 +41,7 @@ def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     frame = results.frame[results.frame["scene"] == name]
     finest = frame[frame["dt"] == frame["dt"].min()]
     own = finest[finest["kind"].isin(["truth", "invariant"])]
-    pairs = finest[finest["kind"] == "agreement"]
+    pairs = finest[(finest["kind"] == "agreement") & ~finest["reason"].str.startswith(NO_EVIDENCE)]
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
     for engine in engines:

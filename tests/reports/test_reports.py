@@ -342,7 +342,7 @@ def test_many_engines_break_the_table_and_no_number(capsys):
             text = capsys.readouterr().out
             assert "…" not in text
             assert max(map(len, text.splitlines())) <= width
-            errors = found.frame[(found.frame["metric"] == "orientation_error") & found.frame["engine"].isin(engines)]
+            errors = found.measurements[(found.measurements["metric"] == "orientation_error") & found.measurements["engine"].isin(engines)]
             assert len(errors) == len(engines)
             for value in [*errors["value"], apart]:
                 assert written(value) in text

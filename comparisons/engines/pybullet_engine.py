@@ -30,6 +30,8 @@ from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
 
 STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact there
+ALMOST = 0.999
+NO_PUSH = 1e-6  # of a step's gravity
 FASTEST = 1e12  # m/s and rad/s; Bullet clamps the speeds of a multibody to 100 by default
 LARGEST_TURN = np.pi / 4  # rad a step; Bullet turns by less than it should beyond
 FLOOR_HALF_SIZE = 1e3  # m; thick enough that nothing tunnels, and Bullet loses no digits to it
@@ -100,6 +102,8 @@ class PyBulletSimulation(Simulation):
 
     def __init__(self, scene: Scenario, dt: float, *, default: bool, multibody: bool) -> None:
         self._bullet = _import_quietly()
+        self._dt, self._fall = dt, dt * scene.acceleration
+        self._grips = scene.floor is not None and scene.floor.friction == "infinite"
         self._client = self._bullet.connect(self._bullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet gave no connection")
@@ -176,6 +180,11 @@ class PyBulletSimulation(Simulation):
         velocity, angular_velocity = self._bullet.getBaseVelocity(self._body, self._client)
         return np.array(position + orientation + velocity + angular_velocity)
 
+    def record(self, steps: int, every: int = 1) -> Array:
+        rows = super().record(steps, every)
+        self.limits = list(_limits_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
+        return rows
+
     def as_built(self) -> AsBuilt:
         dynamics = self._bullet.getDynamicsInfo(self._body, -1, physicsClientId=self._client)
         world = self._bullet.getPhysicsEngineParameters(physicsClientId=self._client)
@@ -184,6 +193,22 @@ class PyBulletSimulation(Simulation):
 
     def close(self) -> None:
         self._bullet.disconnect(self._client)
+
+
+def _limits_met(rows: Array, dt: float, fall: Array | None) -> Iterator[str]:
+    """Bullet's own limits that a motion has reached, from its states at every step.
+
+    `fall` is what gravity adds to the velocity in a step [m/s], where a floor is to grip.
+    """
+    turn = float(np.linalg.norm(rows[:, 10:13], axis=1).max()) * dt
+    if turn > LARGEST_TURN:
+        yield f"the body turns by up to {turn:.3g} rad a step; beyond π/4 Bullet's rotations fall short"
+    if fall is None:
+        return
+    pushes = np.diff(rows[:, 7:10], axis=0) - fall
+    along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
+    if bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
+        yield f"a contact needs more than {STRONGEST_FRICTION:g} times its normal push to stick; Bullet's friction ends there, and it slips"
 
 
 def _parameters(scene: Scenario, dt: float) -> dict[str, float]:

@@ -99,3 +99,26 @@ def test_multibody_is_mujoco_s_euler_and_maximal_its_implicit():
         assert engine(one).discretisation(scene) == engine(other).discretisation(scene)
         first, second = (simulate(scene, name, 1e-3).angular_velocity for name in (one, other))
         np.testing.assert_allclose(first, second, atol=1e-9 * 5)
+
+
+def test_what_bullet_cannot_do_is_said():
+    """It turns by too little beyond π/4 rad a step, and lets a contact slip that would need more than 10 times its normal push."""
+
+    def limits_of(scene, dt):
+        found = comparisons.run([scene], ["pybullet"], [dt]).frame
+        return list(found.loc[found["verdict"] == "limited", "reason"])
+
+    fast = load("spin-principal-500")
+    assert limits_of(fast, 1.5e-3) == []  # .75 rad
+    [told] = limits_of(fast, 1.6e-3)
+    assert "turns by up to 0.8 rad a step" in told
+    gripping = ball(0.5).model_copy(update={"floor": ball(0.5).floor.model_copy(update={"friction": "infinite"})})
+    u = 1.0 + 9.81 * 1e-3
+
+    def spinning(ratio):  # what stops the contact is 2/7 of its speed, what is there to push 1.5 u
+        spin = ratio * 1.5 * u * 3.5 / 0.1
+        return gripping.starting_at(np.array([0, 0.1 + 1e-9, 0, 0, 0, 0, 1, 0, -1.0, 0, 0, 0, spin]))
+
+    assert not [told for told in limits_of(spinning(9.9), 1e-4) if "slips" in told]
+    assert [told for told in limits_of(spinning(10.5), 1e-4) if "slips" in told]
+    assert limits_of(load("rock-block"), 2e-3) == []

@@ -3,6 +3,7 @@
 from comparisons.engines.base import AsBuilt, Diverged, Engine, EngineMissing, Simulation
 from comparisons.engines.registry import engine, engine_names
 from comparisons.ensembles import ENSEMBLE_METRICS
+from comparisons.isolation import Limits
 from comparisons.metrics import METRICS
 from comparisons.results import Results
 from comparisons.run import DEFAULT_DTS, measure, run
@@ -16,6 +17,7 @@ __all__ = [
     "Diverged",
     "Engine",
     "EngineMissing",
+    "Limits",
     "Results",
     "Simulation",
     "engine",

@@ -10,12 +10,13 @@ from comparisons.agreement import agreement_rows
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Engine
 from comparisons.ensembles import Outcome, ensemble_rows
+from comparisons.isolation import Cells, Limits
 from comparisons.metrics import Average, Metric, metrics_for
 from comparisons.phases import Phase, start_phases
 from comparisons.predictions import prediction_rows
 from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
-from comparisons.simulating import Attempt, assert_step_fits, attempt_by, contestant_named
+from comparisons.simulating import Attempt, assert_step_fits, contestant_named
 from comparisons.studies import blame_settings, study_rows
 from comparisons.verdicts import assert_expectations_can_be_judged, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
@@ -31,6 +32,7 @@ def run(
     engines: Sequence[str | Engine],
     dts: Sequence[float] = DEFAULT_DTS,
     progress: Progress = lambda scene, engine, dt: None,
+    limits: Limits = Limits(),  # noqa: B008 - it cannot be changed
 ) -> Results:
     """Run every scene through every engine at every step, measure, and judge.
 
@@ -39,6 +41,7 @@ def run(
         engines: Engines, or names with options. One that is not installed is `missing` in the results, and the rest runs.
         dts: Time steps [s].
         progress: Called with scene, engine and step after each of len(scenes) * len(engines) * len(dts) pieces of work.
+        limits: What an engine may use for one of these pieces; each engine works in a process of its own.
 
     Raises:
         DropspinError: Something was asked for that cannot be: an unknown engine, a step that is no step, equal names.
@@ -55,33 +58,34 @@ def run(
     trajectories: dict[TrajectoryKey, Trajectory] = {}
     ensembles: dict[TrajectoryKey, Outcome] = {}
     settings: dict[str, dict[str, Any]] = {}
-    for scene, truth in zip(scenes, truths, strict=True):
-        measured: dict[str, list[Row]] = {label: [] for label in labels}
-        for dt in dts:
-            phases = start_phases(scene, truth, dt)
-            attempts: list[Attempt] = []
+    with Cells(limits) as cells:
+        for scene, truth in zip(scenes, truths, strict=True):
+            measured: dict[str, list[Row]] = {label: [] for label in labels}
+            for dt in dts:
+                phases = start_phases(scene, truth, dt)
+                attempts: list[Attempt] = []
+                for contestant in contestants:
+                    attempt = cells.attempt(contestant, scene, dt, phases)
+                    if attempt.motion is not None:
+                        trajectories[scene.name, contestant.label, dt] = attempt.motion
+                        settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
+                    measured[contestant.label] += _truth_rows(Phase(scene, truth), dt, attempt, phases)
+                    if contestant.engine is not None and attempt.motion is not None:
+                        rows += prediction_rows(contestant.engine, scene, truth, dt)
+                    attempts.append(attempt)
+                    if attempt.outcome is not None:
+                        ensembles[scene.name, contestant.label, dt] = attempt.outcome
+                        rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
+                    progress(scene.name, contestant.label, dt)
+                for first, second in combinations(attempts, 2):
+                    rows += agreement_rows(Phase(scene, truth), dt, first, second, phases)
+            studies = {c.label: study_rows(scene, c.engine, measured[c.label]) for c in contestants if c.engine is not None}
             for contestant in contestants:
-                attempt = attempt_by(contestant, scene, dt, phases)
-                if attempt.motion is not None:
-                    trajectories[scene.name, contestant.label, dt] = attempt.motion
-                    settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
-                measured[contestant.label] += _truth_rows(Phase(scene, truth), dt, attempt, phases)
-                if contestant.engine is not None and attempt.motion is not None:
-                    rows += prediction_rows(contestant.engine, scene, truth, dt)
-                attempts.append(attempt)
-                if attempt.outcome is not None:
-                    ensembles[scene.name, contestant.label, dt] = attempt.outcome
-                    rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
-                progress(scene.name, contestant.label, dt)
-            for first, second in combinations(attempts, 2):
-                rows += agreement_rows(Phase(scene, truth), dt, first, second, phases)
-        studies = {c.label: study_rows(scene, c.engine, measured[c.label]) for c in contestants if c.engine is not None}
-        for contestant in contestants:
-            own = measured[contestant.label] + studies.get(contestant.label, [])
-            twin = contestant.engine.calibrated_label if contestant.engine is not None else None
-            if twin in studies:
-                blame_settings(own, studies[twin])
-            rows += own
+                own = measured[contestant.label] + studies.get(contestant.label, [])
+                twin = contestant.engine.calibrated_label if contestant.engine is not None else None
+                if twin in studies:
+                    blame_settings(own, studies[twin])
+                rows += own
     by_name = {scene.name: scene for scene in scenes}
     return Results(as_frame(rows), by_name, tuple(labels), trajectories, ensembles, stamp | {"settings": settings})
 

@@ -12,7 +12,6 @@ from comparisons.building import assert_built_as_meant, sound_record
 from comparisons.engines.base import Diverged, Engine, EngineMissing
 from comparisons.engines.registry import engine as engine_named
 from comparisons.ensembles import Outcome, outcome_of
-from comparisons.phases import Phase
 from scenarios import DropspinError, Scenario, Trajectory
 
 TIMED_REPEATS = 3
@@ -106,10 +105,15 @@ def contestant_named(chosen: str | Engine) -> Contestant:
     return Contestant(created.label, created)
 
 
-def attempt_by(contestant: Contestant, scene: Scenario, dt: float, phases: Sequence[Phase]) -> Attempt:
-    """Run a scene as written, then from each of its start phases; whatever goes wrong is told in the attempt."""
+def attempt_of(contestant: Contestant, scene: Scenario) -> Attempt:
+    """An attempt that is not made yet."""
+    return Attempt(contestant.label, contestant.engine.discretisation(scene) if contestant.engine else None)
+
+
+def attempt_by(contestant: Contestant, scene: Scenario, dt: float, starts: Sequence[Scenario]) -> Attempt:
+    """Run a scene as written, then from each of its start phases if there are several; whatever goes wrong is told in the attempt."""
     engine = contestant.engine
-    attempt = Attempt(contestant.label, engine.discretisation(scene) if engine else None)
+    attempt = attempt_of(contestant, scene)
     if engine is None:
         attempt.verdict, attempt.reason = "missing", contestant.missing
         return attempt
@@ -119,7 +123,7 @@ def attempt_by(contestant: Contestant, scene: Scenario, dt: float, phases: Seque
             attempt.verdict, attempt.reason = "declined", refusal
             return attempt
         attempt.motion, attempt.limits = _motion(scene, engine, dt)
-        attempt.phases = [attempt.motion] if len(phases) == 1 else [_motion(phase.scene, engine, dt)[0] for phase in phases]
+        attempt.phases = [attempt.motion] if len(starts) == 1 else [_motion(start, engine, dt)[0] for start in starts]
         attempt.outcome = None if scene.ensemble is None else outcome_of(engine, scene, dt)
         attempt.settings, attempt.time_per_step = _settings_and_time(engine, scene, dt)
     except Diverged as error:

@@ -101,8 +101,18 @@ def dropspin() -> None:
     metavar="DIR",
     help="Folder for the report and the data; an earlier run there is replaced.",
 )
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=300.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Processor time that an engine may take for one scene at one step.",
+)
 @as_json
-def run(scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...], output: str, json_output: bool) -> int:
+def run(
+    scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...], output: str, time_limit: float, json_output: bool
+) -> int:
     """Run scenes through engines, side by side, and write the report.
 
     SCENE is a name of the catalogue or the path of a TOML file. Without arguments: the core catalogue, three engines, three
@@ -127,7 +137,7 @@ def run(scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...
                 _stop_if_interrupted()
                 progress(scene, engine, dt)
 
-            results = comparisons.run(loaded, chosen, steps, told)
+            results = comparisons.run(loaded, chosen, steps, told, comparisons.Limits(processor_time=time_limit))
         _stop_if_interrupted()
         if not json_output:
             reports.print_table(results)

@@ -27,8 +27,8 @@ def core():
 
 
 def value(results, scene, engine, metric, dt=1e-3):
-    frame = results.frame
-    own = frame[(frame["kind"] != "agreement") & (frame["scene"] == scene) & (frame["engine"] == engine)]
+    frame = results.measurements
+    own = frame[(frame["scene"] == scene) & (frame["engine"] == engine)]
     [found] = own[(own["metric"] == metric) & np.isclose(own["dt"], dt)]["value"]
     return found
 

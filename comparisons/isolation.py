@@ -1,0 +1,126 @@
+"""Engines kept apart: each runs in a process of its own, so that whatever it does costs its own row and nothing else.
+
+A segmentation fault ends the engine's process, not the run; an endless loop ends at a limit of processor time, which a loaded machine does
+not use up; a leak ends at a limit of memory; what an engine prints is dropped. A process that has ended is replaced for the next piece of
+work. One engine works at a time, so that nobody's timing is disturbed.
+"""
+
+import faulthandler
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from concurrent.futures import TimeoutError as OutOfTime
+from dataclasses import dataclass
+from multiprocessing import get_all_start_methods, get_context
+from types import TracebackType
+from typing import Self
+
+from pebble import ProcessExpired, ProcessPool
+
+from comparisons.phases import Phase
+from comparisons.simulating import Attempt, Contestant, attempt_by, attempt_of
+from scenarios import Scenario
+
+BACKSTOP = 10.0
+"""Wall time over processor time: an engine that sleeps for ever uses no processor."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an engine may use for one scene at one step, start phases and ensemble included.
+
+    Attributes:
+        processor_time: [s]; ten times as much by the clock on the wall.
+        memory: Beyond what its process takes when it starts [bytes].
+    """
+
+    processor_time: float = 300.0
+    memory: int = 8 * 2**30
+
+
+class Cells:
+    """One process for each engine; a context manager."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._pools: dict[str, ProcessPool] = {}
+
+    def attempt(self, contestant: Contestant, scene: Scenario, dt: float, phases: Sequence[Phase]) -> Attempt:
+        """Run a scene through an engine in its process; whatever goes wrong is told in the attempt."""
+        if contestant.engine is None:
+            return attempt_by(contestant, scene, dt, [])
+        if contestant.label not in self._pools:
+            self._pools[contestant.label] = self._pool(contestant)
+        starts = [phase.scene for phase in phases]
+        task = self._pools[contestant.label].schedule(
+            _attempt_here, args=[scene, dt, starts, self._limits.processor_time], timeout=BACKSTOP * self._limits.processor_time
+        )
+        failed = attempt_of(contestant, scene)
+        try:
+            attempt: Attempt = task.result()
+            return attempt
+        except OutOfTime:
+            failed.verdict, failed.reason = "timed_out", f"not done after {BACKSTOP * self._limits.processor_time:g} s by the clock"
+        except ProcessExpired as end:
+            failed.verdict, failed.reason = self._told(end.exitcode)
+        return failed
+
+    def _told(self, exit_code: int | None) -> tuple[str, str]:
+        """The verdict on an engine whose process has ended, and the reason."""
+        if exit_code == -signal.SIGXCPU:
+            return "timed_out", f"not done after {self._limits.processor_time:g} s of processor time"
+        if exit_code is not None and exit_code < 0:
+            return "crashed", f"its process was ended by {signal.Signals(-exit_code).name}"
+        return "crashed", f"its process ended with exit code {exit_code}"
+
+    def _pool(self, contestant: Contestant) -> ProcessPool:
+        # A forked process has the engine already, whatever it is made of; and no script of a user's is run again.
+        method = "fork" if "fork" in get_all_start_methods() else "spawn"
+        context = get_context(method)
+        return ProcessPool(max_workers=1, initializer=_move_in, initargs=[contestant, self._limits.memory], context=context)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        for pool in self._pools.values():
+            pool.stop()  # type: ignore[no-untyped-call]
+        for pool in self._pools.values():
+            pool.join()
+
+
+_residents: list[Contestant] = []
+"""The engine whose process this is; empty in the parent."""
+
+
+def _move_in(contestant: Contestant, memory: int) -> None:
+    """Begin a process's life: keep quiet, leave interrupts to the parent, and take no more memory than allowed."""
+    _residents.append(contestant)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    faulthandler.disable()
+    nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
+    for stream in (1, 2):
+        os.dup2(nowhere.fileno(), stream)
+    sys.stdout = sys.stderr = nowhere
+    if sys.platform == "linux":
+        import resource
+
+        with open("/proc/self/statm", encoding="ascii") as file:
+            taken = int(file.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
+
+
+def _attempt_here(scene: Scenario, dt: float, starts: Sequence[Scenario], processor_time: float) -> Attempt:
+    if sys.platform == "linux":
+        import resource
+
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        until = int(used.ru_utime + used.ru_stime + processor_time) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (until, resource.RLIM_INFINITY))
+    try:
+        return attempt_by(_residents[0], scene, dt, starts)
+    except BaseException as error:  # an engine that says sys.exit() or raises an interrupt is none of the user's
+        failed = attempt_of(_residents[0], scene)
+        failed.verdict, failed.reason = "crashed", type(error).__name__
+        return failed

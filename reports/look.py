@@ -89,14 +89,19 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     with chosen.prepare(scene, dt) as simulation:
         assert_built_as_meant(chosen, scene, simulation)
         built = simulation.as_built()
-        rows = [{"what": "engine", "is": chosen.label}, {"what": "staggered", "is": str(simulation.staggered)}]
+        rows = [
+            {"what": "engine", "is": chosen.label, "why": ""},
+            {"what": "staggered", "is": str(simulation.staggered), "why": "velocity lags position by half a step" * simulation.staggered},
+        ]
         if built is not None:
             rows += [
-                {"what": "mass, read back", "is": f"{built.mass!r} kg"},
-                {"what": "inertia, read back", "is": f"{built.inertia.tolist()} kg m²"},
-                {"what": "gravity, read back", "is": f"{built.gravity.tolist()} m/s²"},
+                {"what": "mass", "is": f"{built.mass!r} kg", "why": "read back"},
+                {"what": "inertia", "is": f"{built.inertia.tolist()} kg m²", "why": "read back"},
+                {"what": "gravity", "is": f"{built.gravity.tolist()} m/s²", "why": "read back"},
             ]
-        return rows + [{"what": key, "is": str(value)} for key, value in simulation.settings.items()]
+        reasons = {} if simulation.settings.get("profile") == "default" else chosen.reasons
+        settings = simulation.settings.items()
+        return rows + [{"what": key, "is": str(value), "why": reasons.get(key, "")} for key, value in settings]
 
 
 def doctor_rows(engines: Sequence[str]) -> Rows:

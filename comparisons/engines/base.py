@@ -118,6 +118,8 @@ class Engine:
     """What the engine's state carries: numpy.float64 or numpy.float32."""
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Each option's values, the default first."""
+    reasons: ClassVar[Mapping[str, str]] = {}
+    """Why each setting of a calibrated simulation is what it is, by the names in `Simulation.settings`."""
 
     options: Mapping[str, str] = field(default_factory=dict)
 

@@ -43,10 +43,21 @@ FLOOR_QUATERNION = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: the 
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
+REASONS = {
+    "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; the default's spring rebounds with 0, whatever is asked for",
+    "solimp": "the hardest MuJoCo takes, the same at any depth; left at 0.9 to 0.95, 0.5 becomes 0.466 at 0.25 ms, boxes rest 2 mm deep",
+    "solreffriction": "stops sliding in a step; left to follow solref a gripping corner's slip is reversed: 0.51 of its angular momentum",
+    "condim": "1 without friction, 3 with",
+    "friction": "1e6 where the floor grips; with pyramidal instead of elliptic cones that would be no contact at all",
+}
+"""Effects were measured on a ball dropped from 1 m and boxes on a corner and at rest, restitution 0.5, with the one setting left out."""
+
+
 class MuJoCo(Engine):
     """MuJoCo with exact restitution: one free body, one explicit contact pair with the floor; or as it comes (profile=default)."""
 
     name = "mujoco"
+    reasons = REASONS
     choices: ClassVar = {"integrator": tuple(INTEGRATORS), "profile": PROFILES}
 
     @property

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scenarios import Scenario, Trajectory, Truth
 from scenarios.mechanics import kinetic_energy
+from scenarios.model import TOUCHING
 from scenarios.rotations import rotate
 
 Array = NDArray[np.float64]
@@ -53,9 +54,20 @@ class Comparison:
 
     @cached_property
     def exact(self) -> Trajectory:
-        """The reference; metrics that need one are asked only where there is one."""
+        """The reference; metrics that need one are asked only where there is one.
+
+        Raises:
+            Unresolved: It ends after so few steps that they say nothing.
+        """
         assert self.reference is not None
+        if len(self.reference) < min(SHORTEST_FLIGHT, len(self.motion) - 1):
+            raise Unresolved(f"the truth is known for {len(self.reference) - 1} steps of {self.dt:g} s only")
         return self.reference
+
+    @property
+    def ends_at_an_impact(self) -> bool:
+        """Whether the reference ends before the motion does, because what comes then is not known: something strikes the floor."""
+        return self.reference is not None and len(self.motion) - len(self.reference) > 1
 
     @cached_property
     def compared(self) -> Trajectory:
@@ -80,26 +92,39 @@ class Comparison:
         """
         rows = np.arange(len(self.motion if self.reference is None else self.reference))
         times = self.motion.t[rows]
-        if not self.impacts:
-            contact = self.first_contact if self.reference is None else None
+        if not self.impacts and self.reference is None:
+            contact = self.first_contact
             return [rows if contact is None else rows[: contact[0] + 1]]
         edges = [0.0, *self.impacts, times[-1]]
         inner = []
         for number, (start, end) in enumerate(pairwise(edges)):
             # The last flight may be cut short by the scene's end; its impact is as uncertain as the flight before is long.
             before = 0.0 if number == 0 else 0.25 * max(end - start, start - edges[number - 1])
-            after = 0.0 if number == len(self.impacts) else 0.25 * (end - start)
+            after = 0.0 if number == len(self.impacts) and not self.ends_at_an_impact else 0.25 * (end - start)
             held = rows[(times >= start + before) & (times <= end - after)]
-            if number > 1 and self._out_of_step(held, end - start):
+            if number > 1 and self._is_out_of_step(held, (times >= start) & (times <= end)):
                 break
             if number == 0 or (end - start >= SHORTEST_FLIGHT * self.dt and len(held)):
                 inner.append(held)
         return inner
 
-    def _out_of_step(self, rows: Rows, duration: float) -> bool:
-        """Whether a body's height is off by half the flight's own, so that it may be in another flight by then."""
-        apart = np.abs(self.compared.position[rows, 1] - self.exact.position[rows, 1])
-        return bool(apart.max(initial=0.0) > 0.5 * np.linalg.norm(self.scene.acceleration) * duration**2 / 8.0)
+    @cached_property
+    def out_of_step_from(self) -> float:
+        """When the flight begins in which the body is out of step with the reference [s]; infinite if it is in step to the end."""
+        times = self.motion.t[: len(self.exact)]
+        for start, end in pairwise([*self.impacts, times[-1]]):
+            within = 0.25 * (end - start)
+            held = np.flatnonzero((times >= start + within) & (times <= end - within))
+            if end - start >= SHORTEST_FLIGHT * self.dt and self._is_out_of_step(held, (times >= start) & (times <= end)):
+                return start
+        return np.inf
+
+    def _is_out_of_step(self, rows: Rows, flight: NDArray[np.bool_]) -> bool:
+        """Whether a body's height is off by half of how high the flight is, so that it may be in another flight by then."""
+        heights = self.exact.position[flight, 1]
+        high = float(np.ptp(heights)) if len(heights) else 0.0
+        apart = np.abs(self.compared.position[rows, 1] - self.exact.position[rows, 1]).max(initial=0.0)
+        return high > TOUCHING * self.scene.body.size and bool(apart > 0.5 * high)
 
     @cached_property
     def energy_scale(self) -> float:

@@ -81,7 +81,7 @@ def says_something(dts: Sequence[float]) -> bool:
 
 
 def take_apart(
-    dts: Array, errors: Array, resolution: Array, rounding: Array, claimed: float | None = None, *, signed: bool = True
+    dts: Array, errors: Array, resolution: Array, rounding: Array, claimed: float | None = None, *, signed: bool = True, jumps: bool = False
 ) -> Convergence:
     """The order, limit and cause of one error.
 
@@ -92,6 +92,7 @@ def take_apart(
         rounding: What rounding alone may have brought about.
         claimed: The order that the method is known to have, if it is; else lower powers of the step may hide behind a higher one.
         signed: Whether the error can be negative; one that cannot has no negative limit either, however it looks from three steps.
+        jumps: Whether the error is a count or the like, which no power of the step describes.
     """
     coarsest_first = np.argsort(-dts)
     h, e, noise, floor = (values[coarsest_first] for values in (dts, errors, resolution, rounding))
@@ -101,6 +102,8 @@ def take_apart(
     if not says_something(list(h)):
         told = f"told by {len(h)} of {len(dts)} steps; it takes three, a factor of four apart"
         return Convergence("unresolved", math.nan, (), untold, math.nan, math.nan, told)
+    if jumps and (np.abs(e) > floor).any():
+        return _without_a_power(h, e, noise + floor, untold)
     window = _window(h, e, floor)
     steps = tuple(float(step) for step in h[window])
     left_out = untold + tuple((float(h[n]), "rounding" if n >= window.stop else "too coarse") for n in _outside(window, len(h)))

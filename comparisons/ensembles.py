@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from comparisons.building import sound_record
-from comparisons.comparison import Comparison
+from comparisons.building import assert_starts_as_meant, sound_record
+from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Diverged, Engine
 from comparisons.metrics import last_time_in_motion
 from scenarios import Scenario, Trajectory, members
@@ -27,6 +27,8 @@ MARKS = 41
 AT_ONCE = 32
 """Members whose every step is held in memory at a time."""
 CONFIDENCE = 0.95
+ULPS_OF_MANY = 64
+"""How far a member may start from where it was put: of many some are a little farther off than the 8 ulp that one is allowed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +37,8 @@ class Outcome:
 
     Attributes:
         t: Times [s], shape (MARKS,).
-        energy: Share of its energy at the start that each has left at these times, shape (size, MARKS).
-        rebound: How high each rises after it first touched the floor, over how high it started, shape (size,).
+        energy: What each has of the scene's energy at these times, shape (size, MARKS).
+        rebound: How high each rises after it first touched the floor, over how high it started, shape (size,); 0 if it never did.
         rest_time: When each was last in motion [s], shape (size,).
     """
 
@@ -57,11 +59,13 @@ class EnsembleMetric:
 
 ENSEMBLE_METRICS = {
     "energy_halfway": EnsembleMetric(
-        "1", "Energy left halfway through the scene, over the scene's energy.", lambda o: o.energy[:, MARKS // 2]
+        "1", "Energy halfway through, over the scene's energy (of the fall, or of the start's motion).", lambda o: o.energy[:, MARKS // 2]
     ),
-    "energy_at_end": EnsembleMetric("1", "Energy left at the end, over the scene's energy.", lambda o: o.energy[:, -1]),
+    "energy_at_end": EnsembleMetric(
+        "1", "Energy at the end, over the scene's energy (of the fall, or of the start's motion).", lambda o: o.energy[:, -1]
+    ),
     "rebound_height": EnsembleMetric(
-        "1", "Highest that the centre of mass rises after the first contact, over its start.", lambda o: o.rebound
+        "1", "Highest that the centre of mass is after the first contact, over its start; 0 without one.", lambda o: o.rebound
     ),
     "rest_time": EnsembleMetric("s", "When it was last in motion; the scene's end if it still is.", lambda o: o.rest_time),
 }
@@ -83,15 +87,24 @@ def outcome_of(engine: Engine, scene: Scenario, dt: float) -> Outcome:
     for first in range(0, len(starts), AT_ONCE):
         some = starts[first : first + AT_ONCE]
         for member, states in zip(some, engine.record_ensemble(some, dt, steps), strict=True):
+            assert_starts_as_meant(engine, member, states[0], ULPS_OF_MANY)
             motion = Trajectory.from_states(t, sound_record(states, steps + 1), lag)
             if motion.first_bad_row is not None:
                 raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
             case = Comparison(member, motion)
             contact = case.first_contact
-            energies.append(energy(member, motion[marks]) / case.energy_scale)
-            rebounds.append(np.nan if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1])
+            energies.append(energy(member, motion[marks]) / _energy_scale(case))
+            rebounds.append(0.0 if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1])
             rest_times.append(last_time_in_motion(member, motion))
     return Outcome(t[marks], np.array(energies), np.array(rebounds), np.array(rest_times))
+
+
+def _energy_scale(case: Comparison) -> float:
+    """The scene's energy [J]; where nothing moves and nothing pulls any will do, for there is none to measure."""
+    try:
+        return case.energy_scale
+    except Unresolved:
+        return 1.0
 
 
 def ensemble_rows(scene: Scenario, label: str, dt: float, outcome: Outcome) -> list[Row]:

@@ -143,6 +143,11 @@ def _comes_to_rest(scene: Scenario, truth: Truth | None) -> bool:
     return not truth([0.9 * scene.duration]).states[0, 7:13].any()
 
 
+def _goes_on(scene: Scenario, truth: Truth | None) -> bool:
+    """Impacts that follow from each other by a law that does not magnify errors, as those of a tumble do."""
+    return truth is not None and truth.name in ("bounce-ladder", "rocking") and len(truth.events) > 1
+
+
 def _has_apex(scene: Scenario, truth: Truth | None) -> bool:
     return _has_impact(scene, truth) and bool(scene.acceleration[1] < 0.0)
 
@@ -273,6 +278,12 @@ def landing_error(case: Comparison) -> float:
     axis = case.exact.angular_velocity[rows[0]]
     found, exact = (motion.angular_velocity[rows] @ axis for motion in (case.compared, case.exact))
     return float(found[1] / found[0] - exact[1] / exact[0])
+
+
+@_metric("1/s", "truth", "a truth that bounces or rocks more than once", _goes_on)
+def out_of_step(case: Comparison) -> float:
+    """One over the time at which the body gets out of step with the truth, by half the height of a flight; 0 if it never does."""
+    return 1.0 / case.out_of_step_from
 
 
 @_metric("1", "truth", "a truth with spin", _spins, agreement=True)

@@ -52,7 +52,7 @@ def bounce_error(
         gravity_first: Whether gravity acts in a step before the impact does, as in the note.
         restitution_lost: s, the share of a step's gravity that the rebound is slower by.
     """
-    if truth is None or truth.name != "bounce-ladder" or not scene.starts_above_floor:
+    if truth is None or truth.name != "bounce-ladder" or not truth.events or not scene.starts_above_floor:
         return None
     assert scene.floor is not None
     u, e, g = -float(truth.events[0].before[8]), scene.floor.restitution, -float(scene.acceleration[1])

@@ -70,7 +70,8 @@ def run(
                         trajectories[scene.name, contestant.label, dt] = attempt.motion
                         settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
                     measured[contestant.label] += _truth_rows(Phase(scene, truth), dt, attempt, phases)
-                    if contestant.engine is not None and attempt.motion is not None:
+                    # What is predicted of a bounce is a mean over start phases.
+                    if contestant.engine is not None and attempt.motion is not None and (scene.floor is None or len(phases) > 1):
                         rows += prediction_rows(contestant.engine, scene, truth, dt)
                     attempts.append(attempt)
                     if attempt.outcome is not None:

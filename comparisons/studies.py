@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 ARTEFACTS = frozenset({"energy_error_raw"})
 """Metrics that show how a state is sampled rather than how wrong it is."""
+JUMPING = frozenset({"out_of_step"})
+"""Metrics that go from flight to flight."""
 NEGLIGIBLE = 3e-8
 """Errors as small as this, of the metric's own scale, are put down to rounding and to the residues of iterative solvers."""
 ULPS_A_STEP = 16.0
@@ -44,7 +46,9 @@ def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row
     for metric in _metrics(rows):
         measured = [row for row in rows if row.get("metric") == metric]
         dts, errors, resolutions, rounding = _series(scene, engine, metric, measured)
-        found = take_apart(dts, errors, resolutions, rounding, engine.order_in(scene), signed=METRICS[metric].signed)
+        found = take_apart(
+            dts, errors, resolutions, rounding, engine.order_in(scene), signed=METRICS[metric].signed, jumps=metric in JUMPING
+        )
         for row in measured:
             row["cause"] = row["cause"] or found.cause
         shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}
@@ -85,13 +89,21 @@ def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row
     errors, resolutions = (
         np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both]) for both in zip(*averages, strict=True)
     )
-    scale = scene.body.size + float(np.linalg.norm(scene.start.position)) if METRICS[metric].unit == "m" else 1.0
+    scale = _scale(scene, METRICS[metric].unit)
     rounding = scale * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(engine.precision).eps) * steps)
     if METRICS[metric].unit == "rad":
         errors[np.abs(errors) > LOST] = math.nan
     if metric == "position_error" and scene.starts_above_floor:
         errors[np.abs(errors) > OUT_OF_STEP * scene.clearance] = math.nan
     return dts, errors, resolutions, rounding
+
+
+def _scale(scene: Scenario, unit: str) -> float:
+    """What rounding is relative to: the scene's own lengths, speeds and duration; 1 for ratios and angles."""
+    length = scene.body.size + float(np.linalg.norm(scene.start.position))
+    if unit == "m/s":
+        return math.sqrt(float(np.linalg.norm(scene.acceleration)) * length) + float(np.linalg.norm(scene.start.velocity))
+    return {"m": length, "1/s": 1.0 / scene.duration}.get(unit, 1.0)
 
 
 def _order_row(scene: Scenario, engine: Engine, shared: Row, found: Convergence) -> list[Row]:

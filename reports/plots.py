@@ -139,7 +139,7 @@ def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> 
             axes.fill_between(outcome.t, low, high, color=colours[engine], alpha=0.15, linewidth=0.0)
             axes.plot(outcome.t, middle, color=colours[engine], linewidth=_thinner(3.8, 1.2, number, results), label=engine)
     axes.set_xlabel("time [s]")
-    axes.set_ylabel("energy left")
+    axes.set_ylabel("energy, over the scene's")
 
 
 def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:

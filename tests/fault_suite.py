@@ -92,6 +92,11 @@ def with_floor(scene, **values):
     return scene if scene.floor is None else scene.model_copy(update={"floor": scene.floor.model_copy(update=values)})
 
 
+def with_coefficient(factor):
+    rough = lambda scene: scene.floor is not None and not isinstance(scene.floor.friction, str)  # noqa: E731
+    return lambda scene: with_floor(scene, friction=factor * scene.floor.friction) if rough(scene) else scene
+
+
 def with_restitution(function):
     return lambda scene: scene if scene.floor is None else with_floor(scene, restitution=min(1.0, function(scene.floor.restitution)))
 
@@ -265,6 +270,15 @@ def not_a_number(rows, t):
     return rows
 
 
+def dead_from_the_second(rows, times, impacts, truth):
+    """Restitution is there at the first impact, and lost."""
+    if len(truth.events) > 1:
+        late = impacts > 1
+        rows[late] = truth.events[1].after
+        rows[late, 7:13] = 0.0
+    return rows
+
+
 def frozen(rows, times, dt, truth):
     return np.tile(rows[0], (len(rows), 1))
 
@@ -338,6 +352,7 @@ FAULTS = [
     fault("restitution ignored", change=with_restitution(lambda e: 0.0)),
     fault("restitution that vanishes with the step", change=vanishing_restitution, vanishing=True),
     fault("friction left out", change=lambda scene: with_floor(scene, friction="none")),
+    fault("Coulomb friction 1 % too strong", change=with_coefficient(1.01)),
     fault("friction where there is none", change=lambda scene: with_floor(scene, friction="infinite")),
     fault("mass 1 % too large, inertia as it should be", change=with_body(mass=1.01)),
     fault("inertia 1 % too large", change=with_body(moments=lambda m: 1.01 * m)),
@@ -367,6 +382,7 @@ FAULTS = [
     fault("1 mm/s sideways from a frictionless floor", distort=after_impacts(pushed(1e-3))),
     fault("lifted by 1 mm at each impact", distort=after_impacts(lifted)),
     fault("spin lost at impact", distort=after_impacts(without_spin)),
+    fault("lies dead from the second impact on", distort=after_impacts(dead_from_the_second)),
     fault("falls through the floor", distort=after_impacts(through_the_floor)),
     fault("position drifts by 1e-6 m a step", distort=drifting),
     fault("noise of 1e-5 m", distort=noisy),

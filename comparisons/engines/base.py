@@ -92,6 +92,7 @@ class Simulation:
 PROFILES = ("calibrated", "default")
 """The scene as meant, by whatever settings that takes; and what a user gets who leaves all settings but the obvious."""
 
+LATE_IMPACTS = "impacts noticed late"
 SEMI_IMPLICIT_EULER = "semi-implicit Euler"
 EXPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term explicit"
 IMPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term implicit"

@@ -57,10 +57,12 @@ class Document(Engine):
         return rotation if scene.gravity is None else min(rotation, 1.0)
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """Of the rotation, where it matters; the translation is the note's with all of them."""
+        """Of the rotation, where it matters, and of the contacts; the translation is the note's with all of them."""
         known = {"gyroscopic": EXPLICIT_GYROSCOPIC, "implicit-gyroscopic": IMPLICIT_GYROSCOPIC}
         rotation = self.option("rotation")
-        return known.get(rotation, rotation) if may_tumble(scene) else SEMI_IMPLICIT_EULER
+        flight = known.get(rotation, rotation) if may_tumble(scene) else SEMI_IMPLICIT_EULER
+        contacts = f"gravity before the impact, law {self.option('law')}, contact {self.option('contact')}"
+        return flight if scene.floor is None else f"{flight}, {contacts}"
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """The note's own flight, or an exact rotation about a fixed axis; a flat bounce, in which gravity acts before the impact."""

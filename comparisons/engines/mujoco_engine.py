@@ -15,6 +15,7 @@ import numpy as np
 from comparisons.engines.base import (
     EXPLICIT_GYROSCOPIC,
     IMPLICIT_GYROSCOPIC,
+    LATE_IMPACTS,
     PROFILES,
     SEMI_IMPLICIT_EULER,
     Array,
@@ -66,13 +67,15 @@ class MuJoCo(Engine):
         return 4.0 if self.option("integrator") == "rk4" else 1.0
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """Of the integrator; they differ in the gyroscopic term."""
+        """Of the integrator; they differ in the gyroscopic term. The default's contacts are like nobody else's."""
         integrator = self.option("integrator")
         if integrator == "rk4":
             return "classical Runge-Kutta"
-        if not may_tumble(scene):
-            return SEMI_IMPLICIT_EULER
-        return EXPLICIT_GYROSCOPIC if integrator == "euler" else IMPLICIT_GYROSCOPIC
+        gyroscopic = EXPLICIT_GYROSCOPIC if integrator == "euler" else IMPLICIT_GYROSCOPIC
+        flight = gyroscopic if may_tumble(scene) else SEMI_IMPLICIT_EULER
+        if scene.floor is None:
+            return flight
+        return f"{flight}, {LATE_IMPACTS}" if self.option("profile") == "calibrated" else None
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """Semi-implicit Euler about a fixed axis; a flat bounce that is noticed late, and loses (1 - d) g dt to the impedance."""

@@ -16,6 +16,7 @@ import numpy as np
 from comparisons.engines.base import (
     EXPLICIT_GYROSCOPIC,
     IMPLICIT_GYROSCOPIC,
+    LATE_IMPACTS,
     PROFILES,
     SEMI_IMPLICIT_EULER,
     Array,
@@ -79,10 +80,12 @@ class PyBullet(Engine):
         return self.is_default or self.option("coordinates") == "multibody"
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """Maximal coordinates solve the gyroscopic term implicitly, by one Newton step; multibodies have it explicit."""
-        if not may_tumble(scene):
-            return SEMI_IMPLICIT_EULER
-        return EXPLICIT_GYROSCOPIC if self.is_multibody else IMPLICIT_GYROSCOPIC
+        """Maximal coordinates solve the gyroscopic term implicitly, by one Newton step; multibodies do not, nor share contacts."""
+        gyroscopic = EXPLICIT_GYROSCOPIC if self.is_multibody else IMPLICIT_GYROSCOPIC
+        flight = gyroscopic if may_tumble(scene) else SEMI_IMPLICIT_EULER
+        if scene.floor is None:
+            return flight
+        return None if self.is_multibody else f"{flight}, {LATE_IMPACTS}"
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """Semi-implicit Euler about a fixed axis; a flat bounce, noticed late in maximal coordinates, after gravity in a multibody."""

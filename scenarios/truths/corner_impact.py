@@ -5,12 +5,13 @@ law asked for.
 
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
 Valid for: one corner alone touches, or the two of an edge that meet the floor at once and with one velocity, before and after; a ball with
-any spin; a Coulomb coefficient for a ball only, or by the law asked for; no damping; from the start to the tenth impact at most, to an
-impact that is not of this kind, to one after which the body stays on the floor, or to where a disturbance of 1e-10 rad/s at the start has
-grown to 1e-6, whichever comes first.
+any spin; a Coulomb coefficient for a ball of equal moments only, or by the law asked for; no damping; from the start to the tenth impact
+at most, to an impact that is not of this kind, to one after which the body stays on the floor, or to where a disturbance of 1e-10 rad/s at
+the start has grown to 1e-6, whichever comes first.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -33,6 +34,7 @@ UP = np.array([0.0, 1.0, 0.0])
 CHUNK = 4000  # samples of the height at a time, in search of an impact
 FINEST_ANGLE = 0.02  # rad between two samples: a corner moves by less than 1e-4 of the body's size off a straight line
 MOST_CHUNKS = 1000
+HALVINGS = 60
 ONE_CORNER = 1e-9  # of the body's size: how far above the corner that touches another one touches too
 MOST_IMPACTS = 10
 SHORTEST_FLIGHT = 1e-7  # s; impacts that come faster pile up, as at Zeno's time
@@ -63,7 +65,7 @@ def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
     floor = scene.floor
     if floor is None or scene.damping is not None:
         return None
-    if law is None and not isinstance(floor.friction, str) and not isinstance(scene.body, Sphere):
+    if law is None and not isinstance(floor.friction, str) and not _slides_one_way(scene):
         return None
     law = law or law_of(floor)
     try:
@@ -78,10 +80,15 @@ def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
         return Truth("flight", "free flight that ends above the floor", course.states, horizon=course.horizon)
     meant = WORDS[law] if law != "note" else "eq 15" if floor.friction == "none" else "sticking impulse, eq 17"
     points = len(_touching(scene, course.events[0].before))
-    where = "ball" if isinstance(scene.body, Sphere) else "corner" if points == 1 else "edge"
+    where = "ball" if isinstance(scene.body, Sphere) else {1: "corner", 2: "edge"}.get(points, "face")
     count = "one" if len(course.events) == 1 else str(len(course.events))
     statement = f"free rotor and parabola, {count} {where} impact{'s' if len(course.events) > 1 else ''} ({meant})"
     return Truth(f"{where}-impact", statement, course.states, course.events, course.horizon)
+
+
+def _slides_one_way(scene: Scenario) -> bool:
+    """Whether friction cannot turn the sliding aside during an impact: a ball of three equal moments."""
+    return isinstance(scene.body, Sphere) and float(np.ptp(np.linalg.eigvalsh(scene.body.inertia_tensor))) == 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +117,7 @@ def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
     flights, now, state = [flight_states(start, inertia, g)], 0.0, start
     events: list[Impact] = []
     while True:
-        wait = _next_impact(scene, state, flights[-1], scene.duration - now)
+        wait = _next_impact(scene, state, flights[-1], scene.duration - now, leaves=bool(events))
         if wait is None:
             return _Course(tuple(flights), tuple(events), scene.duration)
         if events and (len(events) == MOST_IMPACTS or wait < SHORTEST_FLIGHT):
@@ -124,7 +131,7 @@ def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
         events.append(Impact(now, before, after))
         flights.append(flight_states(after, inertia, g))
         state = after
-        if not _leaves(touching[0], after):
+        if not _leave(touching, after):
             return _Course(tuple(flights), tuple(events), now)
 
 
@@ -139,8 +146,11 @@ def _trusted(course: _Course, disturbed: _Course) -> _Course:
     return course
 
 
-def _next_impact(scene: Scenario, start: Array, states: States, duration: float) -> float | None:
-    """When the lowest point next comes down through the floor, from a state at or above it; None if not within `duration`."""
+def _next_impact(scene: Scenario, start: Array, states: States, duration: float, leaves: bool) -> float | None:
+    """When the lowest point next comes down through the floor, from a state at or above it; None if not within `duration`.
+
+    `leaves` says that it just leaves the floor, after an impact.
+    """
 
     def height(t: Array) -> Array:
         return lowest_height(scene, Trajectory.from_states(t, states(t)))
@@ -149,9 +159,9 @@ def _next_impact(scene: Scenario, start: Array, states: States, duration: float)
         return float(height(np.array([t]))[0])
 
     on_floor = TOUCHING * scene.body.size
-    if at(0.0) <= on_floor and _descends(scene, start):
+    if not leaves and at(0.0) <= on_floor and _descends(scene, start):
         return 0.0
-    left = at(0.0) > on_floor  # a body that stands on the floor must leave it before it can come down again
+    left = leaves or at(0.0) > on_floor  # a body that stands on the floor must leave it before it can come down again
     step = min(duration / CHUNK, FINEST_ANGLE / max(_fastest_spin(scene, start), 1e-300))
     chunks = 0
     for begin, end in _within_reach(scene, start, duration):
@@ -160,6 +170,10 @@ def _next_impact(scene: Scenario, start: Array, states: States, duration: float)
         while now < end:
             t = np.minimum(now + np.arange(CHUNK + 2) * step, end)
             h = height(t)
+            if leaves and now == 0.0:
+                if h[1] < 0.0:
+                    return _within_first_sample(at, float(t[1]))
+                h[0] = 0.5 * h[1]  # above the floor, whatever rounding says of the moment it leaves
             for n in range(len(t) - 1):
                 left = left or h[n] > on_floor
                 dips = n > 0 and h[n] < min(h[n - 1], h[n + 1]) and h[n] < FINEST_ANGLE**2 * scene.body.size
@@ -175,6 +189,16 @@ def _next_impact(scene: Scenario, start: Array, states: States, duration: float)
     return None
 
 
+def _within_first_sample(at: Callable[[float], float], end: float) -> float:
+    """When a body that leaves the floor is back, sooner than the first sample of its height."""
+    above = end
+    for _ in range(HALVINGS):
+        below, above = above, 0.5 * above
+        if at(above) > 0.0:
+            return float(brentq(at, above, below, xtol=1e-15, rtol=8.9e-16))
+    return 0.0
+
+
 def _within_reach(scene: Scenario, start: Array, duration: float) -> list[tuple[float, float]]:
     """The times [s] at which the centre is so low that a corner may touch the floor: x_y(t) below the body's size."""
     reach = 1.001 * scene.body.size  # a ball's own reach ends where it touches, which rounding may miss
@@ -185,11 +209,9 @@ def _within_reach(scene: Scenario, start: Array, duration: float) -> list[tuple[
 
 
 def _descends(scene: Scenario, state: Array) -> bool:
-    lowest = _touching(scene, state)[0]
-    speed = state[8] + np.cross(state[10:13], lowest)[1]
-    if speed == 0.0:
-        return bool(scene.acceleration[1] <= 0.0)
-    return bool(speed < 1e-12 * np.linalg.norm(state[7:10]))
+    """Whether any of the points on the floor goes down, or stays, pulled down."""
+    slowest = float(_rising(_touching(scene, state), state).min())
+    return slowest < -_no_speed(scene, state) or (abs(slowest) <= _no_speed(scene, state) and scene.acceleration[1] <= 0.0)
 
 
 def _fastest_spin(scene: Scenario, state: Array) -> float:
@@ -206,9 +228,19 @@ def _touching(scene: Scenario, state: Array) -> Array:
     return lowest - scene.body.rounding * UP
 
 
-def _leaves(point: Array, state: Array) -> bool:
-    velocity = state[7:10] + np.cross(state[10:13], point)
-    return bool(velocity[1] > 1e-12 * np.linalg.norm(state[7:10]))
+def _leave(points: Array, state: Array) -> bool:
+    """Whether all of these points go up."""
+    return bool(_rising(points, state).min() > 1e-12 * np.linalg.norm(state[7:10]))
+
+
+def _rising(points: Array, state: Array) -> Array:
+    """Upward velocity [m/s] of points of the body, shape (n,)."""
+    upward: Array = state[8] + np.cross(state[10:13], points)[:, 1]
+    return upward
+
+
+def _no_speed(scene: Scenario, state: Array) -> float:
+    return float(1e-12 * (np.linalg.norm(state[7:10]) + scene.body.size * np.linalg.norm(state[10:13])))
 
 
 def _move_alike(points: Array, state: Array) -> bool:

@@ -2,7 +2,7 @@
 
     v(t) = (v₀ - f g t) d,   x(t) = x₀ + (v₀ t - f g t²/2) d   up to the stop at v₀/(f g), after v₀²/(2 f g)
 
-It stays flat as long as the friction's lever about its centre, f times its height, is shorter than its base reaches forward.
+It stays flat as long as the floor's push can act f times the centre's height ahead of it: within the base.
 
 Source: C. A. de Coulomb, Théorie des machines simples (1785).
 Valid for: a box or other body on at least three vertices, lying on the floor at the start, without spin, moving horizontally; a Coulomb
@@ -11,6 +11,7 @@ coefficient above 0; gravity straight down, no damping. Restitution does not mat
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import rotate
@@ -44,10 +45,14 @@ def coulomb_slide(scene: Scenario) -> Truth | None:
 
 
 def _slides_flat(scene: Scenario, direction: Array, friction: float) -> bool:
+    """Whether the floor can push where it must, ahead of the centre by friction times its height: within what the base spans."""
     offsets = rotate(np.array(scene.start.orientation), scene.body.vertices)
     base = offsets[offsets[:, 1] <= offsets[:, 1].min() + TOUCHING * scene.body.size]
-    on_floor = abs(scene.clearance) <= TOUCHING * scene.body.size
-    across = np.cross(direction, np.array([0.0, 1.0, 0.0]))
-    # As much base on either side, so that friction and weight have no moment about the vertical and the direction of motion.
-    centred = np.abs((base @ across).sum()) <= TOUCHING * scene.body.size
-    return bool(len(base) >= 3 and on_floor and centred and friction * -offsets[:, 1].min() < (base @ direction).max())
+    if abs(scene.clearance) > TOUCHING * scene.body.size or len(base) < 3:
+        return False
+    try:
+        hull = ConvexHull(base[:, [0, 2]])
+    except QhullError:  # all on one line
+        return False
+    ahead = -friction * offsets[:, 1].min() * direction[[0, 2]]
+    return bool((hull.equations[:, :2] @ ahead + hull.equations[:, 2]).max() < 0.0)

@@ -12,7 +12,7 @@ An edge or a face that strikes with one velocity is one point at its middle.
 
 Source: H. Wang, Rigid Body Dynamics, eq 15 and 17; E. T. Whittaker, Analytical Dynamics, section 95; S. D. Poisson, Traité de mécanique
 (1833); A. Chatterjee & A. Ruina, J. Applied Mechanics 65 (1998); C. A. de Coulomb (1785), E. J. Routh, Elementary Rigid Dynamics (1905).
-Valid for: a point that approaches. `coulomb` for one that slides the same way throughout the impact: a ball always does.
+Valid for: a point that approaches. `coulomb` for one that slides the same way throughout the impact: a ball of equal moments does.
 """
 
 from typing import Literal, get_args

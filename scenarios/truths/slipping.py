@@ -42,7 +42,10 @@ def slipping(scene: Scenario) -> Truth | None:
     if floor is None or floor.friction != "none" or scene.damping is not None:
         return None
     stand = on_one_edge(scene)
-    if stand is None or abs(scene.initial_state[8] + stand.speed * stand.radius * math.sin(stand.angle)) > TOUCHING * abs(stand.speed):
+    if stand is None:
+        return None
+    falling = stand.speed * stand.radius * math.sin(stand.angle)
+    if abs(scene.initial_state[8] + falling) > TOUCHING * abs(falling):
         return None
     at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.flat) ** 2
     level = at_start - 0.25 * (stand.share + math.sin(stand.angle) ** 2) * stand.radius / stand.gravity * stand.speed**2

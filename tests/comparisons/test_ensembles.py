@@ -98,3 +98,27 @@ def test_a_member_that_is_not_finite_costs_its_row():
     assert row["verdict"] == "diverged"
     assert "a start of the ensemble is not finite at t = 0.28 s" in row["reason"]
     assert len(found.frame[(found.frame["engine"] == "document") & (found.frame["kind"] == "ensemble")]) == 4
+
+
+def test_an_ensemble_that_touches_nothing():
+    """No start comes to the floor in time: nothing rebounds, and nothing differs by more than chance."""
+    short = FEW.model_copy(update={"duration": 0.2})
+    found = comparisons.run([short], ["document", "pybullet"], [4e-3]).frame
+    rebounds = found[(found["metric"] == "rebound_height")]
+    assert (rebounds["value"] == 0.0).all()
+    assert not rebounds["reason"].str.contains("differ by more").any()
+
+
+def test_members_must_start_where_they_were_put():
+    """An engine that gives one motion for all of them has not run them."""
+
+    class Copies(made.Exact):
+        name = "copies"
+
+        def record_ensemble(self, drawn, dt, steps):
+            one = engine("document").record_ensemble(drawn[:1], dt, steps)
+            return np.repeat(one, len(drawn), axis=0)
+
+    found = comparisons.run([FEW], [Copies()], [4e-3]).frame
+    assert list(found["verdict"]) == ["crashed"]
+    assert "at the start" in found["reason"].iloc[0]

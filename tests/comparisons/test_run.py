@@ -386,3 +386,40 @@ def test_agreement_of_one_discretisation_is_no_evidence(scene, first, second, sa
         apart = pairs[pairs["metric"] == "energy_error"]["value"].abs().max()
         wrong = found.measurements[found.measurements["metric"] == "energy_error"]["value"].abs().min()
         assert apart < 0.05 * wrong
+
+
+def test_scenes_at_the_edges():
+    """A fall that ends above the floor; a start with the quaternion's other sign; a truth that ends within a few steps."""
+    short = BALL.model_copy(update={"duration": 0.3, "expect": ()})
+    turned = BALL.model_copy(update={"name": "turned", "expect": ()}).starting_at(
+        np.array([0, 1.1, 0, 0.1, 0.2, 0.3, -np.sqrt(0.86), *[0] * 6])
+    )
+    found = comparisons.run([short, turned], ["document", "mujoco", "pybullet", "pybullet[coordinates=multibody]"]).frame
+    assert set(found["verdict"]) <= {"passed", "measured"}
+    angle, half = 1e-5, np.array([0.2, 0.2, 0.2])
+    corner = np.array([0.2 * (np.cos(angle) - np.sin(angle)), 0.2 * (np.cos(angle) + np.sin(angle))])
+    content = BALL.model_dump(exclude_none=True, exclude={"expect", "origin"}) | {
+        "name": "nearly-flat",
+        "body": {"shape": "box", "half_extents": half.tolist(), "mass": 1.0},
+        "start": {"position": [0.0, float(corner[1]), 0.0], "orientation": [0.0, 0.0, float(np.sin(angle / 2)), float(np.cos(angle / 2))]},
+        "floor": {"restitution": 0.5, "friction": "infinite"},
+    }
+    scene = scenarios.load(content)
+    assert scenarios.truth_for(scene).horizon < 2e-3
+    found = comparisons.run([scene], [made.Frozen()]).frame
+    judged = found[found["kind"] == "truth"]
+    assert (judged["cause"] == "unresolved").all()
+    assert judged["reason"].str.contains("the truth is known for [01] steps of").all()
+
+
+def test_sound_engines_are_not_accused_of_what_is_out_of_step():
+    """A block that rocks by little, and a slipping box that lands: no model error of MuJoCo or PyBullet."""
+    import sys
+
+    sys.path.insert(0, str(Path(__file__).parents[1] / "scenarios"))
+    from test_standing_on_an_edge import standing
+
+    rocks = standing(lean=0.9 * math.atan(0.4), duration=2.0)
+    slips = standing(half=(0.2, 0.2), lean=0.5 * math.pi / 4, friction="none", duration=1.0).model_copy(update={"name": "slips"})
+    found = comparisons.run([rocks, slips], ["mujoco", "pybullet"])
+    assert found.lasting_errors("model").empty, found.lasting_errors("model").to_string()

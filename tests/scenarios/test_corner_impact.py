@@ -284,3 +284,53 @@ def test_a_body_that_stays_on_the_floor_has_no_impact_truth():
     assert dropped.horizon == dropped.events[0].time
     content["start"] |= {"position": [0.0, scene.start.position[1] - scene.clearance, 0.0]}
     assert truth_for(load(content)) is None
+
+
+@pytest.mark.parametrize("restitution", [0.1, 0.3, 0.5, 0.9])
+@pytest.mark.parametrize("duration", [1.5, 10.0])
+def test_no_flight_is_too_short_to_be_seen(restitution, duration):
+    """A ball that grips and bounces ever lower: the truth never goes through the floor, and its impacts are the ladder's, to 1e-11."""
+    scene = load(
+        {
+            "name": "rolling",
+            "duration": duration,
+            "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0},
+            "start": {"position": [0.0, 0.6, 0.0], "velocity": [1.0, 0.0, 0.0], "angular_velocity": [0.0, 0.0, 1.0]},
+            "gravity": {"acceleration": [0.0, -9.8, 0.0]},
+            "floor": {"restitution": restitution, "friction": "infinite"},
+        }
+    )
+    truth = truth_for(scene)
+    motion = truth(np.linspace(0.0, min(duration, truth.horizon), 20_000))
+    assert lowest_height(scene, motion).min() >= -1e-12
+    u = np.sqrt(2 * 9.8 * 0.5)
+    ladder = u / 9.8 + np.concatenate([[0.0], np.cumsum(2 * u / 9.8 * restitution ** np.arange(1, 10))])
+    times = [event.time for event in truth.events]
+    assert len(times) == min(10, 1 + np.sum(2 * u / 9.8 * restitution ** np.arange(1, 10) >= 1e-7), np.sum(ladder <= duration))
+    np.testing.assert_allclose(times, ladder[: len(times)], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize(("spin", "rise"), [((0, 0, -1.0), 0.0), ((0, 0, 1.0), 0.0), ((0, 0, -1.0), 0.05), ((1.0, 0, 0), 0.0)])
+def test_a_flat_box_that_tips_itself_into_the_floor_does_not_fly(spin, rise):
+    """Some of its corners go up, others down: that is no flight through the floor."""
+    scene = load(
+        {
+            "name": "flat",
+            "duration": 1.0,
+            "body": {"shape": "box", "half_extents": [0.1, 0.1, 0.1], "mass": 1.0},
+            "start": {"position": [0.0, 0.1, 0.0], "velocity": [0.0, rise, 0.0], "angular_velocity": list(spin)},
+            "gravity": {"acceleration": [0.0, -9.8, 0.0]},
+            "floor": {"restitution": 0.5, "friction": "none"},
+        }
+    )
+    truth = truth_for(scene)
+    if truth is not None:
+        motion = truth(np.linspace(0.0, min(1.0, truth.horizon), 1000))
+        assert lowest_height(scene, motion).min() >= -1e-9
+
+
+def test_coulomb_friction_of_a_ball_that_is_not_round_inside():
+    """With unequal moments the sliding turns aside within the impact: no closed form."""
+    content = ball_with_spin(0.1, [0.001, 0.004, 0.004]).model_dump(exclude_none=True)
+    assert truth_for(load(content)) is None
+    assert truth_for(load(content | {"body": content["body"] | {"inertia": "solid"}})).name == "ball-impact"

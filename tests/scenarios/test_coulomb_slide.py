@@ -41,6 +41,7 @@ def test_it_stops_where_its_energy_is_spent(velocity):
     [
         sliding(friction=3.1),  # tips over its leading edge: f times its height is more than its reach
         sliding(friction="infinite"),
+        sliding(friction=0.6, velocity=(3.0, 0.0, 3.0), half=(0.1, 0.5, 1.0), height=0.5),  # over its near edge, askew
         sliding(spin=(0.0, 1.0, 0.0)),
         sliding(height=0.2),
         sliding(velocity=(0.0, 0.0, 0.0)),
@@ -58,3 +59,12 @@ def test_it_is_valid_up_to_where_the_box_would_tip():
     """F h = b is the limit."""
     assert truth_for(sliding(friction=2.99)).name == "coulomb-slide"
     assert truth_for(sliding(friction=3.01)) is None
+
+
+def test_a_body_whose_base_does_not_lie_under_it_tips():
+    """Three feet ahead of the centre of mass: it falls over backwards, whatever friction does."""
+    body = {"shape": "vertices", "points": [[0.5, -0.2, 0.3], [0.5, -0.2, -0.3], [0.2, -0.2, 0.0], [-0.9, 0.3, 0.0]]}
+    body |= {"masses": [0.1, 0.1, 0.1, 1.0]}
+    feet = -load({"name": "feet", "duration": 1.0, "body": body}).body.vertices[:, 1].min()
+    truth = truth_for(sliding(body=body, height=float(feet)))
+    assert truth is None or truth.name != "coulomb-slide"

@@ -13,7 +13,14 @@ NUMBERS = {engine.title: number for number, engine in enumerate([*fault_suite.FA
 
 @pytest.mark.parametrize(
     "title",
-    ["restitution 0.3 % too low", "99 % of the gyroscopic term", "0.1 % of energy gained at each bounce", "inertia 1 % too large"],
+    [
+        "restitution 0.3 % too low",
+        "99 % of the gyroscopic term",
+        "0.1 % of energy gained at each bounce",
+        "inertia 1 % too large",
+        "Coulomb friction 1 % too strong",
+        "lies dead from the second impact on",
+    ],
 )
 def test_a_subtle_fault_is_caught(title):
     """By the core catalogue at its default steps."""

@@ -375,6 +375,9 @@ def test_unsolved_contacts_are_told():
         ("spin-asymmetric", "mujoco[integrator=rk4]", "document[rotation=rk4]", False),
         ("fall-spin", "mujoco", "pybullet", True),
         ("drop-box-corner", "mujoco", "pybullet", False),
+        ("drop-ball", "mujoco", "pybullet", True),
+        ("drop-ball", "document", "pybullet", False),
+        ("drop-ball", "mujoco[profile=default]", "pybullet", False),
     ],
 )
 def test_agreement_of_one_discretisation_is_no_evidence(scene, first, second, same):

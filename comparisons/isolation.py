@@ -9,18 +9,21 @@ import faulthandler
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as OutOfTime
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
 from types import TracebackType
-from typing import Self
+from typing import Any, Self, TypeVar, TypeVarTuple
 
 from pebble import ProcessExpired, ProcessPool
 
 from comparisons.phases import Phase
-from comparisons.simulating import Attempt, Contestant, attempt_by, attempt_of
+from comparisons.simulating import Attempt, Contestant, attempt_by
 from scenarios import Scenario
+
+Given = TypeVarTuple("Given")
+Result = TypeVar("Result")
 
 BACKSTOP = 10.0
 """Wall time over processor time: an engine that sleeps for ever uses no processor."""
@@ -39,6 +42,14 @@ class Limits:
     memory: int = 8 * 2**30
 
 
+class Failed(Exception):
+    """Work that did not come to an end; its verdict, and why."""
+
+    def __init__(self, verdict: str, reason: str) -> None:
+        super().__init__(verdict, reason)
+        self.verdict, self.reason = verdict, reason
+
+
 class Cells:
     """One process for each engine; a context manager."""
 
@@ -50,21 +61,29 @@ class Cells:
         """Run a scene through an engine in its process; whatever goes wrong is told in the attempt."""
         if contestant.engine is None:
             return attempt_by(contestant, scene, dt, [])
+        try:
+            return self.call(contestant, attempt_by, scene, dt, [phase.scene for phase in phases])
+        except Failed as failure:
+            return Attempt(contestant.label, verdict=failure.verdict, reason=failure.reason)
+
+    def call(self, contestant: Contestant, work: Callable[[Contestant, *Given], Result], *given: *Given) -> Result:
+        """Do some work in an engine's process; `work` gets the contestant first.
+
+        Raises:
+            Failed: It ended the process, ran out of time or memory, or raised.
+        """
         if contestant.label not in self._pools:
             self._pools[contestant.label] = self._pool(contestant)
-        starts = [phase.scene for phase in phases]
         task = self._pools[contestant.label].schedule(
-            _attempt_here, args=[scene, dt, starts, self._limits.processor_time], timeout=BACKSTOP * self._limits.processor_time
+            _work_here, args=[work, given, self._limits.processor_time], timeout=BACKSTOP * self._limits.processor_time
         )
-        failed = attempt_of(contestant, scene)
         try:
-            attempt: Attempt = task.result()
-            return attempt
+            result: Result = task.result()
         except OutOfTime:
-            failed.verdict, failed.reason = "timed_out", f"not done after {BACKSTOP * self._limits.processor_time:g} s by the clock"
+            raise Failed("timed_out", f"not done after {BACKSTOP * self._limits.processor_time:g} s by the clock") from None
         except ProcessExpired as end:
-            failed.verdict, failed.reason = self._told(end.exitcode)
-        return failed
+            raise Failed(*self._told(end.exitcode)) from None
+        return result
 
     def _told(self, exit_code: int | None) -> tuple[str, str]:
         """The verdict on an engine whose process has ended, and the reason."""
@@ -111,7 +130,7 @@ def _move_in(contestant: Contestant, memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
 
 
-def _attempt_here(scene: Scenario, dt: float, starts: Sequence[Scenario], processor_time: float) -> Attempt:
+def _work_here(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
     if sys.platform == "linux":
         import resource
 
@@ -119,8 +138,8 @@ def _attempt_here(scene: Scenario, dt: float, starts: Sequence[Scenario], proces
         until = int(used.ru_utime + used.ru_stime + processor_time) + 1
         resource.setrlimit(resource.RLIMIT_CPU, (until, resource.RLIM_INFINITY))
     try:
-        return attempt_by(_residents[0], scene, dt, starts)
-    except BaseException as error:  # an engine that says sys.exit() or raises an interrupt is none of the user's
-        failed = attempt_of(_residents[0], scene)
-        failed.verdict, failed.reason = "crashed", type(error).__name__
-        return failed
+        return work(_residents[0], *given)
+    except Exception as error:  # an engine is somebody else's code
+        raise Failed("crashed", f"{type(error).__name__}: {error}") from None
+    except BaseException as error:  # one that says sys.exit() or raises an interrupt is none of the user's
+        raise Failed("crashed", type(error).__name__) from None

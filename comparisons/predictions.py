@@ -10,6 +10,7 @@ Source: expansion of one step about the impact, to first order in the step h.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,19 +18,22 @@ import numpy as np
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Engine
 from comparisons.metrics import METRICS, metrics_for
-from scenarios import Scenario, Trajectory, Truth, discrete_flight
+from scenarios import Scenario, Trajectory, Truth, discrete_flight, truth_for
 from scenarios.mechanics import angular_momentum
 
 
-def prediction_rows(engine: Engine, scene: Scenario, truth: Truth | None, dt: float) -> list[dict[str, Any]]:
-    """A row of kind `prediction` for each metric whose error is known beforehand."""
-    shared = {"scene": scene.name, "engine": engine.label, "dt": dt, "steps": scene.steps(dt), "kind": "prediction", "verdict": "measured"}
-    rows = []
-    for metric in metrics_for(scene, truth):
-        value = engine.predicted_error(scene, truth, metric.name, dt)
-        if value is not None:
-            rows.append(shared | {"metric": metric.name, "unit": metric.unit, "value": value, "truth": truth.name if truth else ""})
-    return rows
+def predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:
+    """The errors that are known beforehand, by metric."""
+    truth = truth_for(scene)
+    found = {metric.name: engine.predicted_error(scene, truth, metric.name, dt) for metric in metrics_for(scene, truth)}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def prediction_rows(scene: Scenario, truth: Truth | None, label: str, dt: float, predicted: Mapping[str, float]) -> list[dict[str, Any]]:
+    """A row of kind `prediction` for each of them."""
+    shared = {"scene": scene.name, "engine": label, "dt": dt, "steps": scene.steps(dt), "kind": "prediction", "verdict": "measured"}
+    shared["truth"] = truth.name if truth else ""
+    return [shared | {"metric": name, "unit": METRICS[name].unit, "value": value} for name, value in predicted.items()]
 
 
 def flight_error(scene: Scenario, truth: Truth | None, metric: str, dt: float, *, exact_rotation: bool) -> float | None:

@@ -17,7 +17,7 @@ from comparisons.predictions import prediction_rows
 from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
 from comparisons.simulating import Attempt, assert_step_fits, contestant_named
-from comparisons.studies import blame_settings, study_rows
+from comparisons.studies import Claim, blame_settings, study_rows
 from comparisons.verdicts import assert_expectations_can_be_judged, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
@@ -61,6 +61,7 @@ def run(
     with Cells(limits) as cells:
         for scene, truth in zip(scenes, truths, strict=True):
             measured: dict[str, list[Row]] = {label: [] for label in labels}
+            claims: dict[str, Claim] = {}
             for dt in dts:
                 phases = start_phases(scene, truth, dt)
                 attempts: list[Attempt] = []
@@ -70,17 +71,17 @@ def run(
                         trajectories[scene.name, contestant.label, dt] = attempt.motion
                         settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
                     measured[contestant.label] += _truth_rows(Phase(scene, truth), dt, attempt, phases)
-                    # What is predicted of a bounce is a mean over start phases.
-                    if contestant.engine is not None and attempt.motion is not None and (scene.floor is None or len(phases) > 1):
-                        rows += prediction_rows(contestant.engine, scene, truth, dt)
+                    rows += prediction_rows(scene, truth, contestant.label, dt, attempt.predicted)
                     attempts.append(attempt)
+                    if contestant.engine is not None and attempt.motion is not None:
+                        claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision)
                     if attempt.outcome is not None:
                         ensembles[scene.name, contestant.label, dt] = attempt.outcome
                         rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
                     progress(scene.name, contestant.label, dt)
                 for first, second in combinations(attempts, 2):
                     rows += agreement_rows(Phase(scene, truth), dt, first, second, phases)
-            studies = {c.label: study_rows(scene, c.engine, measured[c.label]) for c in contestants if c.engine is not None}
+            studies = {label: study_rows(scene, claim, measured[label]) for label, claim in claims.items()}
             for contestant in contestants:
                 own = measured[contestant.label] + studies.get(contestant.label, [])
                 twin = contestant.engine.calibrated_label if contestant.engine is not None else None

@@ -12,6 +12,7 @@ from comparisons.building import assert_built_as_meant, sound_record
 from comparisons.engines.base import Diverged, Engine, EngineMissing
 from comparisons.engines.registry import engine as engine_named
 from comparisons.ensembles import Outcome, outcome_of
+from comparisons.predictions import predicted_errors
 from scenarios import DropspinError, Scenario, Trajectory
 
 TIMED_REPEATS = 3
@@ -76,10 +77,9 @@ class Contestant:
 
 @dataclass
 class Attempt:
-    """What came of one engine on one scene at one step."""
+    """What came of one engine on one scene at one step; of what it claims, its discretisation, order and errors by metric."""
 
     label: str
-    discretisation: str | None = None
     verdict: str = ""
     reason: str = ""
     motion: Trajectory | None = None
@@ -88,6 +88,9 @@ class Attempt:
     settings: dict[str, Any] = field(default_factory=dict)
     time_per_step: float = float("nan")
     outcome: Outcome | None = None
+    discretisation: str | None = None
+    order: float | None = None
+    predicted: dict[str, float] = field(default_factory=dict)
 
 
 def contestant_named(chosen: str | Engine) -> Contestant:
@@ -105,15 +108,10 @@ def contestant_named(chosen: str | Engine) -> Contestant:
     return Contestant(created.label, created)
 
 
-def attempt_of(contestant: Contestant, scene: Scenario) -> Attempt:
-    """An attempt that is not made yet."""
-    return Attempt(contestant.label, contestant.engine.discretisation(scene) if contestant.engine else None)
-
-
 def attempt_by(contestant: Contestant, scene: Scenario, dt: float, starts: Sequence[Scenario]) -> Attempt:
     """Run a scene as written, then from each of its start phases if there are several; whatever goes wrong is told in the attempt."""
     engine = contestant.engine
-    attempt = attempt_of(contestant, scene)
+    attempt = Attempt(contestant.label)
     if engine is None:
         attempt.verdict, attempt.reason = "missing", contestant.missing
         return attempt
@@ -122,9 +120,12 @@ def attempt_by(contestant: Contestant, scene: Scenario, dt: float, starts: Seque
         if refusal is not None:
             attempt.verdict, attempt.reason = "declined", refusal
             return attempt
+        attempt.discretisation, attempt.order = engine.discretisation(scene), engine.order_in(scene)
         attempt.motion, attempt.limits = _motion(scene, engine, dt)
         attempt.phases = [attempt.motion] if len(starts) == 1 else [_motion(start, engine, dt)[0] for start in starts]
         attempt.outcome = None if scene.ensemble is None else outcome_of(engine, scene, dt)
+        # What is predicted of a bounce is a mean over start phases.
+        attempt.predicted = predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}
         attempt.settings, attempt.time_per_step = _settings_and_time(engine, scene, dt)
     except Diverged as error:
         attempt.verdict, attempt.reason = "diverged", str(error)

@@ -6,13 +6,12 @@ below the one it claims. A fault that is known, and expected of this engine by n
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.convergence import Convergence, says_something, take_apart
-from comparisons.engines.base import Engine
 from comparisons.metrics import METRICS, Average
 from comparisons.verdicts import Verdict, known_fault
 from scenarios import Scenario
@@ -35,7 +34,15 @@ OUT_OF_STEP = 0.5
 """Of the height of the drop: a bouncing body that is so far off is in another flight, and how wrong that is can no longer be told."""
 
 
-def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row]:
+class Claim(NamedTuple):
+    """What an engine says of itself in a scene: its order of accuracy, or None, and the precision of its state."""
+
+    label: str
+    order: float | None
+    precision: type
+
+
+def study_rows(scene: Scenario, claim: Claim, rows: Sequence[Row]) -> list[Row]:
     """Rows of kind `order` and `model_error` from an engine's measurements of a scene at several steps.
 
     Puts the cause into the measurements that have none yet.
@@ -45,15 +52,15 @@ def study_rows(scene: Scenario, engine: Engine, rows: Sequence[Row]) -> list[Row
         return studies
     for metric in _metrics(rows):
         measured = [row for row in rows if row.get("metric") == metric]
-        dts, errors, resolutions, rounding = _series(scene, engine, metric, measured)
+        dts, errors, resolutions, rounding = _series(scene, claim, metric, measured)
         found = take_apart(
-            dts, errors, resolutions, rounding, engine.order_in(scene), signed=METRICS[metric].signed, jumps=metric in JUMPING
+            dts, errors, resolutions, rounding, claim.order, signed=METRICS[metric].signed, jumps=metric in JUMPING
         )
         for row in measured:
             row["cause"] = row["cause"] or found.cause
         shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}
-        studies += _order_row(scene, engine, shared, found)
-        studies += _limit_row(scene, engine, shared, found, [row["dt"] for row in measured])
+        studies += _order_row(scene, claim, shared, found)
+        studies += _limit_row(scene, claim, shared, found, [row["dt"] for row in measured])
     return studies
 
 
@@ -78,7 +85,7 @@ def _metrics(rows: Iterable[Row]) -> list[str]:
     )
 
 
-def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row]) -> tuple[Array, Array, Array, Array]:
+def _series(scene: Scenario, claim: Claim, metric: str, measured: Sequence[Row]) -> tuple[Array, Array, Array, Array]:
     """Steps, errors, how finely these are resolved and what rounding may do; of the part that is worst at the finest step."""
     dts, steps = (np.array([row[name] for row in measured], dtype=float) for name in ("dt", "steps"))
     averages: list[Average] = [row["average"] for row in measured]
@@ -90,7 +97,7 @@ def _series(scene: Scenario, engine: Engine, metric: str, measured: Sequence[Row
         np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both]) for both in zip(*averages, strict=True)
     )
     scale = _scale(scene, METRICS[metric].unit)
-    rounding = scale * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(engine.precision).eps) * steps)
+    rounding = scale * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(claim.precision).eps) * steps)
     if METRICS[metric].unit == "rad":
         errors[np.abs(errors) > LOST] = math.nan
     if metric == "position_error" and scene.starts_above_floor:
@@ -106,8 +113,8 @@ def _scale(scene: Scenario, unit: str) -> float:
     return {"m": length, "1/s": 1.0 / scene.duration}.get(unit, 1.0)
 
 
-def _order_row(scene: Scenario, engine: Engine, shared: Row, found: Convergence) -> list[Row]:
-    claimed = engine.order_in(scene) if found.cause == "discretisation" else None
+def _order_row(scene: Scenario, claim: Claim, shared: Row, found: Convergence) -> list[Row]:
+    claimed = claim.order if found.cause == "discretisation" else None
     if math.isnan(found.order) and claimed != math.inf:
         return []
     lower = math.nan if claimed is None else claimed - SHORT_OF_ORDER
@@ -116,22 +123,22 @@ def _order_row(scene: Scenario, engine: Engine, shared: Row, found: Convergence)
         verdict = "measured"
     steps = ", ".join(f"{dt:g}" for dt in found.window)
     left_out = "".join(f"; {dt:g} s left out: {why}" for dt, why in found.left_out)
-    claim = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
-    reason = f"fitted at {steps} s{left_out}{claim}" if steps else f"{found.reason}{claim}"
+    said = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
+    reason = f"fitted at {steps} s{left_out}{said}" if steps else f"{found.reason}{said}"
     return [
         shared
         | {"kind": "order", "unit": "1", "value": found.order, "lower": lower, "verdict": verdict, "cause": found.cause, "reason": reason}
     ]
 
 
-def _limit_row(scene: Scenario, engine: Engine, shared: Row, found: Convergence, dts: Sequence[float]) -> list[Row]:
+def _limit_row(scene: Scenario, claim: Claim, shared: Row, found: Convergence, dts: Sequence[float]) -> list[Row]:
     if math.isnan(found.limit):
         return []
     reason, verdict = found.reason, "passed"
     if found.cause == "unresolved":
         verdict = "measured"
     if found.cause == "model":
-        fault = known_fault(scene, engine.label, min(dts), METRICS[shared["metric"]], found.limit, found.uncertainty)
+        fault = known_fault(scene, claim.label, min(dts), METRICS[shared["metric"]], found.limit, found.uncertainty)
         verdict, reason = ("failed", f"{reason}; no step cures it") if fault is None else ("passed", fault)
     bounds = {"lower": -found.uncertainty, "upper": found.uncertainty}
     return [shared | bounds | {"kind": "model_error", "value": found.limit, "verdict": verdict, "cause": found.cause, "reason": reason}]

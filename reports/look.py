@@ -10,7 +10,7 @@ from comparisons.simulating import assert_step_fits
 from comparisons.verdicts import assert_expectations_can_be_judged
 from reports.html import left_out, modelled
 from reports.numbers import bound
-from scenarios import Scenario, load, names, truth_for
+from scenarios import DropspinError, Scenario, load, names, truth_for
 
 Rows = list[dict[str, str]]
 
@@ -31,7 +31,7 @@ def engine_rows() -> Rows:
     for name in engine_names():
         try:
             found = engine(name)
-        except EngineMissing as error:
+        except DropspinError as error:
             rows.append({"engine": name, "options": "", "summary": str(error)})
             continue
         options = "; ".join(f"{key} = {' | '.join(values)}" for key, values in found.choices.items())

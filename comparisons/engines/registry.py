@@ -1,7 +1,8 @@
-"""Engines by name: `mujoco`, `mujoco[integrator=rk4]`."""
+"""Engines by name: `mujoco`, `mujoco[integrator=rk4]`; other packages' by the name they registered; anybody's as `my_module:MyEngine`."""
 
 import re
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import NamedTuple
 
@@ -18,6 +19,9 @@ class _Home(NamedTuple):
     how_to_install: str = ""
 
 
+GROUP = "dropspin.engines"
+"""The entry-point group in which other packages register engines: name = "module:Class"."""
+
 BUILT_IN = {
     "document": _Home("comparisons.engines.document", "Document"),
     "mujoco": _Home("comparisons.engines.mujoco_engine", "MuJoCo", "mujoco", "pip install mujoco"),
@@ -31,29 +35,77 @@ BUILT_IN = {
 
 
 def engine_names() -> list[str]:
-    """The engines that can be named, installed or not."""
-    return list(BUILT_IN)
+    """The engines that can be named, installed or not: dropspin's own, then those that other packages bring."""
+    return [*BUILT_IN, *sorted(_entry_points())]
 
 
 def engine(name: str) -> Engine:
-    """The engine of a name with options, such as `mujoco[integrator=rk4]`.
+    """The engine of a name with options, such as `mujoco[integrator=rk4]`, or of a class, such as `my_module:MyEngine`.
 
     Raises:
         UnknownName: There is no such engine, option or value.
-        EngineMissing: Its package is not installed; the text says how to get it.
+        EngineMissing: A package it needs is not installed; the text says how to get it.
+        DropspinError: It is no engine, or cannot be imported or created.
     """
     match = re.fullmatch(r"\s*([\w.:-]+)\s*(?:\[(.*)\])?\s*", name)
     if match is None:
         raise DropspinError(f"engine {name!r}: write a name, or a name with options, such as mujoco[integrator=rk4].")
     base, listed = match.group(1), match.group(2) or ""
-    if base not in BUILT_IN:
-        raise UnknownName("engine", base, BUILT_IN)
-    home = BUILT_IN[base]
-    # Before the adapter, which imports its engine.
-    if home.package and find_spec(home.package) is None:
-        raise EngineMissing(f"{base} is not installed: {home.how_to_install}.")
-    created: Engine = getattr(import_module(home.module), home.adapter)(_options(name, listed))
-    return created
+    adapter = _adapter(base)
+    try:
+        return adapter(_options(name, listed))
+    except DropspinError:
+        raise
+    except Exception as error:
+        raise DropspinError(f"engine {base!r}: it could not be created ({type(error).__name__}: {error}).") from error
+
+
+def _adapter(base: str) -> type[Engine]:
+    """The class of an engine's name."""
+    if base in BUILT_IN:
+        home = BUILT_IN[base]
+        # Before the adapter, which imports its engine.
+        if home.package and find_spec(home.package) is None:
+            raise EngineMissing(f"{base} is not installed: {home.how_to_install}.")
+        adapter: type[Engine] = getattr(import_module(home.module), home.adapter)
+        return adapter
+    if ":" in base:
+        return _imported(base, base)
+    brought = _entry_points()
+    if base not in brought:
+        raise UnknownName("engine", base, [*BUILT_IN, *sorted(brought), "or your own, my_module:MyEngine"])
+    return _imported(base, brought[base].value)
+
+
+def _entry_points() -> dict[str, EntryPoint]:
+    """Engines of other packages, by name; dropspin's own names are its own."""
+    return {point.name: point for point in entry_points(group=GROUP) if point.name not in BUILT_IN}
+
+
+def _imported(name: str, path: str) -> type[Engine]:
+    """The class at module:Class, which must be an engine."""
+    module_name, _, class_name = path.partition(":")
+    try:
+        module = import_module(module_name)
+    except ModuleNotFoundError as error:
+        if error.name is not None and f"{module_name}.".startswith(f"{error.name}."):
+            raise DropspinError(f"engine {name!r}: no module {module_name!r} here, nor where Python looks.") from None
+        raise EngineMissing(f"{name} needs the module {error.name}, which is not installed.") from None
+    except Exception as error:
+        raise DropspinError(f"engine {name!r}: {module_name} cannot be imported ({type(error).__name__}: {error}).") from error
+    found = getattr(module, class_name, None)
+    if found is None:
+        raise UnknownName(f"{module_name}'s engine", class_name, [key for key, value in vars(module).items() if _is_engine(value)])
+    if not _is_engine(found):
+        raise DropspinError(f"engine {name!r}: {class_name} is no engine; an engine is a class that inherits from comparisons.Engine.")
+    if not re.fullmatch(r"[A-Za-z][\w-]*", getattr(found, "name", "")):
+        raise DropspinError(f"engine {name!r}: {class_name}.name is what results call it: letters, digits, - and _, such as 'my-engine'.")
+    adapter: type[Engine] = found
+    return adapter
+
+
+def _is_engine(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, Engine) and found is not Engine
 
 
 def _options(name: str, listed: str) -> dict[str, str]:

@@ -24,6 +24,13 @@ SPIN = load("fall-spin")
 TIGHT = Limits(processor_time=1.0, memory=300 * 2**20)
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _compiled():
+    """What the limits below are too tight for."""
+    comparisons.simulate(BALL, "document", 4e-3)
+    comparisons.simulate(SPIN, "document", 4e-3)
+
+
 def segfault():
     ctypes.string_at(0)
 

@@ -53,9 +53,7 @@ def study_rows(scene: Scenario, claim: Claim, rows: Sequence[Row]) -> list[Row]:
     for metric in _metrics(rows):
         measured = [row for row in rows if row.get("metric") == metric]
         dts, errors, resolutions, rounding = _series(scene, claim, metric, measured)
-        found = take_apart(
-            dts, errors, resolutions, rounding, claim.order, signed=METRICS[metric].signed, jumps=metric in JUMPING
-        )
+        found = take_apart(dts, errors, resolutions, rounding, claim.order, signed=METRICS[metric].signed, jumps=metric in JUMPING)
         for row in measured:
             row["cause"] = row["cause"] or found.cause
         shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}

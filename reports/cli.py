@@ -190,3 +190,30 @@ def doctor(json_output: bool) -> None:
     from reports.terminal import print_rows
 
     print_rows(look.doctor_rows(CORE_ENGINES), json_output)
+
+
+@dropspin.command()
+@click.argument("engine_name", metavar="ENGINE")
+@as_json
+def conform(engine_name: str, json_output: bool) -> int:
+    """Is this adapter right? Hold an engine's adapter against the protocol and against motions that tell mistakes apart.
+
+    ENGINE is a name, as in `dropspin list engines`, or your own as my_module:MyEngine.
+
+    Exit code: 0 nothing is wrong, 1 something is, 2 bad input, 3 the engine crashed, hung or is not installed.
+    """
+    from comparisons import EngineMissing, engine
+    from comparisons.conformance import conform as findings
+    from reports.terminal import print_rows, status
+
+    try:
+        chosen = engine(engine_name)
+    except EngineMissing as error:
+        click.echo(f"dropspin: {error}", err=True)
+        return 3
+    with status(f"checking {chosen.label}"):
+        found = findings(chosen)
+    _stop_if_interrupted()
+    print_rows([{"check": one.check, "verdict": one.verdict, "what was found": one.said} for one in found], json_output)
+    verdicts = {one.verdict for one in found}
+    return 3 if verdicts & {"crashed", "timed_out"} else int("failed" in verdicts)

@@ -101,7 +101,7 @@ class DocumentSimulation(Simulation):
         self._simulator = reference_impl.Simulator(self._body, self._world, dt, methods)
         self._state = scene.initial_state
         self._steps = 0
-        self.settings = {"numba": version("numba"), **asdict(methods)}
+        self.settings = {"version": version("dropspin"), "numba": version("numba"), **asdict(methods)}
 
     def advance(self, steps: int) -> None:
         self._state = self._run(steps, max(steps, 1))[-1]

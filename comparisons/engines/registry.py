@@ -73,7 +73,7 @@ def _adapter(base: str) -> type[Engine]:
         return _imported(base, base)
     brought = _entry_points()
     if base not in brought:
-        raise UnknownName("engine", base, [*BUILT_IN, *sorted(brought), "or your own, my_module:MyEngine"])
+        raise DropspinError(f"{UnknownName('engine', base, engine_names())} One of your own is my_module:MyEngine.")
     return _imported(base, brought[base].value)
 
 

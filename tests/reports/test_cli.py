@@ -216,3 +216,67 @@ def test_command_that_does_it_again(tmp_path):
     (tmp_path / "my scene.toml").write_text(SCENE + '[[expect]]\nmetric = "penetration"\nbelow = 1e-9\nreason = "stiff"\n')
     done = dropspin("run", "my scene.toml", "-e", "mujoco", "--dt", "0.00123456789", cwd=tmp_path)
     assert "dropspin run 'my scene.toml' -e mujoco --dt 0.00123456789" in done.stdout.replace("\n", " ")
+
+
+ADAPTER = (Path(__file__).parents[2] / "docs" / "bring-your-engine.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+
+
+def test_an_engine_of_ones_own(tmp_path):
+    """A module in the working directory, as the page says: it conforms, it runs, and its results bear its name."""
+    (tmp_path / "my_module.py").write_text(ADAPTER)
+    (tmp_path / "scenarios.py").write_text("raise SystemExit('a file of the user hides a module of dropspin')")
+    done = dropspin("conform", "my_module:Flyer", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {row["verdict"] for row in json.loads(done.stdout)} == {"passed", "declined"}
+    done = dropspin("run", "spin-asymmetric", "-e", "my_module:Flyer", "--dt", "0.002", "--json", cwd=tmp_path)
+    assert {row["engine"] for row in json.loads(done.stdout)} == {"flyer"}
+    assert sorted(path.name for path in tmp_path.iterdir()) in (
+        ["__pycache__", "my_module.py", "out", "scenarios.py"],
+        ["my_module.py", "out", "scenarios.py"],
+    )
+
+
+def test_an_engine_of_ones_own_that_is_wrong(tmp_path):
+    """One word a mistake, and exit code 1."""
+    wrong = ADAPTER.replace("Rotation.from_quat(q).apply(self.data.qvel[3:])", "self.data.qvel[3:]")
+    (tmp_path / "my_module.py").write_text(wrong)
+    done = dropspin("conform", "my_module:Flyer", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "angular velocity looks body-framed" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "message"),
+    [
+        ("", 2, "my_module's engine 'Mine' is unknown"),
+        ("Mine = 3", 2, "Mine is no engine"),
+        ("import comparisons\nclass Mine(comparisons.Engine): pass", 2, "Mine.name is what results call it"),
+        ("import no_such_engine", 3, "needs the module no_such_engine, which is not installed"),
+        ("1 / 0", 2, "cannot be imported (ZeroDivisionError"),
+        ("import comparisons\nclass Mine(comparisons.Engine):\n name='mine'\n def __init__(self): pass", 2, "could not be created"),
+        (None, 2, "no module 'my_module' here"),
+    ],
+)
+def test_an_engine_that_is_none(text, code, message, tmp_path):
+    if text is not None:
+        (tmp_path / "my_module.py").write_text(text)
+    done = dropspin("conform", "my_module:Mine", cwd=tmp_path)
+    assert done.returncode == code
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_an_engine_of_another_package(tmp_path):
+    """One that is installed with an entry point is listed, and run by its name."""
+    (tmp_path / "my_module.py").write_text(ADAPTER)
+    info = tmp_path / "flyer-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: flyer\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[dropspin.engines]\nflyer = my_module:Flyer\nmujoco = my_module:Flyer\n")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    listed = subprocess.run([DROPSPIN, "list", "engines", "--json"], env=environment, capture_output=True, text=True, check=True)
+    rows = {row["engine"]: row["summary"] for row in json.loads(listed.stdout)}
+    assert rows["flyer"] == "MuJoCo in free flight."
+    assert rows["mujoco"].startswith("MuJoCo with exact restitution")  # nobody takes a name of dropspin's own
+    done = subprocess.run([DROPSPIN, "show", "spin-asymmetric", "-e", "flyer"], env=environment, capture_output=True, text=True, check=True)
+    assert "version" in done.stdout

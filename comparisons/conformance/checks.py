@@ -1,0 +1,400 @@
+"""What an adapter is held to, one check after the other, each in the engine's own process."""
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import chdir
+from typing import Any, Literal, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.building import ULPS, BuiltDifferently, assert_built_as_meant, assert_starts_as_meant, sound_record
+from comparisons.conformance.mistakes import explained, explained_start
+from comparisons.conformance.probes import DT, PROBES, Probe, differences
+from comparisons.engines.base import Diverged, Engine
+from comparisons.isolation import Cells, Failed, Limits
+from comparisons.simulating import Contestant
+from scenarios import Scenario, load, names, truth_for
+from scenarios.truths import LAWS, Law
+
+Array = NDArray[np.float64]
+Verdict = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]
+
+GENEROUS = Limits(processor_time=60.0)
+A_FEW_STEPS = 24
+SEVERAL = 3
+STEPS_TRIED = (0.01, 0.0025)
+NEAR_ENOUGH = 0.02
+"""Of a step, that a row may be off its time; an engine with some damping is not yet out of time."""
+HARMLESS = 1e-9
+"""Of the largest number, by which steps taken together may differ from steps taken one by one, and be told only."""
+
+
+class Finding(NamedTuple):
+    """What a check found."""
+
+    check: str
+    verdict: Verdict
+    said: str
+
+
+class Wrong(Exception):
+    """What is wrong, in words."""
+
+
+class Declined(Exception):
+    """The engine runs none of the scenes that would show it."""
+
+
+def conform(engine: Engine, limits: Limits = GENEROUS) -> list[Finding]:
+    """Hold an adapter against the protocol, and its motion against scenes that tell one mistake from another.
+
+    Args:
+        engine: The engine.
+        limits: What each check may use.
+    """
+    contestant = Contestant(engine.label, engine)
+    found = []
+    with Cells(limits) as cells:
+        for check in CHECKS:
+            try:
+                found.append(cells.call(contestant, _finding, check))
+            except Failed as failure:
+                found.append(Finding(check, cast(Verdict, failure.verdict), failure.reason))
+    return found
+
+
+def _finding(contestant: Contestant, check: str) -> Finding:
+    assert contestant.engine is not None
+    try:
+        return CHECKS[check](contestant.engine, check)
+    except (Wrong, BuiltDifferently) as wrong:
+        return Finding(check, "failed", str(wrong))
+    except Declined as declined:
+        return Finding(check, "declined", str(declined))
+    except Diverged as diverged:
+        return Finding(check, "failed", f"the engine gave up: {diverged}")
+
+
+def _claims(engine: Engine, check: str) -> Finding:
+    """What the class says of itself."""
+    order = engine.order
+    if not (order is None or (isinstance(order, int | float) and order > 0)):
+        raise Wrong(f"order is {order!r}; it is None for no claim, a number above 0, or inf for exact")
+    if engine.precision not in (np.float32, np.float64):
+        raise Wrong(f"precision is {engine.precision!r}; it is numpy.float64 or numpy.float32")
+    return Finding(check, "passed", f"order {order if order is not None else 'not claimed'}, {np.dtype(engine.precision).name}")
+
+
+def _reasons(engine: Engine, check: str) -> Finding:
+    """A scene is declined with a reason."""
+    scenes = [load(name) for name in names()]
+    for scene in [*scenes, *(probe.scene for probe in PROBES)]:
+        answer = engine.declines(scene)
+        if not (answer is None or (isinstance(answer, str) and answer.strip())):
+            raise Wrong(f"declines({scene.name}) says {answer!r}; it says None, or why in a sentence")
+    declined = sum(engine.declines(scene) is not None for scene in scenes)
+    if declined == len(scenes):
+        raise Wrong(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.declines(scenes[0])}")
+    return Finding(check, "passed", f"{len(scenes) - declined} scenes of the catalogue are run, {declined} declined with a reason")
+
+
+def _builds(engine: Engine, check: str) -> Finding:
+    """What is built is what was meant, in the probes and in every scene of the catalogue."""
+    told = 0
+    for scene in [TELLING, *(probe.scene for probe in PROBES), *(load(name) for name in names())]:
+        if engine.declines(scene) is not None:
+            continue
+        try:
+            told += _built(engine, scene)
+        except (Wrong, BuiltDifferently) as wrong:
+            raise Wrong(f"{scene.name}: {wrong}") from None
+        except Diverged:
+            raise
+        except Exception as error:
+            raise Wrong(f"{scene.name}: {type(error).__name__}: {error}; what cannot be run is declined, with a reason") from error
+    if not told:
+        return Finding(check, "passed", "the start is the scene's; as_built says nothing of mass, inertia and gravity")
+    return Finding(check, "passed", f"start, mass, inertia and gravity are the scene's to {ULPS} ulp")
+
+
+def _built(engine: Engine, scene: Scenario) -> bool:
+    """Whether the engine could say what it has built of a scene."""
+    with engine.prepare(scene, DT) as simulation:
+        state = simulation.state()
+        if not (isinstance(state, np.ndarray) and state.shape == (13,) and np.isrealobj(state)):
+            raise Wrong(f"state() gives {_kind(state)}; it is an array of 13 real numbers, shape (13,)")
+        if not np.isfinite(state).all():
+            raise Wrong(f"the state at the start is not finite: {state.tolist()}")
+        try:
+            assert_starts_as_meant(engine, scene, state)
+        except BuiltDifferently as error:
+            raise Wrong(_start_in_words(engine, scene, state) or str(error)) from None
+        assert_built_as_meant(engine, scene, simulation)
+        sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        return simulation.as_built() is not None
+
+
+def _start_in_words(engine: Engine, scene: Scenario, state: Array) -> str:
+    single = float(ULPS * np.finfo(np.float32).eps)
+    if engine.precision is np.float64 and np.array_equal(state, np.float32(state)):
+        return "the state carries single precision; declare precision = numpy.float32, or hand the start over undiminished"
+    mistake = explained_start(scene, state, single)
+    return "" if mistake is None else mistake.said
+
+
+def _rows(engine: Engine, check: str) -> Finding:
+    """`record` and `advance` take the same steps."""
+    scene = _run_by(engine)
+    with engine.prepare(scene, DT) as simulation:
+        rows = sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        end = simulation.state().copy()
+    with engine.prepare(scene, DT) as simulation:
+        sparse = sound_record(simulation.record(A_FEW_STEPS, every=SEVERAL), 1 + A_FEW_STEPS // SEVERAL)
+    with engine.prepare(scene, DT) as simulation:
+        one_by_one = [simulation.state().copy()]
+        for _ in range(A_FEW_STEPS):
+            simulation.advance(1)
+            one_by_one.append(simulation.state().copy())
+        again = sound_record(simulation.record(SEVERAL), 1 + SEVERAL)
+    stepped = np.array(one_by_one)
+    with engine.prepare(scene, DT) as simulation:
+        simulation.advance(SEVERAL)
+        _assert_alike(simulation.state(), stepped[SEVERAL], f"advance({SEVERAL}) is not {SEVERAL} times advance(1)")
+    _assert_alike(rows[0], stepped[0], "record's first row is not the state now; it is the state before any step")
+    _assert_alike(rows, stepped, f"record({A_FEW_STEPS}) gives other states than advance(1) and state(), {A_FEW_STEPS} times")
+    if _off(sparse, rows[::SEVERAL]) > HARMLESS and _off(sparse, rows[: len(sparse)]) <= HARMLESS:
+        raise Wrong(f"record ignores `every`: with every={SEVERAL} its rows are one step apart")
+    _assert_alike(sparse, rows[::SEVERAL], f"record with every={SEVERAL} does not give each third row of every=1")
+    _assert_alike(rows[-1], end, "after record, state() is not the last row")
+    _assert_alike(again[0], stepped[-1], "a second record does not begin where the simulation stands")
+    if not np.array_equal(rows, stepped):
+        return Finding(check, "noted", f"record and advance differ by rounding, {_off(rows, stepped):.1g}")
+    return Finding(check, "passed", "record and advance take the same steps, bit for bit")
+
+
+def _assert_alike(found: Array, meant: Array, otherwise: str) -> None:
+    off = _off(found, meant)
+    if not off <= HARMLESS:
+        raise Wrong(f"{otherwise} (off by {off:.2g})")
+
+
+def _off(found: Array, meant: Array) -> float:
+    """The largest difference, of the largest number; infinite where one is not finite."""
+    off = float(np.max(np.abs(found - meant)) / np.max(np.abs(meant)))
+    return off if np.isfinite(off) else float("inf")
+
+
+def _clock(engine: Engine, check: str) -> Finding:
+    """Rows are as far apart in time as asked: of a ball that nothing acts on, position is a clock."""
+    scene = _run_by(engine, "coasting")
+    speed = np.array(scene.start.velocity)
+    lengths = []
+    for dt in STEPS_TRIED:
+        with engine.prepare(scene, dt) as simulation:
+            rows = sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        # In steps of dt since the start.
+        clock = (rows[:, :3] - scene.start.position) @ speed / (speed @ speed) / dt
+        between = np.diff(clock)
+        if np.ptp(between) > NEAR_ENOUGH * max(abs(between.mean()), 1.0):
+            raise Wrong(f"rows are not uniform in time: at dt = {dt:g} s from {between.min() * dt:.4g} to {between.max() * dt:.4g} s apart")
+        lengths.append(float(between.mean()) * dt)
+    if np.allclose(lengths, STEPS_TRIED, rtol=NEAR_ENOUGH):
+        return Finding(check, "passed", f"steps are as long as asked, {' and '.join(f'{dt:g}' for dt in STEPS_TRIED)} s")
+    if abs(lengths[0] - lengths[1]) <= NEAR_ENOUGH * abs(lengths[0]):
+        raise Wrong(f"a step is {lengths[0]:.5g} s long, whatever dt is asked for ({' and '.join(f'{dt:g}' for dt in STEPS_TRIED)} s)")
+    asked = f"steps of {STEPS_TRIED[0]:g} and {STEPS_TRIED[1]:g} s"
+    raise Wrong(f"{asked} are {lengths[0]:.5g} and {lengths[1]:.5g} s long, by the way a free ball goes")
+
+
+def _stagger(engine: Engine, check: str) -> Finding:
+    """Whether velocity lags position by half a step is what the simulation says; from how far a fall runs ahead."""
+    scene = _run_by(engine, "falling", "falling straight")
+    steps, g = scene.steps(DT), scene.acceleration
+    with engine.prepare(scene, DT) as simulation:
+        said = simulation.staggered
+        end = sound_record(simulation.record(steps), 1 + steps)[-1]
+    truth = truth_for(scene)
+    assert truth is not None
+    ahead = (end[:3] - truth(steps * DT).position[0]) @ g / (0.5 * g @ g * steps * DT * DT)
+    lag = round(float(ahead))
+    if abs(ahead) > 1.5 or abs(ahead - lag) > 0.25:
+        return Finding(check, "noted", f"the position after a fall is {ahead:.3g} half-steps' fall ahead, as in no known scheme")
+    if lag == 1 and not said:
+        raise Wrong("a fall runs ahead by half a step, as in semi-implicit Euler, where velocity lags position; set staggered = True")
+    if lag == 0 and said:
+        raise Wrong("staggered is True, but velocity and position are of the same time; set staggered = False")
+    if lag == -1:
+        return Finding(check, "noted", "a fall lags by half a step, as in explicit Euler")
+    return Finding(check, "passed", "velocity lags position by half a step" if said else "velocity and position are of the same time")
+
+
+def _repeats(engine: Engine, check: str) -> Finding:
+    """The same scene gives the same bits, whatever else runs in the process."""
+    a, b = _run_by(engine), _run_by(engine, "turning", "coasting")
+    first = _record(engine, a)
+    if not all(np.array_equal(first, _record(engine, a)) for _ in range(SEVERAL)):
+        raise Wrong("the same scene gives other bits when it is run again: something is random, or is kept from run to run")
+    with engine.prepare(b, 4 * DT) as other:
+        other.advance(A_FEW_STEPS)
+        if not np.array_equal(first, _record(engine, a)):
+            raise Wrong("the same scene gives other bits while another simulation is open: they share something")
+        with engine.prepare(a, DT) as simulation:
+            simulation.advance(A_FEW_STEPS // 2)
+            other.advance(A_FEW_STEPS)
+            simulation.advance(A_FEW_STEPS - A_FEW_STEPS // 2)
+            if not np.array_equal(first[-1], simulation.state()):
+                raise Wrong("two simulations that take turns disturb each other: they share something")
+    if not np.array_equal(first, _record(engine, a)):
+        raise Wrong("the same scene gives other bits after another one: A, B, A; something is left behind")
+    return Finding(check, "passed", "A, B, A gives the same bits, and so do simulations that take turns")
+
+
+def _record(engine: Engine, scene: Scenario) -> Array:
+    with engine.prepare(scene, DT) as simulation:
+        return sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS).copy()
+
+
+def _keeps(engine: Engine, check: str) -> Finding:
+    """A state that was handed out stays as it is."""
+    scene = _run_by(engine, "tumbling", "turning", "falling straight", "coasting")
+    with engine.prepare(scene, DT) as simulation:
+        state = simulation.state()
+        before = state.copy()
+        simulation.advance(A_FEW_STEPS)
+        if not np.array_equal(state, before):
+            raise Wrong("state() hands out the engine's own memory, which changes with the next step; hand out a copy")
+        if np.array_equal(simulation.state(), before):
+            raise Wrong(f"the state is the same after {A_FEW_STEPS} steps: nothing moves, or state() looks at what was at the start")
+    return Finding(check, "passed", "states that were handed out stay as they are")
+
+
+def _stamp(engine: Engine, check: str) -> Finding:
+    """Results can be stamped with the settings."""
+    with engine.prepare(_run_by(engine), DT) as simulation:
+        settings = simulation.settings
+    try:
+        json.dumps(dict(settings))
+    except (TypeError, ValueError) as error:
+        raise Wrong(f"settings cannot be written as JSON: {error}") from None
+    if "version" not in settings:
+        return Finding(check, "noted", "settings has no 'version'; results should say which version of the engine they are of")
+    return Finding(check, "passed", f"version {settings['version']}, {len(settings) - 1} settings")
+
+
+def _leaves_nothing(engine: Engine, check: str) -> Finding:
+    """Nothing is written to the working directory, not even when a simulation breaks down."""
+    scene = _run_by(engine, "tumbling", "turning", "falling straight", "coasting")
+    wild = scene.starting_at(scene.initial_state * np.repeat([1.0, 1e4], [7, 6]))
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        _record(engine, scene)
+        if engine.declines(wild) is None:
+            try:
+                with engine.prepare(wild, 100 * DT) as simulation:
+                    simulation.record(A_FEW_STEPS)
+            except Diverged:
+                pass  # as it should say
+        left = sorted(os.listdir(folder))
+    if left:
+        raise Wrong(f"files are left in the working directory: {', '.join(left)}")
+    return Finding(check, "passed", "nothing is written to the working directory")
+
+
+def _motion(engine: Engine, check: str) -> Finding:
+    """The motion of a probe is its truth; if not, what it is instead."""
+    probe = next(probe for probe in PROBES if probe.name == check)
+    scene, steps = probe.scene, probe.scene.steps(DT)
+    refusal = engine.declines(scene)
+    if refusal is not None:
+        raise Declined(refusal)
+    truth = truth_for(scene)
+    assert truth is not None
+    with engine.prepare(scene, DT) as simulation:
+        rows = sound_record(simulation.record(steps), 1 + steps)
+        limits = list(simulation.limits)
+    found, meant = rows[probe.rows], truth(probe.times).states
+    if probe.off(found, meant) <= 1.0:
+        return Finding(check, "passed", _figures(found, meant))
+    law = _own_law(engine, probe, found)
+    if law is not None:
+        return Finding(check, "noted", f"impacts follow the {law} law, as the engine says of itself")
+    mistake = explained(probe, found)
+    if mistake is not None:
+        return Finding(check, "noted" if mistake.is_a_trait else "failed", mistake.said)
+    if limits:
+        return Finding(check, "noted", "; ".join(limits))
+    return Finding(check, "failed", "; ".join([*_symptoms(probe, rows, meant), _figures(found, meant)]))
+
+
+def _own_law(engine: Engine, probe: Probe, found: Array) -> Law | None:
+    """The impact law that an engine names in its discretisation, if it does follow that."""
+    named = engine.discretisation(probe.scene) or ""
+    for law in LAWS:
+        truth = truth_for(probe.scene, law) if f"law {law}" in named else None
+        if truth is not None and probe.off(found, truth(probe.times).states) <= 1.0:
+            return law
+    return None
+
+
+def _figures(found: Array, meant: Array) -> str:
+    if not np.isfinite(found).all():
+        return "the state is not finite"
+    position, attitude, velocity, spin = differences(found, meant)
+    return f"off by {position:.2g} m, {attitude:.2g} rad, {velocity:.2g} m/s, {spin:.2g} rad/s"
+
+
+def _symptoms(probe: Probe, rows: Array, meant: Array) -> Iterator[str]:
+    """What is seen of a motion that no known mistake explains."""
+    scene, end = probe.scene, rows[-1]
+    if not np.any(end[7:]) and np.any(meant[-1, 7:]):
+        yield "the body has come to a stand: it falls asleep"
+        return
+    if scene.floor is None and scene.gravity is None:
+        for what, unit, part in (("speed", "m/s", slice(7, 10)), ("rate of turning", "rad/s", slice(10, 13))):
+            is_, ought = (float(np.linalg.norm(state[part])) for state in (end, meant[-1]))
+            if abs(is_ - ought) > 1e-3 * ought:
+                yield f"its {what} ends as {is_:.4g} {unit} and should as {ought:.4g}: damping, or a clamp, that is not the scene's"
+    rises = np.flatnonzero((rows[1:, 8] > 0.0) & (rows[:-1, 8] <= 0.0))
+    if scene.floor is not None and len(rises):
+        first = int(rises[0])
+        rebound = float(rows[first:, 8].max() / -rows[: first + 1, 8].min())
+        truth = truth_for(scene)
+        assert truth is not None
+        yield f"it turns round at a height of {rows[first, 1]:.4g} m and should at {truth.events[0].before[1]:.4g} m"
+        yield f"it rebounds with {rebound:.3g} of its speed; restitution is {scene.floor.restitution:g}"
+
+
+def _run_by(engine: Engine, *preferred: str) -> Scenario:
+    """The first of some probes, or of those that show most, that an engine runs."""
+    probes = {probe.name: probe for probe in PROBES}
+    wanted = preferred or ("corner", "bouncing ball", "tumbling", "turning", "falling straight", "coasting")
+    refusal = None
+    for name in wanted:
+        refusal = engine.declines(probes[name].scene)
+        if refusal is None:
+            return probes[name].scene
+    raise Declined(f"none of {', '.join(wanted)} is run: {refusal}")
+
+
+def _kind(found: Any) -> str:
+    return f"an array of {found.dtype}, shape {found.shape}" if isinstance(found, np.ndarray) else f"a {type(found).__name__}"
+
+
+TELLING = next(probe.scene for probe in PROBES if probe.name == "tumbling")
+"""A start of which no two numbers are alike."""
+
+CHECKS: dict[str, Callable[[Engine, str], Finding]] = {
+    "claims": _claims,
+    "declines": _reasons,
+    "builds what is meant": _builds,
+    "record and advance": _rows,
+    "time": _clock,
+    "staggered": _stagger,
+    "repeats": _repeats,
+    "states": _keeps,
+    "settings": _stamp,
+    "files": _leaves_nothing,
+    **{probe.name: _motion for probe in PROBES},
+}

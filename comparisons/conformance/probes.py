@@ -1,0 +1,130 @@
+"""Scenes built to tell one mistake from another: no two axes, frames, sizes or rates are alike in them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios import Scenario, load
+from scenarios.rotations import angle_between_orientations
+
+Array = NDArray[np.float64]
+
+DT = 2.5e-4
+"""So short [s] that what an engine's integrator does wrong is small beside what a mistake does."""
+TILT = [0.1825741858350554, 0.3651483716701107, 0.5477225575051661, 0.7302967433402214]  # (1, 2, 3, 4)/√30
+CUBE = {"shape": "box", "half_extents": [0.2, 0.2, 0.2], "mass": 2.0}
+BALL = {"shape": "sphere", "radius": 0.1, "mass": 2.0}
+BLOCK = {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 2.0, "inertia": [0.05, 0.07, 0.1]}
+FALL = {"acceleration": [0.0, -7.0, 0.0]}
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A scene, and how near an engine must come to its truth.
+
+    Attributes:
+        name: What is looked at.
+        scene: The scene.
+        allowed: How far off position [m], attitude [rad], velocity [m/s], angular velocity [rad/s] may be; inf: it is not looked at.
+    """
+
+    name: str
+    scene: Scenario
+    allowed: tuple[float, float, float, float]
+
+    @property
+    def times(self) -> Array:
+        """When it is looked at [s]: half way and at the end."""
+        return DT * self.rows
+
+    @property
+    def rows(self) -> Array:
+        """The steps after which it is looked at."""
+        steps = self.scene.steps(DT)
+        return np.array([steps // 2, steps])
+
+    def off(self, found: Array, meant: Array) -> float:
+        """How far states, shape (2, 13), are from others, over what is allowed; infinite where they are no numbers."""
+        worst = float(np.max(differences(found, meant) / np.array(self.allowed)))
+        return worst if np.isfinite(worst) else float("inf")
+
+
+def differences(found: Array, meant: Array) -> Array:
+    """The largest difference of position [m], attitude [rad], velocity [m/s], angular velocity [rad/s] between states, shape (4,)."""
+    apart = [np.linalg.norm(found[:, part] - meant[:, part], axis=1) for part in (slice(0, 3), slice(7, 10), slice(10, 13))]
+    turned = angle_between_orientations(found[:, 3:7], meant[:, 3:7])
+    return np.array([apart[0].max(), turned.max(), apart[1].max(), apart[2].max()])
+
+
+def _probe(name: str, allowed: tuple[float, float, float, float], duration: float, body: dict[str, Any], **tables: Any) -> Probe:
+    return Probe(name, load({"name": name.replace(" ", "-"), "duration": duration, "body": body, **tables}), allowed)
+
+
+def _floor(restitution: float, friction: str | float) -> dict[str, Any]:
+    return {"restitution": restitution, "friction": friction}
+
+
+PROBES = (
+    _probe(
+        "coasting", (1e-3, 1e-4, 1e-3, 1e-4), 0.5, BALL,
+        start={"position": [1.0, 2.0, -3.0], "orientation": TILT, "velocity": [0.5, -1.25, 2.0]},
+    ),
+    _probe(
+        "turning", (1e-6, 0.01, 1e-6, 0.01), 0.5, CUBE,
+        start={"orientation": TILT, "angular_velocity": [1.0, -2.0, 3.0]},
+    ),
+    _probe(
+        "tumbling", (1e-3, 0.02, 1e-3, 0.06), 0.5, BLOCK,
+        start={"position": [1.0, 2.0, -3.0], "orientation": TILT, "velocity": [0.5, -1.25, 2.25], "angular_velocity": [2.0, -5.0, 4.0]},
+    ),
+    _probe(
+        "tumbling askew", (1e-6, 0.02, 1e-6, 0.06), 0.5,
+        {"shape": "vertices", "points": [[0.2, 0.0, 0.1], [-0.1, 0.3, 0.0], [0.0, -0.2, 0.25], [0.1, 0.1, -0.3]], "mass": 2.0},
+        start={"orientation": TILT, "angular_velocity": [2.0, -5.0, 4.0]},
+    ),
+    _probe(
+        "falling", (2e-3, 1e-4, 2e-3, 1e-4), 0.5, BALL,
+        start={"position": [1.0, 2.0, -3.0], "velocity": [0.5, -1.25, 2.0]}, gravity={"acceleration": [1.5, -7.0, 3.0]},
+    ),
+    _probe(
+        "falling straight", (2e-3, 1e-4, 2e-3, 1e-4), 0.5, BALL,
+        start={"position": [1.0, 2.0, -3.0], "velocity": [0.5, -1.25, 2.0]}, gravity=FALL,
+    ),
+    _probe(
+        "damped", (1e-3, 1e-2, 1e-3, 1e-2), 0.5, CUBE,
+        start={"orientation": TILT, "velocity": [0.5, -1.25, 2.0], "angular_velocity": [1.0, -2.0, 3.0]},
+        damping={"linear": 0.8, "angular": 0.3},
+    ),
+    _probe(
+        "creeping", (1e-5, 1e-5, 2e-5, 2e-5), 4.0, CUBE,
+        start={"velocity": [1e-3, 0.0, 2e-3], "angular_velocity": [0.0, 2e-3, 1e-3]},
+    ),
+    _probe(
+        "fast", (float("inf"), float("inf"), 0.3, 0.3), 0.05, CUBE,
+        start={"velocity": [300.0, 0.0, 0.0], "angular_velocity": [0.0, 300.0, 0.0]},
+    ),
+    _probe(
+        "bouncing ball", (3e-3, 1e-4, 7e-3, 1e-4), 0.5, BALL,
+        start={"position": [0.0, 0.4, 0.0]}, gravity=FALL, floor=_floor(0.6, "none"),
+    ),
+    _probe(
+        "bouncing box", (3e-3, 1e-2, 7e-3, 2e-2), 0.5, {"shape": "box", "half_extents": [0.15, 0.1, 0.2], "mass": 2.0},
+        start={"position": [0.0, 0.4, 0.0]}, gravity=FALL, floor=_floor(0.6, "none"),
+    ),
+    _probe(
+        "gripping floor", (4e-3, 0.02, 0.01, 0.1), 0.5, BALL,
+        start={"position": [0.0, 0.4, 0.0], "velocity": [0.5, 0.0, 0.3], "angular_velocity": [4.0, 2.0, -6.0]},
+        gravity=FALL, floor=_floor(0.6, "infinite"),
+    ),
+    _probe(
+        "slippery floor", (4e-3, 0.02, 0.01, 0.1), 0.5, BALL,
+        start={"position": [0.0, 0.4, 0.0], "velocity": [6.0, 0.0, 3.6], "angular_velocity": [4.0, 2.0, -6.0]},
+        gravity=FALL, floor=_floor(0.6, 0.12),
+    ),
+    _probe(
+        "corner", (3e-3, 0.03, 0.02, 0.1), 0.36, BLOCK,
+        start={"position": [0.0, 0.65, 0.0], "orientation": TILT}, gravity=FALL, floor=_floor(0.6, "none"),
+    ),
+)  # fmt: skip

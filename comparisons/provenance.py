@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-STAMPED = ("dropspin", "numpy", "numba", "scipy", "mujoco", "pybullet")
+STAMPED = ("dropspin", "numpy", "numba", "scipy", "mujoco", "pybullet", "rapier3d", "dartpy", "drake")
 
 
 def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:

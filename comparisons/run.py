@@ -18,7 +18,7 @@ from comparisons.provenance import provenance
 from comparisons.results import Results, TrajectoryKey, as_frame
 from comparisons.simulating import Attempt, assert_step_fits, contestant_named
 from comparisons.studies import Claim, blame_settings, study_rows
-from comparisons.verdicts import assert_expectations_can_be_judged, judge
+from comparisons.verdicts import assert_expectations_can_be_judged, excused, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
 DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
@@ -74,7 +74,9 @@ def run(
                     rows += prediction_rows(scene, truth, contestant.label, dt, attempt.predicted)
                     attempts.append(attempt)
                     if contestant.engine is not None and attempt.motion is not None:
-                        claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision)
+                        earlier = claims[contestant.label].limits if contestant.label in claims else ()
+                        limits_met = tuple(dict.fromkeys([*earlier, *attempt.limits]))
+                        claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision, limits_met)
                     if attempt.outcome is not None:
                         ensembles[scene.name, contestant.label, dt] = attempt.outcome
                         rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
@@ -116,7 +118,7 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}
         if metric.kind == "truth" and truth is not None:
             row["truth"] = truth.name
-        rows.append(row | _measured(scene, dt, attempt.label, metric, cases))
+        rows.append(row | excused(_measured(scene, dt, attempt.label, metric, cases), attempt.limits))
     if truth is None:
         rows.append(shared | {"verdict": "no_truth", "reason": "no closed form is known for this scene"})
     return rows

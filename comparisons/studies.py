@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from comparisons.convergence import Convergence, says_something, take_apart
 from comparisons.metrics import METRICS, Average
-from comparisons.verdicts import Verdict, known_fault
+from comparisons.verdicts import Verdict, excused, known_fault
 from scenarios import Scenario
 
 Row = dict[str, Any]
@@ -35,11 +35,12 @@ OUT_OF_STEP = 0.5
 
 
 class Claim(NamedTuple):
-    """What an engine says of itself in a scene: its order of accuracy, or None, and the precision of its state."""
+    """What an engine says of itself in a scene: its order of accuracy, or None, the precision of its state, and limits it has met."""
 
     label: str
     order: float | None
     precision: type
+    limits: tuple[str, ...] = ()
 
 
 def study_rows(scene: Scenario, claim: Claim, rows: Sequence[Row]) -> list[Row]:
@@ -57,8 +58,8 @@ def study_rows(scene: Scenario, claim: Claim, rows: Sequence[Row]) -> list[Row]:
         for row in measured:
             row["cause"] = row["cause"] or found.cause
         shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}
-        studies += _order_row(scene, claim, shared, found)
-        studies += _limit_row(scene, claim, shared, found, [row["dt"] for row in measured])
+        judged = _order_row(scene, claim, shared, found) + _limit_row(scene, claim, shared, found, [row["dt"] for row in measured])
+        studies += [excused(row, claim.limits) for row in judged]
     return studies
 
 

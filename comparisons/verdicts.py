@@ -1,9 +1,9 @@
 """From a value and a scene's expectations to a bound and a verdict."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from comparisons.engines.base import EngineMissing
 from comparisons.engines.registry import BUILT_IN, engine
@@ -112,3 +112,10 @@ def _bounds(expectation: Expectation, metric: Metric) -> tuple[float, float]:
         return expectation.above, math.inf
     assert expectation.below is not None
     return (-expectation.below if metric.signed else -math.inf), expectation.below
+
+
+def excused(row: dict[str, Any], limits: Sequence[str]) -> dict[str, Any]:
+    """A row of results that is `limited` rather than failed, where the engine has said which of its limits it met on the way."""
+    if row["verdict"] != "failed" or not limits:
+        return row
+    return row | {"verdict": "limited", "reason": "; ".join(filter(None, [*limits, row["reason"]]))}

@@ -8,6 +8,7 @@ import signal
 import sys
 import traceback
 from importlib.metadata import version
+from typing import Literal
 
 import click
 
@@ -217,3 +218,48 @@ def conform(engine_name: str, json_output: bool) -> int:
     print_rows([{"check": one.check, "verdict": one.verdict, "what was found": one.said} for one in found], json_output)
     verdicts = {one.verdict for one in found}
     return 3 if verdicts & {"crashed", "timed_out"} else int("failed" in verdicts)
+
+
+@dropspin.command()
+@click.option("-e", "--engine", "engine_name", default="mujoco", show_default=True, metavar="ENGINE", help="The engine, with options.")
+@click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Speed after an impact over speed before.")
+@click.option("--dt", type=float, required=True, metavar="SECONDS", help="The time step.")
+@click.option("--friction", default="none", show_default=True, metavar="F", help="none, infinite or a coefficient.")
+@click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", show_default=True, help="What falls.")
+@click.option("--as", "language", metavar="LANGUAGE", help="Print nothing but the text to paste: python, mjcf or urdf.")
+@as_json
+def calibrate(
+    engine_name: str,
+    restitution: float,
+    dt: float,
+    friction: str,
+    shape: Literal["ball", "box"],
+    language: str | None,
+    json_output: bool,
+) -> None:
+    """The settings that give a restitution at a time step, ready to paste, and what they were measured to do.
+
+    MuJoCo has two ways: a damper over one step, and with -e mujoco[spring_steps=20] a spring over so many steps.
+    """
+    from comparisons import engine
+    from comparisons.calibration import calibrate as calibrated
+    from reports import look
+    from reports.terminal import print_rows, status
+    from scenarios.errors import UnknownName
+
+    chosen = engine(engine_name)
+    with status(f"measuring {chosen.label}"):
+        found = calibrated(chosen, restitution, dt, look.friction(friction), shape)
+    _stop_if_interrupted()
+    if language is not None:
+        if language not in found.programs:
+            raise UnknownName(f"{chosen.label}'s language", language, found.programs)
+        click.echo(found.programs[language], nl=False)
+        return
+    if json_output:
+        click.echo(json.dumps(look.calibration(found), indent=1, ensure_ascii=False))
+        return
+    print_rows(look.measured_rows(found), json_output=False)
+    print_rows(look.setting_rows(found), json_output=False)
+    for name, text in found.programs.items():
+        click.echo(f"To paste, as {name}:\n\n{text}")

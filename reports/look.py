@@ -1,10 +1,14 @@
 """What `list`, `show` and `doctor` have to say: rows of words, for a table or for JSON."""
 
+import math
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 from comparisons import ENSEMBLE_METRICS, METRICS, EngineMissing, engine, engine_names, simulate
 from comparisons.building import assert_built_as_meant
+from comparisons.calibration import Calibration
 from comparisons.provenance import processor, versions
 from comparisons.simulating import assert_step_fits
 from comparisons.verdicts import assert_expectations_can_be_judged
@@ -34,7 +38,9 @@ def engine_rows() -> Rows:
         except DropspinError as error:
             rows.append({"engine": name, "options": "", "summary": str(error)})
             continue
-        options = "; ".join(f"{key} = {' | '.join(values)}" for key, values in found.choices.items())
+        choices = [f"{key} = {' | '.join(values)}" for key, values in found.choices.items()]
+        numbers = [f"{key} = {allowed.least:g} … {allowed.most:g}" for key, allowed in found.numbers.items()]
+        options = "; ".join(choices + numbers)
         rows.append({"engine": name, "options": options, "summary": (type(found).__doc__ or "").strip().splitlines()[0]})
     return rows
 
@@ -102,6 +108,43 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
         reasons = {} if simulation.settings.get("profile") == "default" else chosen.reasons
         settings = simulation.settings.items()
         return rows + [{"what": key, "is": str(value), "why": reasons.get(key, "")} for key, value in settings]
+
+
+def friction(text: str) -> str | float:
+    """A floor's friction as it is written on the command line.
+
+    Raises:
+        DropspinError: It is none.
+    """
+    if text in ("none", "infinite"):
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise DropspinError(f"friction: got {text!r}; it is none, infinite or a number.") from None
+
+
+def measured_rows(found: Calibration) -> Rows:
+    """What a calibrated engine was measured to do."""
+    return [
+        {"measured": one.name, "value": f"{one.value:.4g}{'' if one.unit == '1' else f' {one.unit}'}", "how": one.how}
+        for one in found.measured
+    ]
+
+
+def setting_rows(found: Calibration) -> Rows:
+    """What to set."""
+    return [{"set": name, "to": str(value), "why": found.reasons.get(name, "")} for name, value in found.settings.items()]
+
+
+def calibration(found: Calibration) -> dict[str, Any]:
+    """All of a calibration, as JSON has it."""
+    return {
+        "engine": found.engine,
+        "measured": [asdict(one) | {"value": None if math.isnan(one.value) else one.value} for one in found.measured],
+        "settings": dict(found.settings),
+        "programs": dict(found.programs),
+    }
 
 
 def doctor_rows(engines: Sequence[str]) -> Rows:

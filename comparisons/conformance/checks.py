@@ -357,11 +357,11 @@ def _symptoms(probe: Probe, rows: Array, meant: Array) -> Iterator[str]:
             if abs(is_ - ought) > 1e-3 * ought:
                 yield f"its {what} ends as {is_:.4g} {unit} and should as {ought:.4g}: damping, or a clamp, that is not the scene's"
     rises = np.flatnonzero((rows[1:, 8] > 0.0) & (rows[:-1, 8] <= 0.0))
-    if scene.floor is not None and len(rises):
+    truth = truth_for(scene)
+    assert truth is not None
+    if scene.floor is not None and truth.events and len(rises):
         first = int(rises[0])
         rebound = float(rows[first:, 8].max() / -rows[: first + 1, 8].min())
-        truth = truth_for(scene)
-        assert truth is not None
         yield f"it turns round at a height of {rows[first, 1]:.4g} m and should at {truth.events[0].before[1]:.4g} m"
         yield f"it rebounds with {rebound:.3g} of its speed; restitution is {scene.floor.restitution:g}"
 

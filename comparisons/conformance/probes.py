@@ -124,6 +124,10 @@ PROBES = (
         gravity=FALL, floor=_floor(0.6, 0.12),
     ),
     _probe(
+        "sliding box", (3e-3, 0.01, 0.01, 0.03), 0.5, {"shape": "box", "half_extents": [0.2, 0.05, 0.3], "mass": 2.0},
+        start={"position": [0.0, 0.05, 0.0], "velocity": [2.0, 0.0, 0.0]}, gravity=FALL, floor=_floor(0.0, 0.3),
+    ),
+    _probe(
         "corner", (3e-3, 0.03, 0.02, 0.1), 0.36, BLOCK,
         start={"position": [0.0, 0.65, 0.0], "orientation": TILT}, gravity=FALL, floor=_floor(0.6, "none"),
     ),

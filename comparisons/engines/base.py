@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
 from types import TracebackType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,14 @@ class Simulation:
         self.close()
 
 
+class Number(NamedTuple):
+    """What a numeric option may be."""
+
+    default: float
+    least: float
+    most: float
+
+
 PROFILES = ("calibrated", "default")
 """The scene as meant, by whatever settings that takes; and what a user gets who leaves all settings but the obvious."""
 
@@ -119,23 +127,42 @@ class Engine:
     """What the engine's state carries: numpy.float64 or numpy.float32."""
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Each option's values, the default first."""
+    numbers: ClassVar[Mapping[str, Number]] = {}
+    """Each numeric option's default and range."""
     reasons: ClassVar[Mapping[str, str]] = {}
     """Why each setting of a calibrated simulation is what it is, by the names in `Simulation.settings`."""
 
     options: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for option, value in self.options.items():
-            if option not in self.choices:
-                raise UnknownName(f"{self.name}'s option", option, self.choices)
-            if value not in self.choices[option]:
+        chosen = {}
+        for option, value in sorted(self.options.items()):
+            if option not in self.choices and option not in self.numbers:
+                raise UnknownName(f"{self.name}'s option", option, [*self.choices, *self.numbers])
+            if option in self.choices and value not in self.choices[option]:
                 raise UnknownName(f"{self.name}'s {option}", value, self.choices[option])
-        chosen = {key: value for key, value in sorted(self.options.items()) if value != self.choices[key][0]}
+            canonical = self._canonical_number(option, value) if option in self.numbers else value
+            if canonical != self._default(option):
+                chosen[option] = canonical
         object.__setattr__(self, "options", chosen)
+
+    def _default(self, option: str) -> str:
+        return f"{self.numbers[option].default:g}" if option in self.numbers else self.choices[option][0]
+
+    def _canonical_number(self, option: str, value: str) -> str:
+        """One way to write each number, so that equal options have equal labels."""
+        allowed = self.numbers[option]
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not allowed.least <= number <= allowed.most:
+            raise DropspinError(f"{self.name}'s {option}: got {value!r}; it is a number from {allowed.least:g} to {allowed.most:g}.")
+        return f"{number:g}" if float(f"{number:g}") == number else repr(number)
 
     def option(self, name: str) -> str:
         """An option's value, given or default."""
-        return self.options.get(name, self.choices[name][0])
+        return self.options.get(name, self._default(name))
 
     @property
     def label(self) -> str:
@@ -168,6 +195,14 @@ class Engine:
     def declines(self, scene: Scenario) -> str | None:
         """Why this engine cannot run a scene as meant, or None: it can."""
         return None
+
+    def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
+        """Texts that have the settings of a scene at a time step [s], ready to paste, by their language; empty: there are none.
+
+        The one in `python` runs by itself, and has `motion(height, steps, step)`: heights of the body's lowest point [m] and vertical
+        speeds [m/s] after each step of a fall from that height.
+        """
+        return {}
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         """Build a scene at a time step [s], start included."""

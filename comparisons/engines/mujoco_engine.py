@@ -1,11 +1,6 @@
-"""The engine `mujoco`: calibrated, the scene as meant, by settings MuJoCo has but does not default to; or with its defaults.
+"""The engine `mujoco`: calibrated, the scene as meant, by settings MuJoCo has but does not default to; or with its defaults."""
 
-MuJoCo has no coefficient of restitution. A contact is a damped spring whose reference acceleration is
-a_ref = -b v - k r; with k = 0 and b = (1 + e) / dt, one step of a one-stage integrator turns the normal velocity v into
--e v, exactly but for the impedance d < 1, which leaves (1 - d) g dt behind.
-"""
-
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, ClassVar
 
@@ -22,17 +17,18 @@ from comparisons.engines.base import (
     AsBuilt,
     Diverged,
     Engine,
+    Number,
     Simulation,
     may_tumble,
     version,
 )
+from comparisons.engines.mujoco_contact import IMPEDANCE, contact
+from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.predictions import bounce_error, flight_error
-from scenarios import Scenario, Truth
+from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
-from scenarios.rotations import conjugate, rotate
+from scenarios.rotations import conjugate, cross, rotate
 
-IMPEDANCE = 0.9999  # the largest that MuJoCo takes
-INFINITE_FRICTION = 1e6  # sound with elliptic cones up to 1e9
 DEFAULT_INFINITE_FRICTION = 10.0  # with the pyramidal cones of the default, 1e6 would be no friction and no contact at all
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -41,25 +37,46 @@ INTEGRATORS = {
     "rk4": mujoco.mjtIntegrator.mjINT_RK4,
 }
 FLOOR_QUATERNION = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: the plane's normal from z to y
+NO_SLIP = 1e-3  # m/s; what is left of a slip that friction stops
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
+SOLVER = {"cone": "elliptic", "jacobian": "dense", "diagexact": "enable", "island": "disable", "autoreset": "disable"}
+"""What calibration sets of the solver, by the names that MJCF has for it."""
+
 REASONS = {
-    "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; the default's spring rebounds with 0, whatever is asked for",
+    "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; the default's spring rebounds with 0, whatever is asked",
     "solimp": "the hardest MuJoCo takes, the same at any depth; left at 0.9 to 0.95, 0.5 becomes 0.466 at 0.25 ms, boxes rest 2 mm deep",
     "solreffriction": "stops sliding in a step; left to follow solref a gripping corner's slip is reversed: 0.51 of its angular momentum",
     "condim": "1 without friction, 3 with",
-    "friction": "1e6 where the floor grips; with pyramidal instead of elliptic cones that would be no contact at all",
+    "friction": "as asked; 1e6 where the floor grips",
+    "cone": "friction alike in every direction; with pyramids, a friction of 1e6 would be no contact at all",
+    "jacobian": "what MuJoCo takes for few bodies anyway; said, as version 4.0.0 has a fault in its sparse solver",
+    "diagexact": "the contact's exact inertia, not an estimate; at an impedance of 0.9999 that is 1e-4 of a corner's energy",
+    "island": "one body is one island; looking for it takes a seventh of a step",
+    "autoreset": "a state that breaks down stays broken; MuJoCo would put it back to its start, unnoticed",
 }
 """Effects were measured on a ball dropped from 1 m and boxes on a corner and at rest, restitution 0.5, with the one setting left out."""
+SPRING = "a spring that only pushes, so stiff that it pushes for so many steps and so damped that e is left; its numbers are for this step"
 
 
 class MuJoCo(Engine):
     """MuJoCo with exact restitution: one free body, one explicit contact pair with the floor; or as it comes (profile=default)."""
 
     name = "mujoco"
-    reasons = REASONS
     choices: ClassVar = {"integrator": tuple(INTEGRATORS), "profile": PROFILES}
+    numbers: ClassVar = {"kappa": Number(0.0, 0.0, 1.0), "spring_steps": Number(0.0, 0.0, 1e4)}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        one_of = [option for option in ("kappa", "spring_steps", "profile") if option in self.options]
+        if len(one_of) > 1:
+            raise DropspinError(f"engine {self.label!r}: {' and '.join(one_of)} do not go together; the contact is one of them.")
+
+    @property
+    def reasons(self) -> Mapping[str, str]:  # type: ignore[override]  # they depend on the options
+        """Why each setting is what it is."""
+        return REASONS | ({"solref": SPRING} if "spring_steps" in self.options else {})
 
     @property
     def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
@@ -75,14 +92,19 @@ class MuJoCo(Engine):
         flight = gyroscopic if may_tumble(scene) else SEMI_IMPLICIT_EULER
         if scene.floor is None:
             return flight
-        return f"{flight}, {LATE_IMPACTS}" if self.option("profile") == "calibrated" else None
+        return f"{flight}, {LATE_IMPACTS}" if self._stops_in_a_step else None
+
+    @property
+    def _stops_in_a_step(self) -> bool:
+        """Whether a contact is the damper over one step, and nothing else."""
+        return not {"profile", "kappa", "spring_steps"} & set(self.options)
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """Semi-implicit Euler about a fixed axis; a flat bounce that is noticed late, and loses (1 - d) g dt to the impedance."""
         if self.option("integrator") == "rk4" or self.option("profile") == "default":
             return None
         flight = flight_error(scene, truth, metric, dt, exact_rotation=True)
-        if flight is not None:
+        if flight is not None or not self._stops_in_a_step:
             return flight
         if metric == "restitution_error" and not isinstance(scene.body, Sphere):
             return None  # several contacts share the impedance in a way of their own
@@ -101,25 +123,47 @@ class MuJoCo(Engine):
             return "only spheres and boxes are mapped onto a floor"
         if self.option("profile") == "default":
             return None
-        if self.option("integrator") == "rk4":
-            return "RK4 has no restitution in one step: all its stages see the contact's damper; use integrator=euler on a floor"
-        if not isinstance(floor.friction, str):
-            return "MuJoCo's convex friction cone adds normal velocity where a contact slips; friction is 'none' or 'infinite'"
+        if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
+            return "RK4 has no restitution in one step: all its stages see the contact's damper; use integrator=euler, or spring_steps=20"
+        if floor.restitution == 0.0 and "spring_steps" in self.options:
+            return "a spring that only pushes has no restitution of 0; leave out spring_steps"
         if floor.rest_speed > 0.0:
             return "MuJoCo has no speed below which restitution is 0 (floor.rest_speed)"
         return None
 
+    def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
+        """As Python and as MJCF."""
+        if self.option("profile") == "default" or not can_be_pasted(scene):
+            return {}
+        values = {"engine": "MuJoCo", "dt": dt, "integrator": self.option("integrator"), "solver": SOLVER, "pair": self._pair(scene, dt)}
+        return {
+            "python": rendered("mujoco.py.jinja", scene, why=self.reasons, **values),
+            "mjcf": rendered("mujoco.xml.jinja", scene, **values),
+        }
+
+    def _pair(self, scene: Scenario, dt: float) -> dict[str, Any]:
+        """Settings of the contact, none where there is no floor."""
+        if scene.floor is None:
+            return {}
+        kappa, steps = (float(self.option(name)) for name in ("kappa", "spring_steps"))
+        return contact(scene.floor.restitution, scene.floor.friction, dt, kappa, steps)
+
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return MuJoCoSimulation(scene, dt, self.option("integrator"), self.option("profile"))
+        settings = {name: self.option(name) for name in ("profile", "integrator")}
+        if self.option("profile") == "default":
+            return MuJoCoSimulation(scene, _default_specification(scene, dt, self.option("integrator")), settings)
+        pair = self._pair(scene, dt)
+        return MuJoCoSimulation(scene, _specification(scene, dt, self.option("integrator"), pair), settings | SOLVER | pair)
 
 
 class MuJoCoSimulation(Simulation):
     """A compiled model and its data."""
 
-    def __init__(self, scene: Scenario, dt: float, integrator: str, profile: str) -> None:
-        self.staggered = integrator != "rk4"
-        calibrated = profile == "calibrated"
-        self._model = (_specification if calibrated else _default_specification)(scene, dt, integrator).compile()
+    def __init__(self, scene: Scenario, specification: Any, settings: Mapping[str, Any]) -> None:
+        self._scene = scene
+        self._model = specification.compile()
+        self.staggered = settings["integrator"] != "rk4"
+        self.settings = {"version": version("mujoco"), **settings}
         if scene.damping is not None:
             rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)
             rates[3:] *= np.diag(scene.body.inertia_tensor)
@@ -131,15 +175,6 @@ class MuJoCoSimulation(Simulation):
         self._data.qvel[0:3] = start[7:10]
         self._data.qvel[3:6] = rotate(conjugate(start[3:7]), start[10:13])
         self._steps = 0
-        self.settings = {"version": version("mujoco"), "profile": profile, "integrator": integrator}
-        if scene.floor is not None and calibrated:
-            self.settings |= {
-                "solref": self._model.pair_solref[0].tolist(),
-                "solimp": self._model.pair_solimp[0].tolist(),
-                "solreffriction": self._model.pair_solreffriction[0].tolist(),
-                "condim": int(self._model.pair_dim[0]),
-                "friction": float(self._model.pair_friction[0, 0]),
-            }
 
     def advance(self, steps: int) -> None:
         with _quiet():
@@ -163,7 +198,9 @@ class MuJoCoSimulation(Simulation):
                 positions[row], velocities[row] = qpos, qvel
         self._steps += (len(rows) - 1) * every
         self._raise_if_bad()
-        return _to_world(rows)
+        states = _to_world(rows)
+        self.limits = list(_limits_met(self._scene, states)) if every == 1 and self.settings["profile"] == "calibrated" else []
+        return states
 
     def as_built(self) -> AsBuilt:
         axes = rotate(self._model.body_iquat[1][[1, 2, 3, 0]], np.eye(3))
@@ -174,6 +211,20 @@ class MuJoCoSimulation(Simulation):
         for kind in BAD_STATE:
             if self._data.warning[kind].number > 0:
                 raise Diverged(f"MuJoCo's {kind.name} (a number beyond 1e10 or NaN) within the first {self._steps} steps")
+
+
+def _limits_met(scene: Scenario, states: Array) -> Iterator[str]:
+    """How fast contacts slip that Coulomb friction should slow: of each step, the corners that begin it below the floor."""
+    if scene.floor is None or isinstance(scene.floor.friction, str):
+        return
+    before, after = states[:-1], states[1:]
+    arms = rotate(before[:, None, 3:7], scene.body.vertices) - [0.0, scene.body.rounding, 0.0]
+    touching = before[:, None, 1] + arms[..., 1] <= 0.0
+    velocities = after[:, None, 7:10] + cross(after[:, None, 10:13], arms)
+    slip = float(np.hypot(velocities[..., 0], velocities[..., 2])[touching].max(initial=0.0))
+    if slip > NO_SLIP:
+        added = scene.floor.friction * slip
+        yield f"contacts slip by up to {slip:.3g} m/s, to which MuJoCo's friction cone adds up to µ slip, {added:.3g} m/s of rebound"
 
 
 def _free_body(scene: Scenario, dt: float, integrator: str) -> tuple[Any, Any]:
@@ -207,7 +258,8 @@ def _default_specification(scene: Scenario, dt: float, integrator: str) -> Any:
     return spec
 
 
-def _specification(scene: Scenario, dt: float, integrator: str) -> Any:
+def _specification(scene: Scenario, dt: float, integrator: str, pair: Mapping[str, Any]) -> Any:
+    """The settings of `SOLVER` and of a contact pair; without a pair, neither contacts nor constraints are looked for."""
     spec, body = _free_body(scene, dt, integrator)
     option = spec.option
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -215,10 +267,13 @@ def _specification(scene: Scenario, dt: float, integrator: str) -> Any:
     disable, enable = mujoco.mjtDisableBit, mujoco.mjtEnableBit
     option.disableflags |= disable.mjDSBL_ISLAND
     option.enableflags = enable.mjENBL_DIAGEXACT
-    if scene.floor is None:
-        option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
+    if pair:
+        passive = {"contype": 0, "conaffinity": 0}  # the pair is all there is
+        _add_shape(body, scene, name="shape", **passive)
+        spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **passive)
+        spec.add_pair(geomname1="floor", geomname2="shape", **pair)
     else:
-        _add_contact(spec, body, scene, dt)
+        option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
     return spec
 
 
@@ -236,24 +291,6 @@ def _principal(inertia: Array) -> tuple[Array, Array]:
 
 def _is_diagonal(inertia: Array) -> bool:
     return np.count_nonzero(inertia - np.diag(np.diag(inertia))) == 0
-
-
-def _add_contact(spec: Any, body: Any, scene: Scenario, dt: float) -> None:
-    assert scene.floor is not None
-    _add_shape(body, scene, name="shape", contype=0, conaffinity=0)
-    spec.worldbody.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, contype=0, conaffinity=0
-    )
-    sticking = scene.floor.friction == "infinite"
-    spec.add_pair(
-        geomname1="floor",
-        geomname2="shape",
-        condim=3 if sticking else 1,
-        friction=[INFINITE_FRICTION, INFINITE_FRICTION, 0.0, 0.0, 0.0] if sticking else [0.0] * 5,
-        solref=[0.0, -(1.0 + scene.floor.restitution) / dt],
-        solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
-        solreffriction=[0.0, -1.0 / dt],
-    )
 
 
 def _add_shape(body: Any, scene: Scenario, **properties: Any) -> None:

@@ -6,7 +6,7 @@ reduction that adds penetration to the rebound, and the speed below which restit
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, ClassVar
@@ -26,6 +26,7 @@ from comparisons.engines.base import (
     may_tumble,
     version,
 )
+from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
@@ -40,15 +41,22 @@ FLOOR_HALF_SIZE = 1e3  # m; thick enough that nothing tunnels, and Bullet loses 
 
 REASONS = {
     "coordinates": "maximal: a rebound of e times the approach; a multibody's is e (u + g dt), and its speeds are clamped at 100",
+    "fixedTimeStep": "the step asked for; Bullet's own is 1/240 s",
+    "numSubSteps": "no steps within a step, of which nobody would see the states",
+    "deterministicOverlappingPairs": "contacts in the same order in every run",
+    "restitution": "as asked; Bullet multiplies those of two bodies, and the floor's is 1",
     "solverResidualThreshold": "solves contacts to the end; left at 1e-7 a resting box trembles at 5 mm/s and a corner rebounds 5e-6 off",
     "contactERP": "pushes no depth out; left at 0.08 a resting box trembles at 3 mm/s, and rebounds are faster by the depth over a step",
+    "erp": "as contactERP, for joints",
+    "frictionERP": "as contactERP, for friction",
     "contactSlop": "lets no depth stand",
-    "restitutionVelocityThreshold": "the scene's rest_speed; Bullet drops restitution below 0.2 m/s",
+    "restitutionVelocityThreshold": "as asked, 0 if nothing is; Bullet drops restitution below 0.2 m/s",
     "useSplitImpulse": "keeps what is pushed out of a depth out of the velocities",
+    "splitImpulsePenetrationThreshold": "at any depth",
     "enableConeFriction": "the same friction in every direction; a pyramid's is up to 1.41 times larger",
-    "lateralFriction": f"the scene's; {STRONGEST_FRICTION:g} where the floor grips, which is as much as Bullet takes",
+    "lateralFriction": f"as asked; {STRONGEST_FRICTION:g} where the floor grips, which is as much as Bullet takes",
     "contactProcessingThreshold": "bounces where bodies touch, not before; left as it is 0.5 becomes 0.248 at 1 ms and 0.024 at 0.25 ms",
-    "linearDamping": "1 - exp(-rate) is the scene's decay, 0 none; a multibody's default is 0.04",
+    "linearDamping": "1 - exp(-rate), 0 for none; a multibody's default is 0.04",
     "angularDamping": "as linearDamping",
     "activationState": "never falls asleep",
     "maxJointVelocity": "no clamp of a multibody's speeds, at 100 m/s and 100 rad/s by default",
@@ -112,6 +120,21 @@ class PyBullet(Engine):
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
             return f"Bullet caps friction at {STRONGEST_FRICTION:g}, got {floor.friction:g}"
         return None
+
+    def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
+        """As Python and as URDF, which has the body's part of it."""
+        if self.is_default or not can_be_pasted(scene):
+            return {}
+        moments = np.diag(scene.body.inertia_tensor)[[2, 0, 1]].tolist()
+        sizes = [2.0 * scene.body.half_extents[axis] for axis in (2, 0, 1)] if isinstance(scene.body, Box) else []
+        surface = {**_contact_properties(scene, default=False), **_damping(scene, default=False)}
+        surface |= {"maxJointVelocity": FASTEST} if self.is_multibody else {}
+        parameters = {name: value for name, value in _parameters(scene, dt).items() if name != "fixedTimeStep"}
+        values = {"engine": "PyBullet", "dt": dt, "maximal": not self.is_multibody, "surface": surface}
+        return {
+            "python": rendered("pybullet.py.jinja", scene, why=REASONS, parameters=parameters, floor_half_size=FLOOR_HALF_SIZE, **values),
+            "urdf": rendered("pybullet.urdf.jinja", scene, moments=moments, sizes=sizes, **values),
+        }
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return PyBulletSimulation(scene, dt, default=self.is_default, multibody=self.is_multibody)

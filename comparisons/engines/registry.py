@@ -31,6 +31,9 @@ BUILT_IN = {
         "pybullet",
         "pip install pybullet (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)",
     ),
+    "rapier": _Home("comparisons.engines.rapier_engine", "Rapier", "rapier3d", "pip install 'dropspin[rapier]'"),
+    "dart": _Home("comparisons.engines.dart_engine", "Dart", "dartpy", "pip install 'dropspin[dart]'"),
+    "drake": _Home("comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
 }
 
 

@@ -280,3 +280,36 @@ def test_an_engine_of_another_package(tmp_path):
     assert rows["mujoco"].startswith("MuJoCo with exact restitution")  # nobody takes a name of dropspin's own
     done = subprocess.run([DROPSPIN, "show", "spin-asymmetric", "-e", "flyer"], env=environment, capture_output=True, text=True, check=True)
     assert "version" in done.stdout
+
+
+def test_calibrate(tmp_path):
+    """The table, the settings and the texts; one text alone; all of it as JSON."""
+    asked = ("calibrate", "--restitution", "0.7", "--dt", "0.002")
+    done = dropspin(*asked, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "[0.0, -850.0]" in done.stdout
+    assert "To paste, as mjcf:" in done.stdout
+    alone = dropspin(*asked, "-e", "pybullet", "--as", "urdf", cwd=tmp_path)
+    assert alone.stdout.startswith("<?xml")
+    found = json.loads(dropspin(*asked, "--json", cwd=tmp_path).stdout)
+    assert found["settings"]["solref"] == [0.0, -850.0]
+    assert {one["name"]: one["value"] for one in found["measured"]}["restitution"] == pytest.approx(0.7, abs=1e-4)
+    assert set(found["programs"]) == {"python", "mjcf"}
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--dt", "0.002"], "Missing option '--restitution'"),
+        (["--restitution", "2", "--dt", "0.002"], "2.0 is not in the range"),
+        (["--restitution", "0.5", "--dt", "1"], "dt: got 1.0 s"),
+        (["--restitution", "0.5", "--dt", "0.002", "--friction", "some"], "friction: got 'some'; it is none, infinite or a number"),
+        (["--restitution", "0.5", "--dt", "0.002", "--as", "urdf"], "mujoco's language 'urdf' is unknown"),
+        (["--restitution", "0.5", "--dt", "0.002", "-e", "document"], "document has no settings to calibrate"),
+    ],
+)
+def test_calibrate_what_cannot_be(given, message, tmp_path):
+    done = dropspin("calibrate", *given, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,182 @@
+"""Calibration: the settings that make an engine do what is asked, ready to paste, and what they were measured to do.
+
+What is measured is the very text that is pasted: it is run here, and its motion is looked at.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.engines.base import Engine
+from comparisons.isolation import Cells, Failed, Limits
+from comparisons.phases import PHASES
+from comparisons.simulating import Contestant, assert_step_fits
+from scenarios import DropspinError, Scenario, load
+
+Array = NDArray[np.float64]
+Motion = Callable[[float, int, float], tuple[list[float], list[float]]]
+"""Height of a fall [m], steps and step [s] to heights of the lowest point [m] and vertical speeds [m/s]."""
+Shape = Literal["ball", "box"]
+
+BODIES: Mapping[Shape, Mapping[str, Any]] = {
+    "ball": {"shape": "sphere", "radius": 0.1, "mass": 1.0},
+    "box": {"shape": "box", "half_extents": [0.15, 0.1, 0.25], "mass": 1.0},
+}
+GRAVITY = 9.81
+DROP = 1.0  # m
+IMPACT = math.sqrt(2.0 * GRAVITY * DROP)  # m/s
+LOW_DROP = 0.01  # m
+SETTLING, WATCHED = 5.0, 1.0  # s
+LARGEST_STEP = 0.1  # s, as far as is looked
+LONG = 3.0  # s
+GAIN = 1.02
+"""Of the height of the drop; a body that comes higher has gained energy."""
+FINELY = 1.01
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One figure: what it is, its value and unit, and how it was come by."""
+
+    name: str
+    value: float
+    unit: str
+    how: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What to set, and what comes of it.
+
+    Attributes:
+        engine: The engine's label.
+        settings: By name; what the engine is built with.
+        reasons: Why each of them is what it is.
+        programs: Texts to paste, by language; `python` runs by itself.
+        measured: What that program does.
+    """
+
+    engine: str
+    settings: Mapping[str, Any]
+    reasons: Mapping[str, str]
+    programs: Mapping[str, str]
+    measured: tuple[Measured, ...]
+
+
+def calibrate(
+    engine: Engine,
+    restitution: float,
+    dt: float,
+    friction: str | float = "none",
+    shape: Shape = "ball",
+    limits: Limits = Limits(),  # noqa: B008
+) -> Calibration:
+    """The settings that give a restitution at a time step, measured.
+
+    Args:
+        engine: The engine; its options choose among the ways it has.
+        restitution: From 0 to 1.
+        dt: Time step [s].
+        friction: 'none', 'infinite' or a coefficient.
+        shape: What falls, flat onto a floor.
+        limits: What the measurement may use.
+
+    Raises:
+        DropspinError: The engine has no such settings, or broke down with them.
+    """
+    scene = load(
+        {
+            "name": f"a {shape} on a floor",
+            "duration": LONG,
+            "body": dict(BODIES[shape]),
+            "start": {"position": [0.0, DROP + (0.1 if shape == "ball" else BODIES[shape]["half_extents"][1]), 0.0]},
+            "gravity": {"acceleration": [0.0, -GRAVITY, 0.0]},
+            "floor": {"restitution": restitution, "friction": friction},
+        }
+    )
+    assert_step_fits(scene, dt)
+    refusal = engine.declines(scene)
+    if refusal is not None:
+        raise DropspinError(f"{engine.label} cannot be calibrated for that: {refusal}.")
+    programs = engine.programs(scene, dt)
+    if not programs:
+        raise DropspinError(f"{engine.label} has no settings to calibrate; engines that have are mujoco and pybullet.")
+    with Cells(limits) as cells:
+        try:
+            settings, measured = cells.call(Contestant(engine.label, engine), _measured, scene, dt, programs["python"])
+        except Failed as failure:
+            raise DropspinError(f"{engine.label} broke down with these settings: {failure.reason}.") from None
+    return Calibration(engine.label, settings, engine.reasons, programs, measured)
+
+
+def _measured(contestant: Contestant, scene: Scenario, dt: float, program: str) -> tuple[dict[str, Any], tuple[Measured, ...]]:
+    """What the engine sets, and what a program does."""
+    assert contestant.engine is not None
+    with contestant.engine.prepare(scene, dt) as simulation:
+        settings = dict(simulation.settings)
+    names: dict[str, Any] = {"__name__": "pasted"}
+    exec(compile(program, "pasted", "exec"), names)
+    return settings, tuple(measurements(cast(Motion, names["motion"]), dt))
+
+
+def measurements(motion: Motion, dt: float) -> list[Measured]:
+    """What a falling body does with settings made for a step [s]."""
+    speeds, heights, deepest = _bounces(motion, dt)
+    settling, watched = math.ceil(SETTLING / dt), math.ceil(WATCHED / dt)
+    low, slow = (np.array(values[settling - watched :]) for values in motion(LOW_DROP, settling, dt))
+    half, _, _ = _bounces(motion, dt / 2.0)
+    at_impact = f"over {PHASES} drops from {DROP:g} m, which strike at as many places in a step"
+    at_rest = f"dropped from {1e3 * LOW_DROP:g} mm, in the fifth second"
+    step, how = _largest_step(motion, dt)
+    return [
+        Measured("restitution", float(speeds.mean()), "1", f"speed just after the impact over just before, mean {at_impact}"),
+        Measured("restitution, least", float(speeds.min()), "1", "of those"),
+        Measured("restitution, most", float(speeds.max()), "1", "of those"),
+        Measured("restitution by height", float(heights.mean()), "1", "√(height of the rebound / of the drop), mean of those"),
+        Measured("penetration", deepest, "m", f"deepest of those; the way of a step is {IMPACT * dt:.3g} m there"),
+        Measured("depth at rest", float(-low.mean()), "m", at_rest),
+        Measured("jitter at rest", float(np.ptp(low)), "m", f"highest less lowest, {at_rest}"),
+        Measured("speed at rest", float(np.abs(slow).max()), "m/s", f"greatest, {at_rest}"),
+        Measured("restitution at half the step", float(half.mean()), "1", "with these same settings, which may belong to their step"),
+        Measured("largest stable step", step, "s", how),
+    ]
+
+
+def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
+    """Of drops that strike at as many places in a step: ratios of speeds, roots of ratios of heights, and the greatest depth [m]."""
+    ratios, roots, deepest = [], [], 0.0
+    for part in (np.arange(PHASES) + 0.5) / PHASES:
+        drop = DROP + IMPACT * dt * part
+        # The fall, and as long as the highest rebound takes to its apex; some steps more for those that take several.
+        heights, speeds = map(np.array, motion(drop, math.ceil(2.0 * IMPACT / GRAVITY / dt) + PHASES, dt))
+        down = int(np.argmin(speeds))
+        up = down + int(np.argmax(speeds[down:]))
+        ratios.append(max(0.0, speeds[up]) / -speeds[down])
+        roots.append(math.sqrt(max(0.0, heights[up:].max()) / drop))
+        deepest = max(deepest, -float(heights.min()))
+    return np.array(ratios), np.array(roots), deepest
+
+
+def _largest_step(motion: Motion, dt: float) -> tuple[float, str]:
+    """The largest step with which a body neither gains energy nor sinks, and how that was found."""
+    if not _is_stable(motion, dt):
+        return math.nan, f"it gains energy, or sinks, at {dt:g} s already"
+    sound = dt
+    while (longer := min(2.0**0.25 * sound, LARGEST_STEP)) > sound and _is_stable(motion, longer):
+        sound = longer
+    if sound >= LARGEST_STEP:
+        return LARGEST_STEP, "as far as was looked: it gains no energy and does not sink"
+    unsound = longer
+    while unsound > FINELY * sound:
+        middle = math.sqrt(sound * unsound)
+        sound, unsound = (middle, unsound) if _is_stable(motion, middle) else (sound, middle)
+    return sound, f"with these same settings; beyond, a drop from {DROP:g} m gains energy or ends below the floor"
+
+
+def _is_stable(motion: Motion, dt: float) -> bool:
+    drops = [np.array(motion(DROP + IMPACT * dt * part, math.ceil(LONG / dt), dt)[0]) for part in (0.2, 0.5, 0.8)]
+    return all(bool(np.isfinite(one).all() and one.max() <= GAIN * one[0] and one[-1] > -0.1 * DROP) for one in drops)

@@ -1,0 +1,45 @@
+"""Texts that have an engine's settings, ready to paste: templates, and what they have in common."""
+
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from scenarios import Scenario
+from scenarios.body import Box, Sphere
+
+
+@cache
+def _templates() -> Environment:
+    # Programs and models of our own figures, not pages of anybody's text: nothing to escape.
+    return Environment(loader=PackageLoader(__name__, "."), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False)
+
+
+def rendered(template: str, scene: Scenario, **values: Any) -> str:
+    """The text of a template for a ball or a flat box that falls onto a floor; in it, z is up."""
+    assert scene.floor is not None
+    body = scene.body
+    if isinstance(body, Sphere):
+        shape, extents = "ball", [body.radius]
+    else:
+        assert isinstance(body, Box)
+        shape, extents = "box", [body.half_extents[axis] for axis in (2, 0, 1)]
+    text = (
+        _templates()
+        .get_template(template)
+        .render(
+            shape=shape,
+            extents=extents,
+            lowest=extents[-1],
+            mass=body.mass,
+            gravity=-scene.acceleration[1],
+            restitution=scene.floor.restitution,
+            **values,
+        )
+    )
+    return text
+
+
+def can_be_pasted(scene: Scenario) -> bool:
+    """Whether the templates know the scene: a ball or a box on a floor, under gravity along -y."""
+    return scene.floor is not None and isinstance(scene.body, (Sphere, Box)) and scene.acceleration[1] < 0.0 == any(scene.acceleration[::2])

@@ -1,0 +1,119 @@
+"""The engine `rapier`: the scene as meant, by settings that Rapier has but does not default to; in single precision.
+
+Rapier solves a step's contacts as if nothing bounced; one pass over them then turns each new contact's normal velocity v into -e v.
+So one contact rebounds exactly, several at once undo one another, and friction does not answer the rebound.
+"""
+
+import os
+from functools import cache
+from typing import Any
+
+import numpy as np
+import rapier3d
+from scipy.spatial.transform import Rotation
+
+from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, may_tumble, version
+from comparisons.predictions import spins_steadily
+from scenarios import Scenario
+from scenarios.body import Box, Sphere
+from scenarios.rotations import rotate
+
+FRICTION = {"none": 0.0, "infinite": 1e6}
+LARGEST = float(np.finfo(np.float32).max)
+FIRST_PROCESS = cache(os.getpid)  # to simulate; Rapier's threads, which all worlds share, are started there
+PARAMETERS = {
+    "num_solver_iterations": (1, "substeps; at the default 4 velocity lags by an eighth of a step, a ball gains 1.7e-3 of its energy"),
+    "num_internal_pgs_iterations": (50, "for positions; at 1 a turning box on a rough floor errs by 1e-4 in energy, not 8e-6"),
+    "num_internal_stabilization_iterations": (50, "for velocities; with 1 of both a gripping corner goes on down at 1.4 of 3.8 m/s"),
+    "normalized_max_corrective_velocity": (LARGEST, "back onto the floor in one step, apart from the velocity; 3 m/s by default"),
+    "static_contact_softness": ((1e9, 1.0), "Hz, damping ratio; at 60 Hz a bounce errs by 4.6e-3, not 8e-4, boxes rest 0.1 mm deep"),
+    "normalized_max_linear_velocity": (LARGEST, "no clamp of the speed, at 400 m/s by default"),
+    "friction_in_bias_pass": (True, "positions feel friction too; without, a rocking block gains 3.7e-5 of its energy, not 4e-6"),
+    "max_ccd_substeps": (0, "nothing is swept ahead of its step; over a half-space, which nothing passes, it makes no difference"),
+}
+REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
+    "normalized_prediction_distance": "a step's fall; at 0 turning on a rough floor errs by 0.19 rad, not 5e-3; at 2 cm landings by 1.5%",
+    "gyroscopic_forces": "not in steady flight, where there are none, and rounding L = I ω and back adds 1.2e-4 of it in 1000 steps",
+    "allow_fast_rotation": "no clamp of the spin, at π/4 a step by default",
+    "linear_damping": "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which is then the scene's decay; so angular_damping",
+    "friction": f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution: Rapier takes the average",
+}
+"""Effects were measured at 1 ms with the one setting left out."""
+
+
+class Rapier(Engine):
+    """Rapier's rigid body on a half-space."""
+
+    name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
+
+    def declines(self, scene: Scenario) -> str | None:
+        """What Rapier has no setting for."""
+        body, floor = scene.body, scene.floor
+        if floor is not None and not isinstance(body, (Sphere, Box)):
+            return "only spheres and boxes are mapped onto a floor"
+        if floor is not None and floor.rest_speed > 0.0:
+            return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
+        if floor is None or floor.restitution == 0.0:
+            return None
+        if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):
+            return "Rapier's friction does not answer the rebound; a rough floor needs restitution 0, or a ball that it grips"
+        heights = rotate(np.array(scene.start.orientation), body.vertices)[:, 1]
+        tied = np.count_nonzero(heights <= heights.min() + 1e-6 * body.size) > 1
+        if tied and scene.starts_above_floor and not any(scene.start.angular_velocity[::2]):
+            return "Rapier's contacts rebound one after another, once, each undoing those before; here several corners land at once"
+        return None
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return RapierSimulation(scene, dt)
+
+
+class RapierSimulation(Simulation):
+    """A world of its own."""
+
+    staggered = True
+
+    def __init__(self, scene: Scenario, dt: float) -> None:
+        start, body, floor, inertia = scene.initial_state, scene.body, scene.floor, scene.body.inertia_tensor
+        self._world = rapier3d.PhysicsWorld(gravity=scene.acceleration)
+        if FIRST_PROCESS() != os.getpid():  # forked, it has none of those threads, and would wait for them for ever
+            self._world.set_num_threads(1)
+        parameters: dict[str, Any] = {name: value for name, (value, _) in PARAMETERS.items()}
+        parameters |= {"dt": dt, "normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
+        for name, value in parameters.items():
+            setattr(self._world.integration_parameters, name, rapier3d.SpringCoefficients(*value) if isinstance(value, tuple) else value)
+        gyroscopic = may_tumble(scene) and (floor is not None or not spins_steadily(scene))
+        dynamics: dict[str, Any] = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic}
+        for motion, rate in scene.damping.model_dump().items() if scene.damping else ():
+            dynamics[f"{motion}_damping"] = float(np.expm1(rate * dt)) / dt
+        skew = np.count_nonzero(inertia - np.diag(np.diag(inertia)))
+        moments, axes = np.linalg.eigh(inertia) if skew else (np.diag(inertia).copy(), np.eye(3))
+        frame = Rotation.from_matrix(axes * np.linalg.det(axes)).as_quat()
+        moving = rapier3d.RigidBody.dynamic(**dynamics).position((start[0:3], start[3:7])).linvel(start[7:10]).angvel(start[10:13])
+        moving = moving.additional_mass_properties(rapier3d.MassProperties(np.zeros(3), body.mass, moments, frame))
+        handle, surface = self._world.add_body(moving), {}
+        if floor is not None:
+            surface = {"restitution": floor.restitution, "friction": FRICTION.get(str(floor.friction), floor.friction)}
+            shape = rapier3d.SharedShape.ball(body.size) if isinstance(body, Sphere) else rapier3d.SharedShape.cuboid(*body.vertices.max(0))
+            self._world.add_collider(rapier3d.Collider.new(shape, density=0.0, **surface), handle)
+            self._world.add_collider(rapier3d.Collider.halfspace((0.0, 1.0, 0.0), **surface))
+        self._body = self._world.rigid_bodies[handle]
+        self._body.recompute_mass_properties_from_colliders(self._world.colliders)  # else it has none until the first step
+        self.settings = {"version": version("rapier3d"), **parameters, **dynamics, **surface}
+
+    def advance(self, steps: int) -> None:
+        for _ in range(steps):
+            self._world.step()
+        if not self._body.is_enabled:
+            raise Diverged("Rapier put the body out of action: its state is not finite")
+
+    def state(self) -> Array:
+        x, q, v, w = self._body.translation, self._body.rotation, self._body.linvel, self._body.angvel
+        return np.array([x.x, x.y, x.z, q.i, q.j, q.k, q.w, v.x, v.y, v.z, w.x, w.y, w.z])
+
+    def as_built(self) -> AsBuilt:
+        built = self._body.mass_properties
+        axes = Rotation.from_quat(built.principal_inertia_local_frame.to_tuple()).as_matrix()
+        return AsBuilt(built.mass, axes @ np.diag(built.principal_inertia.to_tuple()) @ axes.T, np.array(self._world.gravity.to_tuple()))
+
+    def close(self) -> None:
+        del self._body, self._world

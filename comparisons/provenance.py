@@ -1,11 +1,13 @@
 """Where figures come from: versions, machine, commit, time."""
 
+import hashlib
+import json
 import os
 import platform
 import subprocess
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:
         "asked": dict(asked),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": versions(),
+        "wheels": {package: tag for package in STAMPED if (tag := _wheel(package))},
         "python": platform.python_version(),
         "platform": platform.platform(),
         "cpu": processor(),
@@ -46,6 +49,21 @@ def _version(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
+
+
+def _wheel(package: str) -> str | None:
+    """What a package was built for, such as cp311-cp311-manylinux_2_28_x86_64."""
+    try:
+        told = distribution(package).read_text("WHEEL") or ""
+    except PackageNotFoundError:
+        return None
+    tags = [line.removeprefix("Tag: ") for line in told.splitlines() if line.startswith("Tag: ")]
+    return ", ".join(tags) or None
+
+
+def digest(settings: Mapping[str, Any]) -> str:
+    """A short hash of settings: two runs with equal ones had the engine set alike."""
+    return hashlib.sha256(json.dumps(settings, sort_keys=True, default=str).encode()).hexdigest()[:12]
 
 
 def _commit() -> str | None:

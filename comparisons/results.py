@@ -1,12 +1,13 @@
 """What a run gives: the table, the trajectories, and where they come from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import pandas as pd
 
 from comparisons.ensembles import Outcome
+from comparisons.provenance import digest
 from comparisons.verdicts import BREAKDOWNS, FAILURES
 from scenarios import Scenario, Trajectory
 
@@ -69,6 +70,23 @@ class Results:
         if verdicts.isin(BREAKDOWNS).any() or missing.any():
             return 3
         return int(verdicts.isin(FAILURES).any())
+
+
+def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
+    """One run of the runs of its scenes, in order; settings are collected in the provenance."""
+    settings: dict[str, dict[str, Any]] = {}
+    for part in parts:
+        for engine, stamped in part.provenance["settings"].items():
+            settings.setdefault(engine, {}).update(stamped)
+    digests = {engine: digest(stamped) for engine, stamped in settings.items()}
+    return Results(
+        pd.concat([part.frame for part in parts], ignore_index=True),
+        dict(item for part in parts for item in part.scenes.items()),
+        parts[0].engines,
+        dict(item for part in parts for item in part.trajectories.items()),
+        dict(item for part in parts for item in part.ensembles.items()),
+        {**provenance, "settings": settings, "settings_digests": digests},
+    )
 
 
 def as_frame(rows: list[dict[str, Any]]) -> pd.DataFrame:

@@ -1,22 +1,23 @@
 """The main job: scenes × engines × time steps, measured against truth and against each other, and judged."""
 
-from collections.abc import Callable, Sequence
-from itertools import combinations
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 
 from comparisons.agreement import agreement_rows
 from comparisons.comparison import Comparison, Unresolved
-from comparisons.engines.base import Engine
+from comparisons.engines.base import Engine, calibrated_label
 from comparisons.ensembles import Outcome, ensemble_rows
 from comparisons.isolation import Cells, Limits
 from comparisons.metrics import Average, Metric, metrics_for
 from comparisons.phases import Phase, start_phases
 from comparisons.predictions import prediction_rows
 from comparisons.provenance import provenance
-from comparisons.results import Results, TrajectoryKey, as_frame
-from comparisons.simulating import Attempt, assert_step_fits, contestant_named
+from comparisons.results import Results, TrajectoryKey, as_frame, joined
+from comparisons.simulating import Attempt, Contestant, assert_step_fits, contestant_named
 from comparisons.studies import Claim, blame_settings, study_rows
 from comparisons.verdicts import assert_expectations_can_be_judged, excused, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
@@ -33,6 +34,8 @@ def run(
     dts: Sequence[float] = DEFAULT_DTS,
     progress: Progress = lambda scene, engine, dt: None,
     limits: Limits = Limits(),  # noqa: B008 - it cannot be changed
+    keep: Callable[[Results], None] = lambda part: None,
+    done: Iterable[Results] = (),
 ) -> Results:
     """Run every scene through every engine at every step, measure, and judge.
 
@@ -42,6 +45,8 @@ def run(
         dts: Time steps [s].
         progress: Called with scene, engine and step after each of len(scenes) * len(engines) * len(dts) pieces of work.
         limits: What an engine may use for one of these pieces; each engine works in a process of its own.
+        keep: Called with the results of each scene as soon as it is done.
+        done: Results of scenes from an earlier run. Those that were asked for in the same way, of the same versions, are not run again.
 
     Raises:
         DropspinError: Something was asked for that cannot be: an unknown engine, a step that is no step, equal names.
@@ -52,46 +57,66 @@ def run(
     _assert_sensible(scenes, truths, dts, labels)
     if len(set(labels)) < len(labels):
         raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
-    asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)}
-    stamp = provenance(asked)
+    stamp = provenance({"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)})
+    earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if _is_the_same(part.provenance, stamp)}
+    parts = []
+    with Cells(limits) as cells:
+        for scene, truth in zip(scenes, truths, strict=True):
+            if scene.model_dump_json() in earlier:
+                parts.append(replace(earlier[scene.model_dump_json()], scenes={scene.name: scene}))
+                for contestant, dt in product(contestants, dts):
+                    progress(scene.name, contestant.label, dt)
+                continue
+            parts.append(_run_scene(Phase(scene, truth), contestants, dts, cells, progress, stamp))
+            keep(parts[-1])
+    return joined(parts, stamp)
+
+
+def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
+    """Whether two runs had the same engines, steps, versions and machine."""
+    asked = all(earlier["asked"][what] == stamp["asked"][what] for what in ("engines", "dts"))
+    return asked and all(earlier[what] == stamp[what] for what in ("versions", "python", "cpu"))
+
+
+def _run_scene(
+    written: Phase, contestants: Sequence[Contestant], dts: Sequence[float], cells: Cells, progress: Progress, stamp: Mapping[str, Any]
+) -> Results:
+    scene, truth = written
+    labels = tuple(contestant.label for contestant in contestants)
     rows: list[Row] = []
+    measured: dict[str, list[Row]] = {label: [] for label in labels}
+    claims: dict[str, Claim] = {}
     trajectories: dict[TrajectoryKey, Trajectory] = {}
     ensembles: dict[TrajectoryKey, Outcome] = {}
     settings: dict[str, dict[str, Any]] = {}
-    with Cells(limits) as cells:
-        for scene, truth in zip(scenes, truths, strict=True):
-            measured: dict[str, list[Row]] = {label: [] for label in labels}
-            claims: dict[str, Claim] = {}
-            for dt in dts:
-                phases = start_phases(scene, truth, dt)
-                attempts: list[Attempt] = []
-                for contestant in contestants:
-                    attempt = cells.attempt(contestant, scene, dt, phases)
-                    if attempt.motion is not None:
-                        trajectories[scene.name, contestant.label, dt] = attempt.motion
-                        settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
-                    measured[contestant.label] += _truth_rows(Phase(scene, truth), dt, attempt, phases)
-                    rows += prediction_rows(scene, truth, contestant.label, dt, attempt.predicted)
-                    attempts.append(attempt)
-                    if contestant.engine is not None and attempt.motion is not None:
-                        earlier = claims[contestant.label].limits if contestant.label in claims else ()
-                        limits_met = tuple(dict.fromkeys([*earlier, *attempt.limits]))
-                        claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision, limits_met)
-                    if attempt.outcome is not None:
-                        ensembles[scene.name, contestant.label, dt] = attempt.outcome
-                        rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
-                    progress(scene.name, contestant.label, dt)
-                for first, second in combinations(attempts, 2):
-                    rows += agreement_rows(Phase(scene, truth), dt, first, second, phases)
-            studies = {label: study_rows(scene, claim, measured[label]) for label, claim in claims.items()}
-            for contestant in contestants:
-                own = measured[contestant.label] + studies.get(contestant.label, [])
-                twin = contestant.engine.calibrated_label if contestant.engine is not None else None
-                if twin in studies:
-                    blame_settings(own, studies[twin])
-                rows += own
-    by_name = {scene.name: scene for scene in scenes}
-    return Results(as_frame(rows), by_name, tuple(labels), trajectories, ensembles, stamp | {"settings": settings})
+    for dt in dts:
+        phases = start_phases(scene, truth, dt)
+        attempts: list[Attempt] = []
+        for contestant in contestants:
+            attempt = cells.attempt(contestant, scene, dt, phases)
+            measured[contestant.label] += _truth_rows(written, dt, attempt, phases)
+            rows += prediction_rows(scene, truth, contestant.label, dt, attempt.predicted)
+            if contestant.engine is not None and attempt.motion is not None:
+                trajectories[scene.name, contestant.label, dt] = attempt.motion
+                settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
+                earlier = claims[contestant.label].limits if contestant.label in claims else ()
+                met = tuple(dict.fromkeys([*earlier, *attempt.limits]))
+                claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision, met)
+            if attempt.outcome is not None:
+                ensembles[scene.name, contestant.label, dt] = attempt.outcome
+                rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
+            attempts.append(attempt)
+            progress(scene.name, contestant.label, dt)
+        for first, second in combinations(attempts, 2):
+            rows += agreement_rows(written, dt, first, second, phases)
+    studies = {label: study_rows(scene, claim, measured[label]) for label, claim in claims.items()}
+    for label in labels:
+        own = measured[label] + studies.get(label, [])
+        twin = calibrated_label(label)
+        if twin in studies:
+            blame_settings(own, studies[twin])
+        rows += own
+    return Results(as_frame(rows), {scene.name: scene}, labels, trajectories, ensembles, {**stamp, "settings": settings})
 
 
 def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:

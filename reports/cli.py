@@ -28,10 +28,12 @@ def main() -> None:
     # SIGTERM like Ctrl-C, so that nothing unfinished is left behind.
     for one in (signal.SIGINT, signal.SIGTERM):
         signal.signal(one, _interrupt)
+    sys.unraisablehook = _tell_unless_interrupted
     try:
         sys.exit(_run())
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("dropspin: interrupted; nothing was written.", err=True)
+    except (click.Abort, KeyboardInterrupt) as interrupt:
+        told = (interrupt.__cause__ or interrupt).args  # click has one of its own for the interrupts of commands
+        click.echo(f"dropspin: interrupted; {told[0] if told else 'nothing was written'}.", err=True)
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # the reader has gone; Python would flush into the void at exit
@@ -51,6 +53,12 @@ _interrupts: list[int] = []
 def _interrupt(number: int, frame: object) -> None:
     _interrupts.append(number)
     raise KeyboardInterrupt
+
+
+def _tell_unless_interrupted(found: "sys.UnraisableHookArgs") -> None:
+    """Say what went wrong where nothing can be raised; an interrupt that came there is not lost, see `_stop_if_interrupted`."""
+    if not isinstance(found.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(found)
 
 
 def _stop_if_interrupted() -> None:
@@ -111,9 +119,16 @@ def dropspin() -> None:
     metavar="SECONDS",
     help="Processor time that an engine may take for one scene at one step.",
 )
+@click.option("--resume", is_flag=True, help="Go on with a run that was interrupted: measured scenes are not run again.")
 @as_json
 def run(
-    scenes: tuple[str, ...], engines: tuple[str, ...], dts: tuple[float, ...], output: str, time_limit: float, json_output: bool
+    scenes: tuple[str, ...],
+    engines: tuple[str, ...],
+    dts: tuple[float, ...],
+    output: str,
+    time_limit: float,
+    resume: bool,
+    json_output: bool,
 ) -> int:
     """Run scenes through engines, side by side, and write the report.
 
@@ -125,26 +140,35 @@ def run(
     import comparisons
     import reports
     import scenarios
-    from reports.folder import fill, run_folder
+    from reports.folder import Measured, fill, run_folder
     from reports.terminal import progress_bar, status
 
     everything = map(scenarios.load, scenarios.names())
     loaded = [scenarios.load(name) for name in scenes] if scenes else [scene for scene in everything if "core" in scene.tags]
     chosen = engines or CORE_ENGINES
     steps = dts or comparisons.DEFAULT_DTS
-    with run_folder(output) as folder:
-        with progress_bar(len(loaded) * len(chosen) * len(steps)) as progress:
+    measured = Measured(output)
+    try:
+        with run_folder(output) as folder:
+            if not resume:
+                measured.clear()
+            with progress_bar(len(loaded) * len(chosen) * len(steps)) as progress:
 
-            def told(scene: str, engine: str, dt: float) -> None:
-                _stop_if_interrupted()
-                progress(scene, engine, dt)
+                def told(scene: str, engine: str, dt: float) -> None:
+                    _stop_if_interrupted()
+                    progress(scene, engine, dt)
 
-            results = comparisons.run(loaded, chosen, steps, told, comparisons.Limits(processor_time=time_limit))
-        _stop_if_interrupted()
-        if not json_output:
-            reports.print_table(results)
-        with status("writing the report"):
-            fill(results, folder)
+                limits = comparisons.Limits(processor_time=time_limit)
+                results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
+            _stop_if_interrupted()
+            if not json_output:
+                reports.print_table(results)
+            with status("writing the report"):
+                fill(results, folder)
+    except KeyboardInterrupt:
+        kept = len(measured.parts())
+        raise KeyboardInterrupt(f"{kept} of {len(loaded)} scenes are kept, --resume goes on" if kept else "nothing was written") from None
+    measured.clear()
     if json_output:
         rows = [
             {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in row.items()}

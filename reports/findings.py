@@ -1,10 +1,12 @@
 """What a run found, in words and counts; the one place that reports agree on."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
 from comparisons import Results
+from comparisons.engines.base import calibrated_label
 from comparisons.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 
 NEGLIGIBLE = 1e-4
@@ -61,6 +63,60 @@ def lasting_errors(results: Results, cause: str) -> dict[str, list[str]]:
     }
 
 
+@dataclass(frozen=True)
+class ProfileComparison:
+    """An engine with its defaults beside the same engine, calibrated.
+
+    Attributes:
+        engine: Label of the one with its defaults.
+        calibrated: Label of the other.
+        rows: Errors of both at the finest step; `part` is how much of the first one the calibrated engine does not have.
+    """
+
+    engine: str
+    calibrated: str
+    rows: list[dict[str, Any]]
+
+    @property
+    def sentence(self) -> str:
+        """In one sentence."""
+        parts = sorted(row["part"] for row in self.rows)
+        half = parts[len(parts) // 2]
+        return (
+            f"{self.engine}: of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest step, {sum(part > 0.5 for part in parts)} "
+            f"are mostly the settings'; in the median {100 * half:.1f} % of an error."
+        )
+
+
+def profile_comparisons(results: Results) -> list[ProfileComparison]:
+    """For each engine that was run with its defaults and calibrated: how much of the error was the setting."""
+    frame = results.measurements
+    truths = frame[(frame["kind"] == "truth") & frame["value"].notna()]
+    found = []
+    for engine in results.engines:
+        twin = calibrated_label(engine)
+        if twin not in results.engines:
+            continue
+        finest = truths[truths["dt"] == truths["dt"].min()].set_index(["scene", "metric"])
+        mine, other = (finest[finest["engine"] == label] for label in (engine, twin))
+        both = mine.join(other["value"].rename("calibrated"), how="inner")
+        worth = both[both["value"].abs() > NEGLIGIBLE].reset_index()
+        rows = [
+            {
+                "scene": row["scene"],
+                "metric": row["metric"],
+                "unit": row["unit"],
+                "default": row["value"],
+                "calibrated": row["calibrated"],
+                "part": max(0.0, 1.0 - abs(row["calibrated"]) / abs(row["value"])),
+            }
+            for row in worth.to_dict("records")
+        ]
+        if rows:
+            found.append(ProfileComparison(engine, twin, rows))
+    return found
+
+
 def orders(results: Results, scene: str, engine: str) -> tuple[float, float] | None:
     """The least and the largest order at which an engine's errors vanish in a scene; None if none does at a clear order."""
     frame = results.frame
@@ -108,4 +164,4 @@ def finding_sentences(results: Results) -> list[str]:
         if total and not stuck and not settings[engine]:
             where = f"in all {total} scenes " if total > 1 else ""
             sentences.append(f"{engine}: {where}no error above {NEGLIGIBLE:g} stays as the step goes to 0.")
-    return sentences
+    return sentences + [comparison.sentence for comparison in profile_comparisons(results)]

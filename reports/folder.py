@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from comparisons import Results
-from comparisons.store import save
+from comparisons.store import restore, save
 from reports.html import PLOTS, html_report, markdown_report, svg_plots
 from scenarios import DropspinError
 
@@ -74,6 +74,33 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
         for parent in made:
             with suppress(OSError):  # it holds the run, or somebody else's
                 parent.rmdir()
+
+
+class Measured:
+    """The scenes of a run that are measured already, on disk beside the folder that the run will have.
+
+    A run that is interrupted, or killed, leaves them there; one that ends well does not.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        target = Path(os.path.realpath(folder))
+        self._path = target.with_name(f".{target.name[:100]}-measured")
+
+    def keep(self, part: Results) -> None:
+        """Write a scene's results, whole or not at all."""
+        [scene] = part.scenes
+        self._path.mkdir(exist_ok=True)
+        unfinished = Path(tempfile.mkdtemp(prefix="unfinished-", dir=self._path))
+        save(part, unfinished)
+        unfinished.rename(self._path / f"{len(list(self._path.iterdir())):03d}-{part.scenes[scene].digest}")
+
+    def parts(self) -> list[Results]:
+        """What there is, in no order."""
+        return [restore(path) for path in sorted(self._path.glob("[0-9]*"))]
+
+    def clear(self) -> None:
+        """Forget it."""
+        shutil.rmtree(self._path, ignore_errors=True)
 
 
 def _umask() -> int:

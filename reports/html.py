@@ -12,7 +12,17 @@ from markupsafe import Markup
 from comparisons import ENSEMBLE_METRICS, METRICS, Results
 from reports import numbers
 from reports.colours import engine_colours
-from reports.findings import NEGLIGIBLE, STUDIES, counts, failures, finding_sentences, lasting_errors, verdict_sentence, worst_verdicts
+from reports.findings import (
+    NEGLIGIBLE,
+    STUDIES,
+    counts,
+    failures,
+    finding_sentences,
+    lasting_errors,
+    profile_comparisons,
+    verdict_sentence,
+    worst_verdicts,
+)
 from reports.plots import convergence_figure, ensemble_figure, time_figure
 from reports.svg import svg
 from scenarios import Scenario, truth_for
@@ -78,6 +88,7 @@ def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
         "matrix": {name: {engine: worst.get((name, engine), "missing") for engine in results.engines} for name in results.scenes},
         "stuck": {"model error": lasting_errors(results, "model"), "setting": lasting_errors(results, "setting")},
         "negligible": NEGLIGIBLE,
+        "profiles": profile_comparisons(results),
         "failures": [_row(row) for row in failures(results).itertuples()],
         "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,

@@ -112,6 +112,16 @@ def may_tumble(scene: Scenario) -> bool:
     return bool(np.ptp(moments) > 1e-12 * moments[-1]) and (any(scene.start.angular_velocity) or scene.floor is not None)
 
 
+def calibrated_label(label: str) -> str | None:
+    """The label of the same engine, calibrated, of the label of one that has its defaults; else None."""
+    name, _, listed = label.removesuffix("]").partition("[")
+    options = listed.split(",")
+    if "profile=default" not in options:
+        return None
+    left = ",".join(option for option in options if option != "profile=default")
+    return f"{name}[{left}]" if left else name
+
+
 @dataclass(frozen=True)
 class Engine:
     """An engine with its options.
@@ -169,13 +179,6 @@ class Engine:
         """The canonical name: `name[option=value,…]`, options sorted, defaults left out."""
         listed = ",".join(f"{key}={value}" for key, value in self.options.items())
         return f"{self.name}[{listed}]" if listed else self.name
-
-    @property
-    def calibrated_label(self) -> str | None:
-        """The label of the same engine, calibrated, where this one has its defaults; else None."""
-        if self.options.get("profile") != "default":
-            return None
-        return type(self)({key: value for key, value in self.options.items() if key != "profile"}).label
 
     def order_in(self, scene: Scenario) -> float | None:
         """The order claimed for a scene's errors: `order` in free flight, none where there is a floor to hit."""

@@ -7,7 +7,9 @@ import pytest
 
 import comparisons
 from comparisons import engine, simulate
-from scenarios import DropspinError, load
+from comparisons.engines.base import calibrated_label
+from scenarios import DropspinError, Trajectory, load, truth_for
+from scenarios.mechanics import kinetic_energy
 
 U = math.sqrt(2 * 9.81)
 
@@ -50,6 +52,29 @@ def test_pybullet_s_default_restitution_vanishes_with_the_step():
     assert apparent("pybullet[profile=default]", 0.95, 1 / 4000) < 0.04
 
 
+@pytest.mark.parametrize("name", ["mujoco", "pybullet"])
+@pytest.mark.parametrize("friction", ["none", "infinite"])
+def test_a_tilted_box_keeps_the_energy_of_a_rigid_impact(name, friction):
+    """Kinetic energy just after the first impact over that of the closed form: 1 to .2 % at 1/4000 s (measured 1.0002 to 1.0006)."""
+    scene = load(
+        {
+            "name": "tilted",
+            "duration": 0.5,
+            "body": {"shape": "box", "half_extents": [0.1, 0.15, 0.25], "mass": 1.0},
+            "start": {"position": [0.0, 1.2, 0.0], "orientation": [0.2, 0.1, 0.3, 0.9]},
+            "gravity": {"acceleration": [0.0, -9.81, 0.0]},
+            "floor": {"restitution": 0.5, "friction": friction},
+        }
+    )
+    impact = truth_for(scene).events[0]
+    dt = 1 / 4000
+    motion = simulate(scene, name, dt)
+    after = math.ceil(impact.time / dt)
+    exact = kinetic_energy(scene, Trajectory.from_states(np.zeros(1), impact.after[None]))[0]
+    assert kinetic_energy(scene, motion[after : after + 1])[0] == pytest.approx(exact, rel=2e-3)
+    assert kinetic_energy(scene, motion)[after - 1] > 1.4 * exact
+
+
 def test_mujoco_has_no_restitution_by_default():
     """The same whatever is asked for, and next to none."""
     for dt in (1 / 240, 1e-3):
@@ -79,9 +104,9 @@ def test_what_the_note_lacks_is_no_setting():
 
 def test_profiles_and_coordinates():
     """Labels, the calibrated twin, and what does not go together."""
-    assert engine("pybullet[profile=default]").calibrated_label == "pybullet"
-    assert engine("mujoco[integrator=implicitfast,profile=default]").calibrated_label == "mujoco[integrator=implicitfast]"
-    assert engine("mujoco").calibrated_label is None
+    assert calibrated_label("pybullet[profile=default]") == "pybullet"
+    assert calibrated_label("mujoco[integrator=implicitfast,profile=default]") == "mujoco[integrator=implicitfast]"
+    assert calibrated_label("mujoco") is calibrated_label("mujoco[kappa=0.002]") is None
     assert engine("pybullet[profile=calibrated]").label == "pybullet"
     with pytest.raises(DropspinError, match="profile=default has the coordinates of the default"):
         engine("pybullet[coordinates=multibody,profile=default]")

@@ -165,6 +165,66 @@ def test_interrupted_runs_leave_nothing(how, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def rows_of(folder):
+    with (folder / "results.csv").open(newline="") as file:
+        return [{key: value for key, value in row.items() if key != "time_per_step"} for row in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_interrupted_runs_go_on(how, tmp_path):
+    """What is measured is kept, scene by scene; with --resume only the rest is run, and the table is as if nothing had happened."""
+    asked = ["run", "spin-principal", "fall-spin", "drop-ball", "-e", "document", "-e", "mujoco"]
+    whole = dropspin(*asked, "-o", "whole", cwd=tmp_path)
+    assert whole.returncode == 0
+    process = subprocess.Popen([DROPSPIN, *asked, "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while "drop-ball" not in process.stderr.readline():
+        pass
+    process.send_signal(how)
+    _, errors = process.communicate(timeout=60)
+    if how == signal.SIGINT:
+        assert process.returncode == 130
+        assert "2 of 3 scenes are kept, --resume goes on" in errors
+    kept = tmp_path / ".part-measured"
+    assert len(list(kept.glob("[0-9]*"))) == 2
+    stamps = [path.stat().st_mtime_ns for path in sorted(kept.glob("[0-9]*/run.json"))]
+    resumed = subprocess.Popen(
+        [DROPSPIN, *asked, "-o", "part", "--resume"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    while "drop-ball" not in resumed.stderr.readline():
+        pass
+    assert [path.stat().st_mtime_ns for path in sorted(kept.glob("[0-9]*/run.json"))][:2] == stamps
+    told, errors = resumed.communicate(timeout=120)
+    assert resumed.returncode == 0, errors
+    assert "All" in told
+    assert rows_of(tmp_path / "part") == rows_of(tmp_path / "whole")
+    assert not kept.exists()
+
+
+def test_resume_runs_again_what_was_asked_differently(tmp_path):
+    """Other steps, another scene of the same name: nothing of an earlier run is taken for it."""
+    import comparisons
+    from reports.folder import Measured
+
+    scene = scenarios.load("spin-principal")
+    earlier = comparisons.run([scene], ["document"], [4e-3])
+    Measured(tmp_path / "run").keep(earlier)
+    [part] = Measured(tmp_path / "run").parts()
+    ran = []
+
+    def count(scene, engine, dt):
+        ran.append(dt)
+
+    def runs_again(scene, engines, dts):
+        kept = []
+        comparisons.run([scene], engines, dts, count, keep=kept.append, done=[part])
+        return len(kept) == 1
+
+    assert not runs_again(scene, ["document"], [4e-3])
+    assert runs_again(scene, ["document"], [2e-3])
+    assert runs_again(scene, ["mujoco"], [4e-3])
+    assert runs_again(scene.model_copy(update={"duration": 0.5}), ["document"], [4e-3])
+
+
 def test_an_interrupt_that_is_swallowed_still_stops_the_run(tmp_path, monkeypatch):
     """A callback of an engine or of the compiler may eat the exception; the next step of the run notices."""
     from click.testing import CliRunner

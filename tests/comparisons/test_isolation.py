@@ -60,6 +60,10 @@ def shout():
     sys.stdout.write("garbage")
 
 
+def fail():
+    raise RuntimeError("no")
+
+
 def interrupt():
     raise KeyboardInterrupt
 
@@ -86,6 +90,7 @@ def breaking(what):
         (allocate, "crashed", "MemoryError"),
         (leave, "crashed", "its process ended with exit code 7"),
         (interrupt, "crashed", "KeyboardInterrupt"),
+        (fail, "crashed", "RuntimeError: no"),
     ],
 )
 def test_whatever_an_engine_does_costs_its_own_row(what, verdict, reason):
@@ -134,14 +139,14 @@ def test_processor_time_is_counted_anew_for_each_piece_of_work():
 
 
 def test_runs_of_good_and_bad_leave_nothing_behind():
-    """No process, and no file where temporary files go; in an interpreter of its own, whose children can be counted."""
+    """Fifty runs: no process, and no file where temporary files go; in an interpreter of its own, whose children can be counted."""
     script = textwrap.dedent(f"""
         import os, sys, tempfile
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         import comparisons, test_isolation as t
-        for _ in range(3):
-            for what in (t.segfault, t.leave, t.allocate, t.loop):
-                comparisons.run([t.BALL, t.SPIN], [t.breaking(what), "document"], [4e-3], limits=t.TIGHT)
+        kinds = (t.segfault, t.leave, t.allocate, t.loop, t.shout, t.fail, t.interrupt)
+        for number in range(50):
+            comparisons.run([t.BALL, t.SPIN], [t.breaking(kinds[number % len(kinds)]), "document"], [4e-3], limits=t.TIGHT)
         parents = {{p: open(f"/proc/{{p}}/stat").read().split(") ")[1].split()[1] for p in os.listdir("/proc") if p.isdigit()}}
         print([p for p, parent in parents.items() if parent == str(os.getpid())], os.listdir(tempfile.gettempdir()))
     """)

@@ -44,7 +44,7 @@ OUT = Path("out")
 
 
 def scene(name: str) -> scenarios.Scenario:
-    """A box of 1 kg in flight without a floor, dropped from 1 m, or lying on the floor."""
+    """A box of 1 kg in flight, without a floor or over one far below; dropped from 1 m; or lying on the floor."""
     content = {
         "name": name,
         "duration": STEPS * DT,
@@ -55,6 +55,8 @@ def scene(name: str) -> scenarios.Scenario:
     floor = {"restitution": 0.5, "friction": "infinite"}
     if name == "drop":
         content |= {"floor": floor}
+    if name == "far":
+        content |= {"floor": floor, "start": content["start"] | {"position": [0.0, 900.0, 0.0]}}
     if name == "rest":
         content |= {"floor": floor, "start": {"position": [0.0, 0.05, 0.0]}}
     return scenarios.load(content)
@@ -174,6 +176,16 @@ def parts() -> dict[str, Contestant]:
     }
 
 
+def floors() -> dict[str, Contestant]:
+    """Each engine in flight, with no floor modelled and with one that it never meets."""
+    names = {"flight": "no floor", "far": "a floor far below"}
+    return {
+        f"{label}, {told}": alone(label, name, recording=False)
+        for label in ("document", "mujoco", "pybullet")
+        for name, told in names.items()
+    }
+
+
 def first_call(cached: bool, width: str) -> float:
     """Seconds of the first simulate in a fresh process, import of numba apart."""
     program = (
@@ -260,6 +272,7 @@ def main() -> None:
     results["drop, ensembles, threads"] = report("drop, ensembles, threads", timed(cores), "threads: 1")
     results["rotation methods"] = report("rotation methods", timed(rotations()), "note")
     results["what leaving out saves"] = report("what leaving out saves", timed(parts()), "everything")
+    results["what a floor costs that is not met"] = report("what a floor costs that is not met", timed(floors()), "document, no floor")
     first = {f"{kind}, {width}": first_call(kind == "cached", width) for width in ("one body", "ensemble") for kind in ("cold", "cached")}
     print("\nfirst call in a fresh process: " + "; ".join(f"{label} {seconds:.2f} s" for label, seconds in first.items()))
     stamp = {"versions": versions(), "cpu": processor(), "lanes": lanes.WIDTH}

@@ -49,6 +49,9 @@ class Failed(Exception):
         super().__init__(verdict, reason)
         self.verdict, self.reason = verdict, reason
 
+    def __str__(self) -> str:
+        return self.reason
+
 
 class Cells:
     """One process for each engine; a context manager."""

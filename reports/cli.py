@@ -211,10 +211,11 @@ def show(scene: str, engine_name: str | None, dt: float, json_output: bool) -> N
 @as_json
 def doctor(json_output: bool) -> None:
     """Look at this installation: versions, engines, processor, and whether each engine steps."""
+    from comparisons import engine_names
     from reports import look
     from reports.terminal import print_rows
 
-    print_rows(look.doctor_rows(CORE_ENGINES), json_output)
+    print_rows(look.doctor_rows(engine_names()), json_output)
 
 
 @dropspin.command()

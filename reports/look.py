@@ -9,8 +9,9 @@ from typing import Any
 from comparisons import ENSEMBLE_METRICS, METRICS, EngineMissing, engine, engine_names, simulate
 from comparisons.building import assert_built_as_meant
 from comparisons.calibration import Calibration
+from comparisons.isolation import Cells, Failed, Limits
 from comparisons.provenance import processor, versions
-from comparisons.simulating import assert_step_fits
+from comparisons.simulating import Contestant, assert_step_fits, contestant_named
 from comparisons.verdicts import assert_expectations_can_be_judged
 from reports.html import left_out, modelled
 from reports.numbers import bound
@@ -151,13 +152,22 @@ def doctor_rows(engines: Sequence[str]) -> Rows:
     """Versions, processor, and whether each engine steps."""
     rows = [{"what": package, "found": found or "not installed"} for package, found in versions().items()]
     rows += [{"what": "python", "found": sys.version.split()[0]}, {"what": "processor", "found": processor()}]
-    for name in engines:
-        try:
-            motion = simulate(load("drop-ball"), engine(name), 4e-3)
-            found = f"works: ball at {motion.position[-1, 1]:.4f} m after {motion.t[-1]:g} s"
-        except EngineMissing as error:
-            found = f"missing: {error}"
-        except Exception as error:  # a doctor reports whatever is wrong with an engine
-            found = f"broken: {type(error).__name__}: {error}"
-        rows.append({"what": f"engine {name}", "found": found})
+    with Cells(Limits(processor_time=60.0)) as cells:
+        rows += [{"what": f"engine {name}", "found": _health(name, cells)} for name in engines]
     return rows
+
+
+def _health(name: str, cells: Cells) -> str:
+    """Whether an engine steps, tried in a process of its own."""
+    try:
+        return cells.call(contestant_named(engine(name)), _fall)
+    except EngineMissing as error:
+        return f"missing: {error}"
+    except (DropspinError, Failed) as error:
+        return f"broken: {error}"
+
+
+def _fall(contestant: Contestant) -> str:
+    assert contestant.engine is not None
+    motion = simulate(load("fall-spin"), contestant.engine, 4e-3)
+    return f"works: box at {motion.position[-1, 1]:.4f} m after {motion.t[-1]:g} s"

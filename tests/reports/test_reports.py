@@ -13,6 +13,7 @@ import comparisons
 import reports
 import scenarios
 from comparisons.store import restore
+from reports.findings import finding_sentences, profile_comparisons
 from reports.numbers import written
 from scenarios import DropspinError
 
@@ -346,3 +347,21 @@ def test_many_engines_break_the_table_and_no_number(capsys):
             assert len(errors) == len(engines)
             for value in [*errors["value"], apart]:
                 assert written(value) in text
+
+
+def test_how_much_of_an_error_is_the_setting(tmp_path):
+    """Beside its calibrated profile a default one is told, error by error, what the settings make of it; in page, table and sentence."""
+    found = comparisons.run([scenarios.load("drop-ball")], ["pybullet", "pybullet[profile=default]"], [4e-3, 2e-3])
+    [comparison] = profile_comparisons(found)
+    assert (comparison.engine, comparison.calibrated) == ("pybullet[profile=default]", "pybullet")
+    errors = found.measurements.set_index(["engine", "metric", "dt"])["value"]
+    for row in comparison.rows:
+        default, calibrated = (errors[label, row["metric"], 2e-3] for label in ("pybullet[profile=default]", "pybullet"))
+        assert (row["default"], row["calibrated"]) == (default, calibrated)
+        assert row["part"] == max(0.0, 1 - abs(calibrated) / abs(default))
+    height = next(row for row in comparison.rows if row["metric"] == "bounce_height_error")
+    assert height["part"] > 0.98  # .002 of .17 is the step's
+    page = reports.write(found, tmp_path / "run").read_text(encoding="utf-8")
+    assert "How much of the error is the setting" in page
+    assert comparison.sentence in finding_sentences(found)
+    assert profile_comparisons(comparisons.run([scenarios.load("drop-ball")], ["pybullet[profile=default]"], [4e-3])) == []

@@ -182,7 +182,7 @@ class MuJoCoSimulation(Simulation):
         with _quiet():
             mujoco.mj_step(self._model, self._data, steps)
         self._steps += steps
-        self._raise_if_bad()
+        self._raise_if_bad(f"within the first {self._steps} steps")
 
     def state(self) -> Array:
         rows = np.concatenate([self._data.qpos, self._data.qvel])[None]
@@ -191,8 +191,8 @@ class MuJoCoSimulation(Simulation):
     def record(self, steps: int, every: int = 1) -> Array:
         with _quiet():
             rows = self._each_step(steps) if every == 1 and steps else self._some_steps(steps, every)
+        self._raise_if_bad(f"in step {self._steps + _last_good_row(rows) * every + 1}")
         self._steps += (len(rows) - 1) * every
-        self._raise_if_bad()
         states = _to_world(rows)
         self.limits = list(_limits_met(self._scene, states)) if every == 1 and self.settings["profile"] == "calibrated" else []
         return states
@@ -221,10 +221,16 @@ class MuJoCoSimulation(Simulation):
         inertia = axes.T @ np.diag(self._model.body_inertia[1]) @ axes
         return AsBuilt(float(self._model.body_mass[1]), inertia, self._model.opt.gravity.copy())
 
-    def _raise_if_bad(self) -> None:
+    def _raise_if_bad(self, when: str) -> None:
         for kind in BAD_STATE:
             if self._data.warning[kind].number > 0:
-                raise Diverged(f"MuJoCo's {kind.name} (a number beyond 1e10 or NaN) within the first {self._steps} steps")
+                raise Diverged(f"MuJoCo's {kind.name} (a number beyond {mujoco.mjMAXVAL:g} or NaN) {when}")
+
+
+def _last_good_row(rows: Array) -> int:
+    """The last row before a number went bad, or before MuJoCo's recording broke off and repeated its last state."""
+    bad = ~(np.abs(rows) < mujoco.mjMAXVAL).all(axis=1) | (rows == rows[-1]).all(axis=1)
+    return max(0, int(np.argmax(bad)) - 1)
 
 
 def _limits_met(scene: Scenario, states: Array) -> Iterator[str]:

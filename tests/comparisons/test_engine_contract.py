@@ -1,6 +1,7 @@
 """Every engine on every scene: built as meant, uniform, repeatable, and leaving nothing behind."""
 
 import math
+import re
 import sys
 from itertools import product
 from pathlib import Path
@@ -80,9 +81,18 @@ def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
         "body": {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0},
         "start": {"angular_velocity": [300.0, 1000.0, 200.0]},
     }
-    with pytest.raises(Diverged, match=r"BADQVEL|BADQACC|BADQPOS"):
-        simulate(scenarios.load(wild), "mujoco", 5e-3)
+    steps = {}
+    for every in (1, 2):
+        with pytest.raises(Diverged, match=r"BADQVEL|BADQACC|BADQPOS") as told:
+            simulate(scenarios.load(wild), "mujoco", 5e-3, every=every)
+        steps[every] = int(re.search(r"in step (\d+)$", str(told.value))[1])
     assert list(tmp_path.iterdir()) == []
+    assert abs(steps[1] - steps[2]) <= 2  # to a row
+    with engine("mujoco").prepare(scenarios.load(wild), 5e-3) as simulation:
+        simulation.advance(steps[1] - 2)
+        assert np.isfinite(simulation.state()).all()
+        with pytest.raises(Diverged):
+            simulation.advance(3)
 
 
 def rotation_energy(name, steps=500):

@@ -1,6 +1,6 @@
 """Engines run, measured and judged."""
 
-from comparisons.engines.base import AsBuilt, Diverged, Engine, EngineMissing, Simulation
+from comparisons.engines.base import AsBuilt, Diverged, Engine, EngineMissing, Limit, Simulation
 from comparisons.engines.registry import engine, engine_names
 from comparisons.ensembles import ENSEMBLE_METRICS
 from comparisons.isolation import Limits
@@ -17,6 +17,7 @@ __all__ = [
     "Diverged",
     "Engine",
     "EngineMissing",
+    "Limit",
     "Limits",
     "Results",
     "Simulation",

@@ -1,11 +1,12 @@
 """Every engine must simulate the same body: what was built is read back and held against the scene."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Engine, Simulation
+from comparisons.engines.base import Engine, Limit, Simulation
 from scenarios import Scenario
 
 ULPS = 8
@@ -18,6 +19,8 @@ class BuiltDifferently(Exception):
 
 def assert_built_as_meant(engine: Engine, scene: Scenario, simulation: Simulation) -> None:
     """Raise `BuiltDifferently` unless state, mass, inertia and gravity equal the scene's to 8 ulp of the engine's precision."""
+    if simulation.staggered not in (True, False):
+        raise BuiltDifferently(f"staggered is {simulation.staggered!r}; it is True or False")
     state = simulation.state()
     if state.shape != (13,):
         raise BuiltDifferently(f"the state has shape {state.shape}, not (13,)")
@@ -57,6 +60,16 @@ def sound_record(states: Any, rows: int) -> NDArray[np.float64]:
         row = int(np.argmax(off))
         raise BuiltDifferently(f"the quaternion of row {row} has length {lengths[row]:.6g}; an orientation has length 1")
     return record
+
+
+def sound_limits(limits: Any) -> tuple[Limit, ...]:
+    """The limits that a simulation says it has met, each as a `Limit`; a sentence alone explains no error."""
+    if isinstance(limits, str) or not isinstance(limits, Iterable):
+        raise BuiltDifferently(f"limits is {limits!r}; it is a sequence of sentences, or of comparisons.Limit")
+    found = tuple(Limit(limit) if isinstance(limit, str) else limit for limit in limits)
+    if not all(isinstance(limit, Limit) for limit in found):
+        raise BuiltDifferently(f"limits is {limits!r}; it is a sequence of sentences, or of comparisons.Limit")
+    return found
 
 
 def _assert_equal(engine: Engine, what: str, found: NDArray[np.float64], meant: NDArray[np.float64], ulps: int = ULPS) -> None:

@@ -11,8 +11,11 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as OutOfTime
+from concurrent.futures import wait
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
+from multiprocessing.sharedctypes import Synchronized
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar, TypeVarTuple
 
@@ -25,6 +28,8 @@ from scenarios import Scenario
 Given = TypeVarTuple("Given")
 Result = TypeVar("Result")
 
+PROCESSES = Path("/proc")
+POLL, GRACE = 0.5, 2.0  # s, between looks at a process, and for the pool to tell of its end
 BACKSTOP = 10.0
 """Wall time over processor time: an engine that sleeps for ever uses no processor."""
 
@@ -59,6 +64,7 @@ class Cells:
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._pools: dict[str, ProcessPool] = {}
+        self._processes: dict[str, Synchronized[int]] = {}
 
     def attempt(self, contestant: Contestant, scene: Scenario, dt: float, phases: Sequence[Phase]) -> Attempt:
         """Run a scene through an engine in its process; whatever goes wrong is told in the attempt."""
@@ -77,16 +83,37 @@ class Cells:
         """
         if contestant.label not in self._pools:
             self._pools[contestant.label] = self._pool(contestant)
+        self._processes[contestant.label].value = 0
         task = self._pools[contestant.label].schedule(
             _work_here, args=[work, given, self._limits.processor_time], timeout=BACKSTOP * self._limits.processor_time
         )
         try:
+            while not wait([task], timeout=POLL).done:
+                if self._has_left(contestant.label) and not wait([task], timeout=GRACE).done:
+                    self._forget(contestant.label)
+                    raise Failed("crashed", "its process ended by itself, as if all were well")
             result: Result = task.result()
         except OutOfTime:
             raise Failed("timed_out", f"not done after {BACKSTOP * self._limits.processor_time:g} s by the clock") from None
         except ProcessExpired as end:
             raise Failed(*self._told(end.exitcode)) from None
         return result
+
+    def _has_left(self, label: str) -> bool:
+        """Whether the process that took up the work has ended; one that says all is well on its way out is not told of by the pool."""
+        process = self._processes[label].value
+        if not process or not PROCESSES.exists():
+            return False
+        try:
+            return (PROCESSES / str(process) / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        except OSError:
+            return True
+
+    def _forget(self, label: str) -> None:
+        """Begin anew with the next piece of work."""
+        pool = self._pools.pop(label)
+        pool.stop()  # type: ignore[no-untyped-call]
+        pool.join()
 
     def _told(self, exit_code: int | None) -> tuple[str, str]:
         """The verdict on an engine whose process has ended, and the reason."""
@@ -100,7 +127,8 @@ class Cells:
         # A forked process has the engine already, whatever it is made of; and no script of a user's is run again.
         method = "fork" if "fork" in get_all_start_methods() else "spawn"
         context = get_context(method)
-        return ProcessPool(max_workers=1, initializer=_move_in, initargs=[contestant, self._limits.memory], context=context)
+        self._processes[contestant.label] = process = context.Value("l", 0)
+        return ProcessPool(max_workers=1, initializer=_move_in, initargs=[contestant, self._limits.memory, process], context=context)
 
     def __enter__(self) -> Self:
         return self
@@ -112,13 +140,16 @@ class Cells:
             pool.join()
 
 
+_at_work: list["Synchronized[int]"] = []
+"""Where this process says that it is at work."""
 _residents: list[Contestant] = []
 """The engine whose process this is; empty in the parent."""
 
 
-def _move_in(contestant: Contestant, memory: int) -> None:
+def _move_in(contestant: Contestant, memory: int, process: "Synchronized[int]") -> None:
     """Begin a process's life: keep quiet, leave interrupts to the parent, and take no more memory than allowed."""
     _residents.append(contestant)
+    _at_work.append(process)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     faulthandler.disable()
     nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
@@ -134,6 +165,7 @@ def _move_in(contestant: Contestant, memory: int) -> None:
 
 
 def _work_here(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
+    _at_work[0].value = os.getpid()
     if sys.platform == "linux":
         import resource
 

@@ -100,8 +100,7 @@ def _run_scene(
                 trajectories[scene.name, contestant.label, dt] = attempt.motion
                 settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
                 earlier = claims[contestant.label].limits if contestant.label in claims else ()
-                met = tuple(dict.fromkeys([*earlier, *attempt.limits]))
-                claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision, met)
+                claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision, (*earlier, *attempt.limits))
             if attempt.outcome is not None:
                 ensembles[scene.name, contestant.label, dt] = attempt.outcome
                 rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
@@ -138,12 +137,12 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
         reason = f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s"
         return [shared | {"verdict": "diverged", "reason": reason}]
     cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in zip(phases, attempt.phases, strict=True)]
-    rows = [shared | {"verdict": "limited", "reason": limit} for limit in attempt.limits]
+    rows = [shared | {"verdict": "limited", "reason": limit.said} for limit in attempt.limits]
     for metric in metrics_for(scene, truth):
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}
         if metric.kind == "truth" and truth is not None:
             row["truth"] = truth.name
-        rows.append(row | excused(_measured(scene, dt, attempt.label, metric, cases), attempt.limits))
+        rows.append(row | excused({"metric": metric.name} | _measured(scene, dt, attempt.label, metric, cases), attempt.limits))
     if truth is None:
         rows.append(shared | {"verdict": "no_truth", "reason": "no closed form is known for this scene"})
     return rows

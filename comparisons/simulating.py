@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.building import assert_built_as_meant, sound_record
-from comparisons.engines.base import Diverged, Engine, EngineMissing
+from comparisons.building import assert_built_as_meant, sound_limits, sound_record
+from comparisons.engines.base import Diverged, Engine, EngineMissing, Limit
 from comparisons.engines.registry import engine as engine_named
 from comparisons.ensembles import Outcome, outcome_of
 from comparisons.predictions import predicted_errors
@@ -43,17 +43,17 @@ def simulate(scene: Scenario, engine: str | Engine, dt: float, every: int = 1) -
         raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
     motion, limits = _motion(scene, chosen, dt, every)
     for limit in limits:
-        warnings.warn(limit, stacklevel=2)
+        warnings.warn(limit.said, stacklevel=2)
     return motion
 
 
-def _motion(scene: Scenario, engine: Engine, dt: float, every: int = 1) -> tuple[Trajectory, Sequence[str]]:
+def _motion(scene: Scenario, engine: Engine, dt: float, every: int = 1) -> tuple[Trajectory, tuple[Limit, ...]]:
     """What an engine does with a scene, checked, and which of its limits it met."""
     with engine.prepare(scene, dt) as simulation:
         assert_built_as_meant(engine, scene, simulation)
         states = sound_record(simulation.record(scene.steps(dt), every), 1 + scene.steps(dt) // every)
         lag = 0.5 * dt if simulation.staggered else 0.0
-        limits = simulation.limits
+        limits = sound_limits(simulation.limits)
     return Trajectory.from_states(dt * every * np.arange(len(states), dtype=float), states, lag), limits
 
 
@@ -84,7 +84,7 @@ class Attempt:
     reason: str = ""
     motion: Trajectory | None = None
     phases: list[Trajectory] = field(default_factory=list)
-    limits: Sequence[str] = ()
+    limits: Sequence[Limit] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     time_per_step: float = float("nan")
     outcome: Outcome | None = None

@@ -1,11 +1,11 @@
 """From a value and a scene's expectations to a bound and a verdict."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from comparisons.engines.base import EngineMissing
+from comparisons.engines.base import EngineMissing, Limit
 from comparisons.engines.registry import BUILT_IN, engine
 from comparisons.metrics import METRICS, Metric
 from scenarios import DropspinError, Scenario, SceneError, Truth
@@ -114,8 +114,9 @@ def _bounds(expectation: Expectation, metric: Metric) -> tuple[float, float]:
     return (-expectation.below if metric.signed else -math.inf), expectation.below
 
 
-def excused(row: dict[str, Any], limits: Sequence[str]) -> dict[str, Any]:
-    """A row of results that is `limited` rather than failed, where the engine has said which of its limits it met on the way."""
-    if row["verdict"] != "failed" or not limits:
+def excused(row: dict[str, Any], limits: Iterable[Limit]) -> dict[str, Any]:
+    """A row of results that is `limited` rather than failed, where a limit that the engine has met explains an error of that size."""
+    if row["verdict"] != "failed":
         return row
-    return row | {"verdict": "limited", "reason": "; ".join(filter(None, [*limits, row["reason"]]))}
+    reasons = [limit.said for limit in limits if abs(row["value"]) <= limit.sizes.get(row["metric"], -1.0)]
+    return row | {"verdict": "limited", "reason": "; ".join(filter(None, [*reasons, row["reason"]]))} if reasons else row

@@ -76,6 +76,9 @@ def _run() -> int:
         error.show()
     except DropspinError as error:
         click.echo(f"dropspin: {error}", err=True)
+        from comparisons import EngineMissing
+
+        return 3 if isinstance(error, EngineMissing) else 2
     return 2
 
 
@@ -220,25 +223,29 @@ def doctor(json_output: bool) -> None:
 
 @dropspin.command()
 @click.argument("engine_name", metavar="ENGINE")
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=60.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Processor time that each check may take.",
+)
 @as_json
-def conform(engine_name: str, json_output: bool) -> int:
+def conform(engine_name: str, time_limit: float, json_output: bool) -> int:
     """Is this adapter right? Hold an engine's adapter against the protocol and against motions that tell mistakes apart.
 
     ENGINE is a name, as in `dropspin list engines`, or your own as my_module:MyEngine.
 
     Exit code: 0 nothing is wrong, 1 something is, 2 bad input, 3 the engine crashed, hung or is not installed.
     """
-    from comparisons import EngineMissing, engine
+    from comparisons import Limits, engine
     from comparisons.conformance import conform as findings
     from reports.terminal import print_rows, status
 
-    try:
-        chosen = engine(engine_name)
-    except EngineMissing as error:
-        click.echo(f"dropspin: {error}", err=True)
-        return 3
+    chosen = engine(engine_name)
     with status(f"checking {chosen.label}"):
-        found = findings(chosen)
+        found = findings(chosen, Limits(processor_time=time_limit))
     _stop_if_interrupted()
     print_rows([{"check": one.check, "verdict": one.verdict, "what was found": one.said} for one in found], json_output)
     verdicts = {one.verdict for one in found}
@@ -272,6 +279,8 @@ def calibrate(
     from reports.terminal import print_rows, status
     from scenarios.errors import UnknownName
 
+    if language is not None and json_output:
+        raise click.UsageError("--as prints one text and --json all of them; give one of the two.")
     chosen = engine(engine_name)
     with status(f"measuring {chosen.label}"):
         found = calibrated(chosen, restitution, dt, look.friction(friction), shape)

@@ -8,7 +8,7 @@ from typing import Any
 
 from comparisons import ENSEMBLE_METRICS, METRICS, EngineMissing, engine, engine_names, simulate
 from comparisons.building import assert_built_as_meant
-from comparisons.calibration import Calibration
+from comparisons.calibration import Calibration, Measured
 from comparisons.isolation import Cells, Failed, Limits
 from comparisons.provenance import processor, versions
 from comparisons.simulating import Contestant, assert_step_fits, contestant_named
@@ -127,10 +127,13 @@ def friction(text: str) -> str | float:
 
 def measured_rows(found: Calibration) -> Rows:
     """What a calibrated engine was measured to do."""
-    return [
-        {"measured": one.name, "value": f"{one.value:.4g}{'' if one.unit == '1' else f' {one.unit}'}", "how": one.how}
-        for one in found.measured
-    ]
+    return [{"measured": one.name, "value": _with_unit(one), "how": one.how} for one in found.measured]
+
+
+def _with_unit(one: Measured) -> str:
+    if math.isnan(one.value):
+        return "–"
+    return f"{one.value:.4g}" if one.unit == "1" else f"{one.value:.4g} {one.unit}"
 
 
 def setting_rows(found: Calibration) -> Rows:

@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 DT = 2.5e-4
 """So short [s] that what an engine's integrator does wrong is small beside what a mistake does."""
 TILT = [0.1825741858350554, 0.3651483716701107, 0.5477225575051661, 0.7302967433402214]  # (1, 2, 3, 4)/√30
-CUBE = {"shape": "box", "half_extents": [0.2, 0.2, 0.2], "mass": 2.0}
-BALL = {"shape": "sphere", "radius": 0.1, "mass": 2.0}
-BLOCK = {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 2.0, "inertia": [0.05, 0.07, 0.1]}
+CUBE = {"shape": "box", "half_extents": [0.2, 0.2, 0.2], "mass": 2.7}
+BALL = {"shape": "sphere", "radius": 0.1, "mass": 2.7}
+BLOCK = {"shape": "box", "half_extents": [0.11, 0.2, 0.29], "mass": 2.7, "inertia": [0.05, 0.07, 0.1]}
 FALL = {"acceleration": [0.0, -7.0, 0.0]}
 
 
@@ -81,7 +81,7 @@ PROBES = (
     ),
     _probe(
         "tumbling askew", (1e-6, 0.02, 1e-6, 0.06), 0.5,
-        {"shape": "vertices", "points": [[0.2, 0.0, 0.1], [-0.1, 0.3, 0.0], [0.0, -0.2, 0.25], [0.1, 0.1, -0.3]], "mass": 2.0},
+        {"shape": "vertices", "points": [[0.2, 0.0, 0.1], [-0.1, 0.3, 0.0], [0.0, -0.2, 0.25], [0.1, 0.1, -0.3]], "mass": 2.7},
         start={"orientation": TILT, "angular_velocity": [2.0, -5.0, 4.0]},
     ),
     _probe(
@@ -106,16 +106,28 @@ PROBES = (
         start={"velocity": [300.0, 0.0, 0.0], "angular_velocity": [0.0, 300.0, 0.0]},
     ),
     _probe(
-        "bouncing ball", (3e-3, 1e-4, 7e-3, 1e-4), 0.5, BALL,
+        "bouncing ball", (8e-4, 1e-4, 7e-3, 1e-4), 0.5, BALL,
         start={"position": [0.0, 0.4, 0.0]}, gravity=FALL, floor=_floor(0.6, "none"),
     ),
     _probe(
-        "bouncing box", (3e-3, 1e-2, 7e-3, 2e-2), 0.5, {"shape": "box", "half_extents": [0.15, 0.1, 0.2], "mass": 2.0},
+        "dull ball", (8e-4, 1e-4, 7e-3, 1e-4), 0.5, BALL,
+        start={"position": [0.0, 0.4, 0.0]}, gravity=FALL, floor=_floor(0.3, "none"),
+    ),
+    _probe(
+        "lively ball", (2e-3, 1e-4, 7e-3, 1e-4), 0.5, BALL,
+        start={"position": [0.0, 0.4, 0.0]}, gravity=FALL, floor=_floor(1.0, "none"),
+    ),
+    _probe(
+        "slow ball", (1e-4, 1e-4, 6e-3, 1e-4), 0.03, BALL,
+        start={"position": [0.0, 0.1007, 0.0]}, gravity=FALL, floor=_floor(0.6, "none"),
+    ),
+    _probe(
+        "bouncing box", (3e-3, 1e-2, 7e-3, 2e-2), 0.5, {"shape": "box", "half_extents": [0.16, 0.1, 0.23], "mass": 2.7},
         start={"position": [0.0, 0.4, 0.0]}, gravity=FALL, floor=_floor(0.6, "none"),
     ),
     _probe(
-        "gripping floor", (4e-3, 0.02, 0.01, 0.1), 0.5, BALL,
-        start={"position": [0.0, 0.4, 0.0], "velocity": [0.5, 0.0, 0.3], "angular_velocity": [4.0, 2.0, -6.0]},
+        "gripping floor", (4e-3, 0.05, 0.03, 0.4), 0.5, BALL,
+        start={"position": [0.0, 0.4, 0.0], "velocity": [0.5, 0.0, 0.3], "angular_velocity": [80.0, 20.0, -100.0]},
         gravity=FALL, floor=_floor(0.6, "infinite"),
     ),
     _probe(
@@ -124,11 +136,15 @@ PROBES = (
         gravity=FALL, floor=_floor(0.6, 0.12),
     ),
     _probe(
-        "sliding box", (3e-3, 0.01, 0.01, 0.03), 0.5, {"shape": "box", "half_extents": [0.2, 0.05, 0.3], "mass": 2.0},
+        "sliding box", (3e-3, 0.01, 0.01, 0.03), 0.5, {"shape": "box", "half_extents": [0.2, 0.05, 0.3], "mass": 2.7},
         start={"position": [0.0, 0.05, 0.0], "velocity": [2.0, 0.0, 0.0]}, gravity=FALL, floor=_floor(0.0, 0.3),
     ),
     _probe(
         "corner", (3e-3, 0.03, 0.02, 0.1), 0.36, BLOCK,
         start={"position": [0.0, 0.65, 0.0], "orientation": TILT}, gravity=FALL, floor=_floor(0.6, "none"),
+    ),
+    _probe(
+        "gripping corner", (3e-3, 0.03, 0.02, 0.1), 0.36, BLOCK,
+        start={"position": [0.0, 0.65, 0.0], "orientation": TILT}, gravity=FALL, floor=_floor(0.6, "infinite"),
     ),
 )  # fmt: skip

@@ -45,18 +45,30 @@ class AsBuilt:
     gravity: Array
 
 
+class Limit(NamedTuple):
+    """A known limit of an engine that a simulation has met on its way.
+
+    Attributes:
+        said: What it is, in a sentence, with the figure it has come to.
+        sizes: By metric, how large an error it explains; rows within that are `limited` instead of failed, all others are judged as ever.
+    """
+
+    said: str
+    sizes: Mapping[str, float] = {}
+
+
 class Simulation:
     """One scene at one time step, built and ready to go; a context manager.
 
     Attributes:
         staggered: Whether velocity lags position by half a step, as under semi-implicit Euler.
         settings: What the results are stamped with, versions included; values that JSON knows.
-        limits: Known limits of the engine that it has met on the way, each a sentence; they are told, and fail nothing.
+        limits: Known limits of the engine that it has met on the way: sentences, which are told, or `Limit`, which explains errors too.
     """
 
     staggered: bool = False
     settings: Mapping[str, Any] = {}
-    limits: Sequence[str] = ()
+    limits: Sequence[str | Limit] = ()
 
     def advance(self, steps: int) -> None:
         """Take some native steps and do nothing else: this is what gets timed."""

@@ -18,6 +18,7 @@ from comparisons.engines.base import (
     AsBuilt,
     Diverged,
     Engine,
+    Limit,
     Number,
     Simulation,
     may_tumble,
@@ -38,6 +39,8 @@ INTEGRATORS = {
     "rk4": mujoco.mjtIntegrator.mjINT_RK4,
 }
 FLOOR_QUATERNION = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: the plane's normal from z to y
+LEAST_OF_A_SPRING = 0.01  # damped 5 times over; from there on it hardly pushes
+FEWEST_SPRING_STEPS = 5  # with fewer the rebound is anything between a quarter and half as much again
 NO_SLIP = 1e-3  # m/s; what is left of a slip that friction stops
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -47,7 +50,7 @@ SOLVER = {"cone": "elliptic", "jacobian": "dense", "diagexact": "enable", "islan
 """What calibration sets of the solver, by the names that MJCF has for it."""
 
 REASONS = {
-    "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; the default's spring rebounds with 0, whatever is asked",
+    "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; the default's spring leaves 0.13, whatever is asked",
     "solimp": "the hardest MuJoCo takes, the same at any depth; left at 0.9 to 0.95, 0.5 becomes 0.466 at 0.25 ms, boxes rest 2 mm deep",
     "solreffriction": "stops sliding in a step; left to follow solref a gripping corner's slip is reversed: 0.51 of its angular momentum",
     "condim": "1 without friction, 3 with",
@@ -74,6 +77,8 @@ class MuJoCo(Engine):
         one_of = [option for option in ("kappa", "spring_steps", "profile") if option in self.options]
         if len(one_of) > 1:
             raise DropspinError(f"engine {self.label!r}: {' and '.join(one_of)} do not go together; the contact is one of them.")
+        if 0.0 < float(self.option("spring_steps")) < FEWEST_SPRING_STEPS:
+            raise DropspinError(f"engine {self.label!r}: a spring takes at least {FEWEST_SPRING_STEPS} steps; 0 is the damper.")
 
     @property
     def reasons(self) -> Mapping[str, str]:  # type: ignore[override]  # they depend on the options
@@ -127,8 +132,8 @@ class MuJoCo(Engine):
             return None
         if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
             return "RK4 has no restitution in one step: all its stages see the contact's damper; use integrator=euler, or spring_steps=20"
-        if floor.restitution == 0.0 and "spring_steps" in self.options:
-            return "a spring that only pushes has no restitution of 0; leave out spring_steps"
+        if floor.restitution < LEAST_OF_A_SPRING and "spring_steps" in self.options:
+            return f"a spring that only pushes has no restitution below {LEAST_OF_A_SPRING:g}; leave out spring_steps"
         if floor.rest_speed > 0.0:
             return "MuJoCo has no speed below which restitution is 0 (floor.rest_speed)"
         return None
@@ -233,8 +238,12 @@ def _last_good_row(rows: Array) -> int:
     return max(0, int(np.argmax(bad)) - 1)
 
 
-def _limits_met(scene: Scenario, states: Array) -> Iterator[str]:
-    """How fast contacts slip that Coulomb friction should slow: of each step, the corners that begin it below the floor."""
+def _limits_met(scene: Scenario, states: Array) -> Iterator[Limit]:
+    """How fast contacts slip that Coulomb friction should slow: of each step, the corners that begin it below the floor.
+
+    MuJoCo's cone is convex: a contact that slips at s gets up to a = µ s of rebound on top (dual cone, one-step damper). The hop takes
+    2 (e u + a)/g; by 2 a/g of it friction acts too late, so that the slip is off by up to 2 µ a until the landing makes up for it.
+    """
     if scene.floor is None or isinstance(scene.floor.friction, str):
         return
     before, after = states[:-1], states[1:]
@@ -242,9 +251,24 @@ def _limits_met(scene: Scenario, states: Array) -> Iterator[str]:
     touching = before[:, None, 1] + arms[..., 1] <= 0.0
     velocities = after[:, None, 7:10] + cross(after[:, None, 10:13], arms)
     slip = float(np.hypot(velocities[..., 0], velocities[..., 2])[touching].max(initial=0.0))
-    if slip > NO_SLIP:
-        added = scene.floor.friction * slip
-        yield f"contacts slip by up to {slip:.3g} m/s, to which MuJoCo's friction cone adds up to µ slip, {added:.3g} m/s of rebound"
+    if slip <= NO_SLIP:
+        return
+    friction, g = scene.floor.friction, float(np.linalg.norm(scene.acceleration))
+    added = friction * slip
+    late, e, fastest = 2.0 * friction * added, scene.floor.restitution, float(-states[:, 8].min())
+    hop = 2.0 * (e * max(0.0, fastest) + added) / g if g else 0.0
+    sizes = {
+        "position_error": (late + added) * hop,
+        "orientation_error": (late + added) * hop / scene.body.size,
+        "angular_momentum_error": (late + added) / slip,
+        "energy_error": (2.0 * slip * late + added**2) / slip**2,
+        "energy_gain": (added / slip) ** 2,
+    }
+    if fastest > added:
+        sizes |= {"restitution_error": added / fastest, "bounce_height_error": (2.0 * e * added * fastest + added**2) / fastest**2}
+    yield Limit(
+        f"contacts slip by up to {slip:.3g} m/s, to which MuJoCo's friction cone adds up to µ slip, {added:.3g} m/s of rebound", sizes
+    )
 
 
 def _free_body(scene: Scenario, dt: float, integrator: str) -> tuple[Any, Any]:

@@ -22,6 +22,7 @@ from comparisons.engines.base import (
     Array,
     AsBuilt,
     Engine,
+    Limit,
     Simulation,
     may_tumble,
     version,
@@ -36,6 +37,8 @@ ALMOST = 0.999
 NO_PUSH = 1e-6  # of a step's gravity
 FASTEST = 1e12  # m/s and rad/s; Bullet clamps the speeds of a multibody to 100 by default
 LARGEST_TURN = np.pi / 4  # rad a step; Bullet turns by less than it should beyond
+SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's own solver of three equations takes a smaller determinant for 0
+FASTEST_DECAY = 30.0  # 1/s; 1 - exp(-rate) is 1 from 37 on, and the body stops
 FLOOR_HALF_SIZE = 1e3  # m; thick enough that nothing tunnels, and Bullet loses no digits to it
 
 
@@ -108,6 +111,10 @@ class PyBullet(Engine):
         if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
             return "PyBullet takes inertia along the body's own axes only; these are not principal axes"
         floor = scene.floor
+        if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(inertia)) < SMALLEST_INERTIA:
+            return f"Bullet leaves the gyroscopic term out where the product of the moments is below {SMALLEST_INERTIA:g}; scale the units"
+        if scene.damping is not None and not self.is_default and max(scene.damping.linear, scene.damping.angular) > FASTEST_DECAY:
+            return f"Bullet's damping takes no decay faster than {FASTEST_DECAY:g} per second"
         if scene.damping is not None and self.is_multibody and not self.is_default:
             return "Bullet's multibodies damp by a law of their own, k v (1 + |v|)"
         if floor is None:
@@ -240,20 +247,24 @@ class PyBulletSimulation(Simulation):
         self._bullet.disconnect(self._client)
 
 
-def _limits_met(rows: Array, dt: float, fall: Array | None) -> Iterator[str]:
+def _limits_met(rows: Array, dt: float, fall: Array | None) -> Iterator[Limit]:
     """Bullet's own limits that a motion has reached, from its states at every step.
 
     `fall` is what gravity adds to the velocity in a step [m/s], where a floor is to grip.
     """
     turn = float(np.linalg.norm(rows[:, 10:13], axis=1).max()) * dt
     if turn > LARGEST_TURN:
-        yield f"the body turns by up to {turn:.3g} rad a step; beyond π/4 Bullet's rotations fall short"
+        yield Limit(
+            f"the body turns by up to {turn:.3g} rad a step; beyond π/4 Bullet's rotations fall short", {"orientation_error": np.pi}
+        )
     if fall is None:
         return
     pushes = np.diff(rows[:, 7:10], axis=0) - fall
     along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
     if bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
-        yield f"a contact needs more than {STRONGEST_FRICTION:g} times its normal push to stick; Bullet's friction ends there, and it slips"
+        yield Limit(
+            f"a contact needs more than {STRONGEST_FRICTION:g} times its normal push to stick; Bullet's friction ends there, and it slips"
+        )
 
 
 def _parameters(scene: Scenario, dt: float) -> dict[str, float]:

@@ -1,10 +1,12 @@
 """Engines by name: `mujoco`, `mujoco[integrator=rk4]`; other packages' by the name they registered; anybody's as `my_module:MyEngine`."""
 
 import re
+import sys
+from contextlib import redirect_stdout
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from comparisons.engines.base import Engine, EngineMissing
 from scenarios.errors import DropspinError, UnknownName
@@ -59,7 +61,7 @@ def engine(name: str) -> Engine:
         return adapter(_options(name, listed))
     except DropspinError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise DropspinError(f"engine {base!r}: it could not be created ({type(error).__name__}: {error}).") from error
 
 
@@ -73,11 +75,12 @@ def _adapter(base: str) -> type[Engine]:
         adapter: type[Engine] = getattr(import_module(home.module), home.adapter)
         return adapter
     if ":" in base:
-        return _imported(base, base)
+        module, _, attribute = base.partition(":")
+        return _imported(base, module, attribute)
     brought = _entry_points()
     if base not in brought:
         raise DropspinError(f"{UnknownName('engine', base, engine_names())} One of your own is my_module:MyEngine.")
-    return _imported(base, brought[base].value)
+    return _imported(base, brought[base].module, brought[base].attr)
 
 
 def _entry_points() -> dict[str, EntryPoint]:
@@ -85,25 +88,32 @@ def _entry_points() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP) if point.name not in BUILT_IN}
 
 
-def _imported(name: str, path: str) -> type[Engine]:
-    """The class at module:Class, which must be an engine."""
-    module_name, _, class_name = path.partition(":")
+def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
+    """The class of a module, which must be an engine; what its import prints goes to the standard error."""
+    if not re.fullmatch(r"\w+(\.\w+)*", module_name) or not re.fullmatch(r"\w+(\.\w+)*", attribute):
+        raise DropspinError(f"engine {name!r}: write my_module:MyEngine, or my_package.my_module:MyEngine.")
     try:
-        module = import_module(module_name)
+        with redirect_stdout(sys.stderr):
+            module = import_module(module_name)
     except ModuleNotFoundError as error:
         if error.name is not None and f"{module_name}.".startswith(f"{error.name}."):
             raise DropspinError(f"engine {name!r}: no module {module_name!r} here, nor where Python looks.") from None
         raise EngineMissing(f"{name} needs the module {error.name}, which is not installed.") from None
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise DropspinError(f"engine {name!r}: {module_name} cannot be imported ({type(error).__name__}: {error}).") from error
-    found = getattr(module, class_name, None)
-    if found is None:
-        raise UnknownName(f"{module_name}'s engine", class_name, [key for key, value in vars(module).items() if _is_engine(value)])
+    found: object = module
+    for part in attribute.split("."):
+        if not hasattr(found, part):
+            raise UnknownName(f"{module_name}'s engine", attribute, [key for key, value in vars(module).items() if _is_engine(value)])
+        found = getattr(found, part)
     if not _is_engine(found):
-        raise DropspinError(f"engine {name!r}: {class_name} is no engine; an engine is a class that inherits from comparisons.Engine.")
-    if not re.fullmatch(r"[A-Za-z][\w-]*", getattr(found, "name", "")):
-        raise DropspinError(f"engine {name!r}: {class_name}.name is what results call it: letters, digits, - and _, such as 'my-engine'.")
-    adapter: type[Engine] = found
+        raise DropspinError(f"engine {name!r}: {attribute} is no engine; an engine is a class that inherits from comparisons.Engine.")
+    adapter = cast(type[Engine], found)
+    given = getattr(adapter, "name", "")
+    if not re.fullmatch(r"[A-Za-z][\w-]*", given):
+        raise DropspinError(f"engine {name!r}: {attribute}.name is what results call it: letters, digits, - and _, such as 'my-engine'.")
+    if given in BUILT_IN:
+        raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is an engine of dropspin's own; results need another.")
     return adapter
 
 

@@ -155,7 +155,7 @@ def test_the_spring_takes_its_steps():
     [
         ("document", {}, "document has no settings to calibrate"),
         ("mujoco[integrator=rk4]", {}, "RK4 has no restitution in one step"),
-        ("mujoco[spring_steps=20]", {"restitution": 0.0}, "no restitution of 0"),
+        ("mujoco[spring_steps=20]", {"restitution": 0.0}, "no restitution below 0.01"),
         ("mujoco", {"restitution": 1.5}, "restitution"),
         ("mujoco", {"dt": -1.0}, "dt: got -1.0 s"),
         ("mujoco", {"dt": float("nan")}, "dt: got nan s"),
@@ -173,6 +173,7 @@ def test_what_cannot_be_calibrated(name, given, message):
     [
         ("mujoco[kappa=2]", "kappa: got '2'; it is a number from 0 to 1"),
         ("mujoco[kappa=nan]", "kappa: got 'nan'"),
+        ("mujoco[spring_steps=2]", "a spring takes at least 5 steps"),
         ("mujoco[kappa=a]", "kappa: got 'a'"),
         ("mujoco[kappa=0.002,spring_steps=20]", "do not go together"),
         ("mujoco[kappa=0.002,profile=default]", "do not go together"),

@@ -283,13 +283,14 @@ ADAPTER = (Path(__file__).parents[2] / "docs" / "bring-your-engine.md").read_tex
 
 def test_an_engine_of_ones_own(tmp_path):
     """A module in the working directory, as the page says: it conforms, it runs, and its results bear its name."""
-    (tmp_path / "my_module.py").write_text(ADAPTER)
+    (tmp_path / "my_module.py").write_text(f"print('hello')\n{ADAPTER}\nclass Mine:\n    Flyer = Flyer\n")
     (tmp_path / "scenarios.py").write_text("raise SystemExit('a file of the user hides a module of dropspin')")
     done = dropspin("conform", "my_module:Flyer", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert {row["verdict"] for row in json.loads(done.stdout)} == {"passed", "declined"}
     done = dropspin("run", "spin-asymmetric", "-e", "my_module:Flyer", "--dt", "0.002", "--json", cwd=tmp_path)
     assert {row["engine"] for row in json.loads(done.stdout)} == {"flyer"}
+    assert dropspin("show", "spin-asymmetric", "-e", "my_module:Mine.Flyer", cwd=tmp_path).returncode == 0
     assert sorted(path.name for path in tmp_path.iterdir()) in (
         ["__pycache__", "my_module.py", "out", "scenarios.py"],
         ["my_module.py", "out", "scenarios.py"],
@@ -315,6 +316,8 @@ def test_an_engine_of_ones_own_that_is_wrong(tmp_path):
         ("1 / 0", 2, "cannot be imported (ZeroDivisionError"),
         ("import comparisons\nclass Mine(comparisons.Engine):\n name='mine'\n def __init__(self): pass", 2, "could not be created"),
         (None, 2, "no module 'my_module' here"),
+        ("import sys\nsys.exit(0)", 2, "cannot be imported (SystemExit"),
+        ("import comparisons\nclass Mine(comparisons.Engine):\n name='mujoco'", 2, "an engine of dropspin's own; results need another"),
     ],
 )
 def test_an_engine_that_is_none(text, code, message, tmp_path):

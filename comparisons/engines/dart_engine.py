@@ -23,9 +23,7 @@ REASONS = {
 class Dart(Engine):
     """DART's rigid body over a plane."""
 
-    name = "dart"
-    order = 1.0
-    reasons = REASONS
+    name, order, reasons = "dart", 1.0, REASONS
 
     def discretisation(self, scene: Scenario) -> str | None:
         """MuJoCo's Euler to 1e-13 (to 1e-7 below 1e-3 rad a step, where DART cuts a series off); contacts are like nobody else's."""
@@ -100,13 +98,14 @@ class DartSimulation(Simulation):
             raise Diverged("the body turns faster than 1e10 rad/s")
 
     def state(self) -> Array:
-        x, q = self._body.getWorldTransform().translation(), self._body.getWorldTransform().quaternion().wxyz()[[1, 2, 3, 0]]
-        return np.concatenate([x, q, self._body.getCOMLinearVelocity(), self._body.getAngularVelocity()])
+        place, body = self._body.getWorldTransform(), self._body  # the first has to outlive its translation, a view
+        pose = place.translation(), place.quaternion().wxyz()[[1, 2, 3, 0]]
+        return np.concatenate([*pose, body.getCOMLinearVelocity(), body.getAngularVelocity()])
 
     def record(self, steps: int, every: int = 1) -> Array:
-        rows, floor, body = super().record(steps, every), self._scene.floor, self._scene.body
+        rows, floor, body, dt = super().record(steps, every), self._scene.floor, self._scene.body, self._world.getTimeStep()
         if floor is not None and every == 1:
-            before, dt, fall = rows[:-1, None], self._world.getTimeStep(), self._world.getTimeStep() * self._world.getGravity()[1]
+            before, fall = rows[:-1, None], dt * self._world.getGravity()[1]
             arms = rotate(before[..., 3:7], body.vertices)
             approach = -(before[..., 8] + cross(before[..., 10:13], arms)[..., 1] + fall)
             rebounds = floor.restitution * approach[(before[..., 1] + arms[..., 1] < body.rounding) & (approach > 0.0)]

@@ -109,7 +109,8 @@ class DartSimulation(Simulation):
             arms = rotate(before[..., 3:7], body.vertices)
             approach = -(before[..., 8] + cross(before[..., 10:13], arms)[..., 1] + fall)
             rebounds = floor.restitution * approach[(before[..., 1] + arms[..., 1] < body.rounding) & (approach > 0.0)]
-            lost = {"restitution_error": 1.0, "bounce_height_error": 1.0, "position_error": 0.1**2 / 2.0 / abs(fall) * dt}
+            height = 0.1**2 / 2.0 * dt / abs(fall) if fall else 0.0
+            lost = {"restitution_error": 1.0, "bounce_height_error": 1.0, "position_error": height}
             if not np.all((rebounds == 0.0) | (rebounds >= 0.1) & (rebounds <= 100.0)):
                 self.limits = [Limit("DART's rebounds below 0.1 m/s are none, and those above 100 m/s are 100 m/s", lost)]
         return rows

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from comparisons.tradeoff import TradeOff
+
 Array = NDArray[np.float64]
 Quantity = Callable[[Scenario, Trajectory], Array]
 
@@ -154,6 +156,38 @@ def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> No
     axes.set_xlim(0.0, results.scenes[scene_name].duration)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("share at rest")
+
+
+def plot_tradeoff(found: "TradeOff", axes: "Axes") -> None:
+    """Draw error over cost, both logarithmic: each engine's steps joined, and the front, which nothing beats in both."""
+    engines = list(dict.fromkeys(point.engine for point in found.points))
+    colours, markers = engine_colours(engines), engine_markers(engines)
+    cheapest, best = zip(*((point.typical, max(point.error, ROUNDING)) for point in found.front), strict=True)
+    axes.loglog(cheapest, best, color=INK, linewidth=5.0, alpha=0.25, label="front")
+    for engine in engines:
+        mine = [point for point in found.points if point.engine == engine]
+        axes.loglog(
+            [point.typical for point in mine],
+            [max(point.error, ROUNDING) for point in mine],
+            color=colours[engine],
+            marker=markers[engine],
+            markersize=3.5,
+            linewidth=1.0,
+            label=engine,
+        )
+    unit = METRICS[found.metric].unit
+    axes.set_xlabel("time per simulated second [s]")
+    axes.set_ylabel(found.metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))
+
+
+def tradeoff_figure(found: "TradeOff") -> "Figure":
+    """Error over cost in one scene."""
+    with _figure(2) as (figure, panels):
+        plot_tradeoff(found, panels[0])
+        panels[0].set_title(found.scene.name)
+        panels[1].axis("off")
+        panels[1].legend(*panels[0].get_legend_handles_labels(), loc="center left", frameon=False)
+    return figure
 
 
 def ensemble_figure(results: Results, scene_name: str) -> "Figure | None":

@@ -59,3 +59,17 @@ def status(text: str) -> Iterator[None]:
         return
     with console.status(text):
         yield
+
+
+@contextmanager
+def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
+    """A bar of a share of work done on a terminal; elsewhere one line. On the standard error."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        click.echo(f"running {title}", err=True)
+        yield lambda what, share: None
+        return
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda what, share: bar.update(task, completed=share, description=f"{title}: {what}")

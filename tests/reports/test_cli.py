@@ -376,3 +376,36 @@ def test_calibrate_what_cannot_be(given, message, tmp_path):
     assert done.returncode == 2
     assert message in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_tradeoff(tmp_path):
+    """The front, the advice, and the files."""
+    (tmp_path / "short.toml").write_text("""
+duration = 2.0
+[body]
+shape = "box"
+half_extents = [0.1, 0.2, 0.3]
+mass = 2.0
+[start]
+angular_velocity = [1.0, 5.0, 0.5]
+""")
+    asked = ("tradeoff", "short.toml", "-e", "document[rotation=rk4]", "-e", "document[rotation=exact]", "-e", "document")
+    done = dropspin(*asked, "--within", "1e-9", "--within", "1e-30", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = " ".join(done.stdout.split())
+    assert "orientation error within 1e-09 rad: document[rotation=" in told
+    assert "within 1e-30 rad: nothing gets there; the nearest is document[rotation=" in told
+    assert "Left out: document, it does not converge: orientation error stays at" in told
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["short.svg", "tradeoff.csv", "tradeoff.json", "tradeoff.md"]
+    rows = json.loads((tmp_path / "out" / "tradeoff.json").read_text())
+    assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]"}
+    assert all(row["cost_best"] <= row["cost"] for row in rows)
+    assert any(row["on_front"] for row in rows)
+
+
+def test_tradeoff_of_what_has_no_truth(tmp_path):
+    (tmp_path / "mine.toml").write_text(SCENE.replace("mass = 2.0", "mass = 2.0").replace('friction = "infinite"', "friction = 0.3"))
+    done = dropspin("tradeoff", "mine.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "has no truth to hold errors against" in done.stderr
+    assert list(tmp_path.iterdir()) == [tmp_path / "mine.toml"]

@@ -1,0 +1,106 @@
+"""What a trade-off between error and cost says: rows, sentences, files."""
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from comparisons.metrics import METRICS
+from comparisons.tradeoff import Point, TradeOff
+
+COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "on_front")
+
+
+def rows(found: TradeOff) -> list[dict[str, Any]]:
+    """All points: error, and time per simulated second as median, best and quartiles of the rounds [s]."""
+    front = found.front
+    return [
+        {
+            "scene": found.scene.name,
+            "metric": found.metric,
+            "engine": point.engine,
+            "dt": point.dt,
+            "error": point.error,
+            "cost": point.typical,
+            "cost_best": float(point.cost.min()),
+            "cost_quartiles": [float(value) for value in np.quantile(point.cost, [0.25, 0.75])],
+            "on_front": point in front,
+        }
+        for point in found.points
+    ]
+
+
+def front_rows(found: TradeOff) -> list[dict[str, str]]:
+    """The front, in words: from the cheapest to the most accurate."""
+    unit = _unit(found)
+    return [
+        {
+            "engine": point.engine,
+            "step": f"{1e3 * point.dt:.4g} ms",
+            "error": f"{point.error:.2e}{unit}",
+            "time per simulated second": f"{_time(point.typical)} (best {_time(float(point.cost.min()))})",
+        }
+        for point in found.front
+    ]
+
+
+def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
+    """What to take within each tolerance, by how much, what is next best; and what is never worth its time."""
+    unit = _unit(found)
+    name = found.metric.replace("_", " ")
+    told = []
+    for tolerance in within:
+        goal = f"{found.scene.name}, {name} within {tolerance:g}{unit}"
+        advice = found.recommendation(tolerance)
+        if advice is None:
+            nearest = min(found.points, key=lambda point: point.error)
+            told.append(f"{goal}: nothing gets there; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}.")
+            continue
+        sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical)} a simulated second"
+        if advice.next_best is None:
+            sentence += "; nothing else gets there."
+        elif advice.level:
+            sentence += f"; level with {_named(advice.next_best)}, {advice.ratio:.2f} times that."
+        else:
+            sentence += f"; next best {_named(advice.next_best)}, {advice.ratio:.1f} times that."
+        told.append(sentence)
+    if found.dominated:
+        told.append(f"Dominated, less accurate or slower than something else at every step: {', '.join(found.dominated)}.")
+    told += [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
+    return told
+
+
+def write(found: Sequence[TradeOff], within: Sequence[float], folder: Path) -> None:
+    """`tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot for each scene."""
+    from reports.plots import tradeoff_figure
+
+    folder.mkdir(parents=True, exist_ok=True)
+    everything = [row for one in found for row in rows(one)]
+    with (folder / "tradeoff.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(everything)
+    (folder / "tradeoff.json").write_text(json.dumps(everything, indent=1), encoding="utf-8")
+    parts = []
+    for one in found:
+        listed = "\n".join(f"- {sentence}" for sentence in sentences(one, within))
+        parts.append(f"![{one.scene.name}]({one.scene.name}.svg)\n\n{listed}")
+        tradeoff_figure(one).savefig(folder / f"{one.scene.name}.svg")
+    told = "\n\n".join(parts)
+    (folder / "tradeoff.md").write_text(f"# What accuracy costs\n\n{told}\n", encoding="utf-8")
+
+
+def _named(point: Point) -> str:
+    return f"{point.engine} at {1e3 * point.dt:.4g} ms"
+
+
+def _unit(found: TradeOff) -> str:
+    unit = METRICS[found.metric].unit
+    return "" if unit == "1" else f" {unit}"
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"

@@ -57,6 +57,8 @@ BUDGET_IN_FLIGHT, BUDGET_ON_A_FLOOR = 0.25, 0.05  # s, that one run may take; on
 MOST_RECORDED = 200_000  # steps of one run on a floor, of which each is looked at
 NO_BETTER = 0.8
 """Of the error of the step before: a method that does not get below this has reached its floor, if that is small; else it may be lost."""
+FEWEST_POINTS = 6
+"""To tell a floor, or another motion, from a coarse step."""
 CONVERGED = 0.3
 """Of the largest error of the motion, that the least must be below."""
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
@@ -249,12 +251,13 @@ def _errors(contestant: Contestant, scene: Scenario, metrics: Sequence[str], cel
             stuck = stuck + 1 if found and errors[0] > NO_BETTER * found[-1][1] else 0
             found.append((dt, *errors))
         patience = PATIENCE if found and found[-1][1] < SMALL else PATIENCE_WHILE_LARGE
-        if stuck >= patience or taken > budget:
+        if (stuck >= patience and len(found) > FEWEST_POINTS) or taken > budget:
             break
     if not found:
         raise Failed("diverged", "no step gives a finite error")
     of_the_motion = [error for _, _, error in found]
-    if len(found) > PATIENCE_WHILE_LARGE and min(of_the_motion) > CONVERGED * max(of_the_motion):
+    lost = max(of_the_motion) > SMALL and min(of_the_motion) > CONVERGED * max(of_the_motion)
+    if lost and len(found) > FEWEST_POINTS:
         unit = METRICS[metrics[1]].unit.replace("1", "")
         stays = " ".join(filter(None, [f"{of_the_motion[-1]:.3g}", unit]))
         raise Failed("failed", f"it does not converge: {metrics[1].replace('_', ' ')} stays at {stays}, however small the step")

@@ -95,6 +95,16 @@ def test_what_does_not_converge_is_left_out(spin):
     assert min(point.error for point in spin.points if "exact" in point.engine) < 1e-13
 
 
+def test_the_energy_of_another_motion_is_worth_nothing():
+    """The note keeps the energy of a spin that it gets wrong, and is left out by that metric too; midpoint keeps that of the right one."""
+    short = SPIN.model_copy(update={"duration": 10.0})
+    found = tradeoff(short, ["document", "document[rotation=midpoint]", "document[rotation=rk4]"], metric="energy_error")
+    assert "does not converge: orientation error" in found.left_out["document"]
+    of = {name: [point.error for point in found.points if name in point.engine] for name in ("midpoint", "rk4")}
+    assert max(of["midpoint"]) < 1e-11  # measured 1e-13, at steps of a radian too
+    assert of["rk4"][0] > 1e-4
+
+
 def test_every_cost_is_a_time(spin):
     for point in spin.points:
         assert np.isfinite(point.cost).all()

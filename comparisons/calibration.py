@@ -22,9 +22,10 @@ Motion = Callable[[float, int, float], tuple[list[float], list[float]]]
 """Height of a fall [m], steps and step [s] to heights of the lowest point [m] and vertical speeds [m/s]."""
 Shape = Literal["ball", "box"]
 
+HALF_HEIGHT = 0.1  # m
 BODIES: Mapping[Shape, Mapping[str, Any]] = {
-    "ball": {"shape": "sphere", "radius": 0.1, "mass": 1.0},
-    "box": {"shape": "box", "half_extents": [0.15, 0.1, 0.25], "mass": 1.0},
+    "ball": {"shape": "sphere", "radius": HALF_HEIGHT, "mass": 1.0},
+    "box": {"shape": "box", "half_extents": [0.15, HALF_HEIGHT, 0.25], "mass": 1.0},
 }
 GRAVITY = 9.81
 DROP = 1.0  # m
@@ -75,7 +76,7 @@ def calibrate(
     dt: float,
     friction: str | float = "none",
     shape: Shape = "ball",
-    limits: Limits = Limits(),  # noqa: B008
+    limits: Limits = Limits(),  # noqa: B008 - it cannot be changed
 ) -> Calibration:
     """The settings that give a restitution at a time step, measured.
 
@@ -95,7 +96,7 @@ def calibrate(
             "name": f"a {shape} on a floor",
             "duration": LONG,
             "body": dict(BODIES[shape]),
-            "start": {"position": [0.0, DROP + (0.1 if shape == "ball" else BODIES[shape]["half_extents"][1]), 0.0]},
+            "start": {"position": [0.0, DROP + HALF_HEIGHT, 0.0]},
             "gravity": {"acceleration": [0.0, -GRAVITY, 0.0]},
             "floor": {"restitution": restitution, "friction": friction},
         }

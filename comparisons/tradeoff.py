@@ -183,7 +183,8 @@ def tradeoff(
     truth = truth_for(scene)
     if truth is None:
         raise DropspinError(f"{scene.name} has no truth to hold errors against; choose a scene that has, see dropspin list.")
-    chosen = metric or default_metric(scene)
+    of_the_motion = default_metric(scene)
+    chosen = metric or of_the_motion
     known = [one.name for one in metrics_for(scene, truth)]
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
@@ -193,7 +194,7 @@ def tradeoff(
     with Cells(limits) as cells:
         for number, contestant in enumerate(contestants):
             try:
-                errors = _errors(contestant, scene, [chosen, default_metric(scene)], cells)
+                errors = _errors(contestant, scene, [chosen, of_the_motion], cells)
             except Failed as failure:
                 left_out[contestant.label] = failure.reason
                 continue
@@ -258,8 +259,8 @@ def _errors(contestant: Contestant, scene: Scenario, metrics: Sequence[str], cel
     of_the_motion = [error for _, _, error in found]
     lost = max(of_the_motion) > SMALL and min(of_the_motion) > CONVERGED * max(of_the_motion)
     if lost and len(found) > FEWEST_POINTS:
-        unit = METRICS[metrics[1]].unit.replace("1", "")
-        stays = " ".join(filter(None, [f"{of_the_motion[-1]:.3g}", unit]))
+        unit = METRICS[metrics[1]].unit
+        stays = f"{of_the_motion[-1]:.3g}" + ("" if unit == "1" else f" {unit}")
         raise Failed("failed", f"it does not converge: {metrics[1].replace('_', ' ')} stays at {stays}, however small the step")
     return found
 

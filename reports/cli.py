@@ -7,16 +7,31 @@ import os
 import signal
 import sys
 import traceback
+from collections.abc import Callable
 from importlib.metadata import version
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
 
 CORE_ENGINES = ("document", "mujoco", "pybullet")
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 OWN_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor the user's mistake
 
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
+
+
+def _time_limit(default: float, of: str) -> Callable[[Command], Command]:
+    """The option of what an engine's process may use."""
+    return click.option(
+        "--time-limit",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=default,
+        show_default=True,
+        metavar="SECONDS",
+        help=f"Processor time that {of}.",
+    )
 
 
 def main() -> None:
@@ -114,14 +129,7 @@ def dropspin() -> None:
     metavar="DIR",
     help="Folder for the report and the data; an earlier run there is replaced.",
 )
-@click.option(
-    "--time-limit",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=300.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="Processor time that an engine may take for one scene at one step.",
-)
+@_time_limit(300.0, "an engine may take for one scene at one step")
 @click.option("--resume", is_flag=True, help="Go on with a run that was interrupted: measured scenes are not run again.")
 @as_json
 def run(
@@ -169,7 +177,7 @@ def run(
             with status("writing the report"):
                 fill(results, folder)
     except KeyboardInterrupt:
-        kept = len(measured.parts())
+        kept = len(measured)
         raise KeyboardInterrupt(f"{kept} of {len(loaded)} scenes are kept, --resume goes on" if kept else "nothing was written") from None
     measured.clear()
     if json_output:
@@ -223,14 +231,7 @@ def doctor(json_output: bool) -> None:
 
 @dropspin.command()
 @click.argument("engine_name", metavar="ENGINE")
-@click.option(
-    "--time-limit",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=60.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="Processor time that each check may take.",
-)
+@_time_limit(60.0, "each check may take")
 @as_json
 def conform(engine_name: str, time_limit: float, json_output: bool) -> int:
     """Is this adapter right? Hold an engine's adapter against the protocol and against motions that tell mistakes apart.

@@ -76,6 +76,9 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
                 parent.rmdir()
 
 
+PARTS = "[0-9]*"
+
+
 class Measured:
     """The scenes of a run that are measured already, on disk beside the folder that the run will have.
 
@@ -92,11 +95,14 @@ class Measured:
         self._path.mkdir(exist_ok=True)
         unfinished = Path(tempfile.mkdtemp(prefix="unfinished-", dir=self._path))
         save(part, unfinished)
-        unfinished.rename(self._path / f"{len(list(self._path.iterdir())):03d}-{part.scenes[scene].digest}")
+        unfinished.rename(self._path / f"{len(self):03d}-{part.scenes[scene].digest}")
+
+    def __len__(self) -> int:
+        return len(list(self._path.glob(PARTS)))
 
     def parts(self) -> list[Results]:
         """What there is, in no order."""
-        return [restore(path) for path in sorted(self._path.glob("[0-9]*"))]
+        return [restore(path) for path in sorted(self._path.glob(PARTS))]
 
     def clear(self) -> None:
         """Forget it."""

@@ -51,7 +51,7 @@ class Declined(Exception):
     """The engine runs none of the scenes that would show it."""
 
 
-def conform(engine: Engine, limits: Limits = Limits(processor_time=60.0)) -> list[Finding]:  # noqa: B008
+def conform(engine: Engine, limits: Limits = Limits(processor_time=60.0)) -> list[Finding]:  # noqa: B008 - it cannot be changed
     """Hold an adapter against the protocol, and its motion against scenes that tell one mistake from another.
 
     Args:

@@ -27,6 +27,7 @@ Change = Callable[[Array, Array], Array]
 
 POSITION, ORIENTATION, VELOCITY, SPIN = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
 STANDARD_GRAVITY = 9.81
+SLOW = 0.2  # m/s; Bullet drops restitution below it
 
 
 def _as_it_is(scene: Scenario) -> Scenario:
@@ -119,8 +120,12 @@ def _table(part: str, **values: Any) -> Simulated:
 
 def _start(part: slice, change: Change) -> Simulated:
     """The scene with a part of the start changed, by a function of its values and of the orientation."""
-    told = _told(part, change)
-    return lambda scene: scene.starting_at(told(scene.initial_state[None])[0])
+    return _started(_told(part, change))
+
+
+def _started(change: Told) -> Simulated:
+    """The scene with its start changed as states are."""
+    return lambda scene: scene.starting_at(change(scene.initial_state[None])[0])
 
 
 def _told(part: slice, change: Change) -> Told:
@@ -151,7 +156,11 @@ def _convention(part: slice, words: tuple[str, str, str], wrong: Change, right: 
         wrong: What a sound part is made into, by mistake.
         right: The way back.
     """
-    told, simulated = _told(part, wrong), _start(part, right)
+    return _read_set_both(part, words, _told(part, wrong), _told(part, right))
+
+
+def _read_set_both(part: slice, words: tuple[str, str, str], told: Told, back: Told) -> list[Mistake]:
+    simulated = _started(back)
     ways: list[tuple[Simulated, Told]] = [(_as_it_is, told), (simulated, _as_told), (simulated, told)]
     return [Mistake(said, *way, about=str(part)) for said, way in zip(words, ways, strict=True)]
 
@@ -168,14 +177,7 @@ def _orientation(words: tuple[str, str, str], wrong: Change, right: Change) -> l
 
         return changed
 
-    told, back = carried(wrong), carried(right)
-
-    def simulated(scene: Scenario) -> Scenario:
-        return scene.starting_at(back(scene.initial_state[None])[0])
-
-    ways: list[tuple[Simulated, Told]] = [(_as_it_is, told), (simulated, _as_told), (simulated, told)]
-    with_spin = [Mistake(said, *way, about=str(ORIENTATION)) for said, way in zip(words, ways, strict=True)]
-    return _convention(ORIENTATION, words, wrong, right) + with_spin
+    return _convention(ORIENTATION, words, wrong, right) + _read_set_both(ORIENTATION, words, carried(wrong), carried(right))
 
 
 def _three(what: str, ought: str) -> tuple[str, str, str]:
@@ -202,17 +204,16 @@ def _mirrored(states: Array) -> Array:
     return states * [1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0]
 
 
-def _without_products(scene: Scenario) -> Scenario:
-    moments = tuple(float(moment) for moment in np.diag(scene.body.inertia_tensor))
-    return _table("body", inertia=moments)(scene)
+def _moments(scene: Scenario) -> tuple[float, ...]:
+    """Moments of inertia about the body's own axes; products are left out."""
+    return tuple(np.diag(scene.body.inertia_tensor).tolist())
 
 
 def _scaled_inertia(by: Callable[[float], float]) -> Simulated:
-    """Inertia times a function of the mass."""
+    """Moments of inertia times a function of the mass."""
 
     def scaled(scene: Scenario) -> Scenario:
-        moments = tuple(by(scene.body.mass) * float(moment) for moment in np.diag(scene.body.inertia_tensor))
-        return _table("body", inertia=moments)(scene)
+        return _table("body", inertia=tuple(by(scene.body.mass) * moment for moment in _moments(scene)))(scene)
 
     return scaled
 
@@ -222,7 +223,7 @@ def _permuted_extents(order: tuple[int, ...]) -> Simulated:
         if not isinstance(scene.body, Box):
             return scene
         extents = [scene.body.half_extents[axis] for axis in order]
-        return _table("body", half_extents=extents, inertia=tuple(np.diag(scene.body.inertia_tensor).tolist()))(scene)
+        return _table("body", half_extents=extents, inertia=_moments(scene))(scene)
 
     return permuted
 
@@ -247,9 +248,8 @@ def _scaled_size(by: float) -> Simulated:
     def scaled(scene: Scenario) -> Scenario:
         if scene.floor is None:
             return scene
-        fixed = tuple(float(moment) for moment in np.diag(scene.body.inertia_tensor))
         sizes = {"radius", "half_extents"} & set(type(scene.body).model_fields)
-        return _table("body", inertia=fixed, **{size: lambda given: np.multiply(given, by).tolist() for size in sizes})(scene)
+        return _table("body", inertia=_moments(scene), **{size: lambda given: np.multiply(given, by).tolist() for size in sizes})(scene)
 
     return scaled
 
@@ -273,11 +273,6 @@ def _friction(change: Callable[[float], float]) -> Simulated:
 
 def _angular_like_linear(scene: Scenario) -> Scenario:
     return scene if scene.damping is None else _table("damping", angular=scene.damping.linear)(scene)
-
-
-def _slow_stop(scene: Scenario) -> Scenario:
-    """No restitution below 0.2 m/s."""
-    return _table("floor", rest_speed=0.2)(scene)
 
 
 def _of(about: str, *mistakes: tuple[str, Simulated]) -> list[Mistake]:
@@ -391,7 +386,7 @@ FLIGHT = (
     *_of(
         "inertia",
         *((f"the moments of inertia look permuted to ({_axes(order)})", _permuted_moments(order)) for order in ORDERS),
-        ("products of inertia are left out: the body's own axes are not principal", _without_products),
+        ("products of inertia are left out: the body's own axes are not principal", _scaled_inertia(lambda mass: 1.0)),
         ("inertia is twice as large", _scaled_inertia(lambda mass: 2.0)),
         ("inertia is half as large", _scaled_inertia(lambda mass: 0.5)),
         ("inertia is multiplied by the mass", _scaled_inertia(lambda mass: mass)),
@@ -408,7 +403,10 @@ IMPACT = (
         ("restitution looks squared; an engine that multiplies two bodies' needs 1 for the floor", _restitution(lambda e: e**2)),
         ("restitution looks halved; an engine that takes the mean of two bodies' needs both", _restitution(lambda e: e / 2)),
         ("restitution is the mean of the scene's and 1", _restitution(lambda e: (e + 1) / 2)),
-        ("restitution is 0 below a speed of the engine's own; the scene's rest_speed is 0", _slow_stop),
+        (
+            "restitution is 0 below a speed of the engine's own; the scene's rest_speed is 0",
+            _table("floor", rest_speed=SLOW),
+        ),
     ),
     *_of(
         "friction",

@@ -141,8 +141,9 @@ def record(first, given):
         ([(BUILT, f"self.model.dof_damping[:] = 0.1; {BUILT}")], "coasting", "2.367 m/s and should as 2.411: damping"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_named(changes, check, words):
-    """Planted in the documented adapter."""
+def test_a_mistake_is_named(changes, check, words, tmp_path, monkeypatch):
+    """Planted in the documented adapter; one of them writes into the working directory."""
+    monkeypatch.chdir(tmp_path)
     found = bad(documented(*changes))
     assert check in found, found
     assert words in found[check][1]

@@ -42,4 +42,5 @@ def rendered(template: str, scene: Scenario, **values: Any) -> str:
 
 def can_be_pasted(scene: Scenario) -> bool:
     """Whether the templates know the scene: a ball or a box on a floor, under gravity along -y."""
-    return scene.floor is not None and isinstance(scene.body, (Sphere, Box)) and scene.acceleration[1] < 0.0 == any(scene.acceleration[::2])
+    falls = bool(scene.acceleration[1] < 0.0) and not any(scene.acceleration[::2])
+    return falls and scene.floor is not None and isinstance(scene.body, (Sphere, Box))

@@ -147,24 +147,26 @@ class Comparison:
 
     @cached_property
     def first_contact(self) -> tuple[int, int] | None:
-        """The rows just before and just after the floor first changes the velocity, or None.
+        """The rows just before and just after the floor first changes the velocity, or None."""
+        if self.scene.floor is None or not self.touching.any():
+            return None
+        first = int(np.argmax(self.touching))
+        free = np.flatnonzero(~self.touching[first:])
+        return first, first + int(free[0]) if len(free) else len(self.motion) - 1
+
+    @cached_property
+    def touching(self) -> NDArray[np.bool_]:
+        """In which steps the floor changes the velocity, shape (n - 1,).
 
         Without contact, a step changes the velocity by gravity and damping alone. What is left over counts as contact above
         1e-3 of gravity's share, 1e-6 of the speed (an engine in single precision) and twice the damping's share (each engine
         damps by a law of its own).
         """
-        if self.scene.floor is None:
-            return None
         v, g = self.motion.velocity, self.scene.acceleration
         left_over = np.linalg.norm(np.diff(v, axis=0) - self.dt * g, axis=1)
         damped = 0.0 if self.scene.damping is None else 2.0 * self.dt * self.scene.damping.linear
         allowed = 1e-3 * self.dt * np.linalg.norm(g) + (1e-6 + damped) * np.linalg.norm(v[:-1], axis=1)
-        touching = left_over > allowed
-        if not touching.any():
-            return None
-        first = int(np.argmax(touching))
-        free = np.flatnonzero(~touching[first:])
-        return first, first + int(free[0]) if len(free) else len(v) - 1
+        return left_over > allowed
 
     def contact_point(self, row: int) -> Array:
         """From the centre of mass to the point that is lowest at a row [m], shape (3,); the middle of several that are."""

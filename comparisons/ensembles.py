@@ -17,7 +17,7 @@ from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Diverged, Engine
 from comparisons.metrics import last_time_in_motion
 from scenarios import Scenario, Trajectory, members
-from scenarios.mechanics import energy
+from scenarios.mechanics import angular_momentum, energy
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
@@ -40,12 +40,15 @@ class Outcome:
         energy: What each has of the scene's energy at these times, shape (size, MARKS).
         rebound: How high each rises after it first touched the floor, over how high it started, shape (size,); 0 if it never did.
         rest_time: When each was last in motion [s], shape (size,).
+        angular_momentum: |L| of each at these times, over r √(2 E M), E the scene's energy and r the body's size, shape (size, MARKS);
+            None in runs from before it was kept.
     """
 
     t: Array
     energy: Array
     rebound: Array
     rest_time: Array
+    angular_momentum: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ def outcome_of(engine: Engine, scene: Scenario, dt: float) -> Outcome:
     marks = np.round(np.linspace(0.0, steps, MARKS)).astype(int)
     with engine.prepare(scene, dt) as simulation:
         lag = 0.5 * dt if simulation.staggered else 0.0
-    energies, rebounds, rest_times = [], [], []
+    energies, momenta, rebounds, rest_times = [], [], [], []
     starts = members(scene)
     for first in range(0, len(starts), AT_ONCE):
         some = starts[first : first + AT_ONCE]
@@ -93,10 +96,13 @@ def outcome_of(engine: Engine, scene: Scenario, dt: float) -> Outcome:
                 raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
             case = Comparison(member, motion)
             contact = case.first_contact
-            energies.append(energy(member, motion[marks]) / _energy_scale(case))
+            scale = _energy_scale(case)
+            energies.append(energy(member, motion[marks]) / scale)
+            lengths = np.linalg.norm(angular_momentum(member, motion[marks]), axis=1)
+            momenta.append(lengths / (scene.body.size * np.sqrt(2.0 * scale * scene.body.mass)))
             rebounds.append(0.0 if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1])
             rest_times.append(last_time_in_motion(member, motion))
-    return Outcome(t[marks], np.array(energies), np.array(rebounds), np.array(rest_times))
+    return Outcome(t[marks], np.array(energies), np.array(rebounds), np.array(rest_times), np.array(momenta))
 
 
 def _energy_scale(case: Comparison) -> float:

@@ -10,10 +10,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons import errors
 from comparisons.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
 from scenarios import Scenario, Trajectory, Truth
-from scenarios.mechanics import angular_momentum, energy, kinetic_energy, lowest_height
-from scenarios.rotations import angle_between_orientations, angle_between_vectors
+from scenarios.mechanics import angular_momentum, apex, energy, kinetic_energy, lowest_height
 
 Array = NDArray[np.float64]
 NEAR_FLOOR = 0.05  # of the body's size: engines may take what is so near for contact
@@ -180,15 +180,13 @@ def _keeps_horizontal_momentum(scene: Scenario, truth: Truth | None) -> bool:
 @_metric("1", "truth", "a truth", _has_truth, signed=True, agreement=True)
 def energy_error(case: Comparison) -> Array:
     """Largest difference of energy from the truth in flight, velocity synchronised with position, over the scene's energy."""
-    found = energy(case.scene, case.compared) - energy(case.scene, case.exact)
-    return _extremes_of_each_flight(found, case) / case.energy_scale
+    return _extremes_of_each_flight(errors.energy_error(case), case)
 
 
 @_metric("1", "truth", "a truth", _has_truth, signed=True)
 def energy_error_raw(case: Comparison) -> Array:
     """The same from the state as it stands: what a user sees who does not know that velocity lags by half a step."""
-    found = energy(case.scene, case.compared, synchronised=False) - energy(case.scene, case.exact)
-    return _extremes_of_each_flight(found, case) / case.energy_scale
+    return _extremes_of_each_flight(errors.energy_error(case, synchronised=False), case)
 
 
 @_metric("1", "invariant", "no damping, a start in flight", _keeps_energy_in_flight, signed=True, first_flight=True)
@@ -212,7 +210,7 @@ def bounce_height_error(case: Comparison) -> float:
     if len(case.flights) < 2:
         raise Unresolved(f"the flight after the impact is too short for steps of {case.dt:g} s")
     rows = case.flights[1]
-    found, exact = (_apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
+    found, exact = (apex(case.scene, motion[rows]) for motion in (case.compared, case.exact))
     return float(np.mean(found - exact)) / case.scene.clearance
 
 
@@ -289,18 +287,13 @@ def out_of_step(case: Comparison) -> float:
 @_metric("1", "truth", "a truth with spin", _spins, agreement=True)
 def angular_momentum_error(case: Comparison) -> Array:
     """Largest difference of angular momentum from the truth in flight, over the truth's largest."""
-    found, exact = (angular_momentum(case.scene, motion) for motion in (case.compared, case.exact))
-    scale = np.max(np.linalg.norm(exact, axis=1))
-    if scale == 0.0:
-        raise Unresolved("the angular momentum is too small to be a number")
-    return _largest_of_each_flight(np.linalg.norm(found - exact, axis=1), case) / scale
+    return _largest_of_each_flight(errors.angular_momentum_error(case), case)
 
 
 @_metric("rad", "truth", "a truth with spin, a start in flight", _spins_in_flight)
 def angular_momentum_direction_error(case: Comparison) -> Array:
     """Largest angle in flight between the angular momentum and the truth's."""
-    found, exact = (angular_momentum(case.scene, motion) for motion in (case.compared, case.exact))
-    return _largest_of_each_flight(angle_between_vectors(found, exact), case)
+    return _largest_of_each_flight(errors.angular_momentum_direction_error(case), case)
 
 
 @_metric("1", "invariant", "a frictionless floor, gravity straight down, no damping", _keeps_horizontal_momentum)
@@ -314,13 +307,13 @@ def horizontal_momentum_error(case: Comparison) -> float:
 @_metric("m", "truth", "a truth", _has_truth)
 def position_error(case: Comparison) -> float:
     """Largest distance of the centre of mass from the truth's."""
-    return float(np.max(np.linalg.norm(case.compared.position - case.exact.position, axis=1)))
+    return float(np.max(errors.position_error(case)))
 
 
 @_metric("rad", "truth", "a truth", _has_truth)
 def orientation_error(case: Comparison) -> float:
     """Largest angle of the rotation that takes the truth's attitude to the engine's."""
-    return float(np.max(angle_between_orientations(case.compared.orientation, case.exact.orientation)))
+    return float(np.max(errors.orientation_error(case)))
 
 
 @_metric("m", "invariant", "a floor", _has_floor)
@@ -335,12 +328,6 @@ def last_time_in_motion(scene: Scenario, motion: Trajectory) -> float:
     still = scene.body.mass * max(2.0 * (g * dt) ** 2, 1e-6 * g * scene.body.size)
     moving = np.flatnonzero(kinetic_energy(scene, motion) > still)
     return float(motion.t[moving[-1]]) if len(moving) else 0.0
-
-
-def _apex(scene: Scenario, motion: Trajectory) -> Array:
-    """The height to which a body in flight rises, or has risen [m], from each of its states alike."""
-    v = motion.velocity[:, 1]
-    return v * v / (-2.0 * scene.acceleration[1]) + motion.position[:, 1] - motion.velocity_lag * v
 
 
 def _largest_of_each_flight(values: Array, case: Comparison) -> Array:

@@ -62,7 +62,9 @@ def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], na
     files = {}
     for number, ((scene, engine, dt), item) in enumerate(items.items()):
         path = f"{kind}/{number:03d}-{_file_name(scene)}-{_file_name(engine)}-{dt:g}.npz"
-        np.savez_compressed(folder / path, allow_pickle=False, **{name: getattr(item, name) for name in names})
+        np.savez_compressed(
+            folder / path, allow_pickle=False, **{name: getattr(item, name) for name in names if getattr(item, name) is not None}
+        )
         files[path] = {"scene": scene, "engine": engine, "dt": dt}
     return files
 
@@ -70,7 +72,7 @@ def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], na
 def _restored_arrays(folder: Path, files: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Iterator[tuple[TrajectoryKey, Any]]:
     for path, key in files.items():
         with np.load(folder / path, allow_pickle=False) as arrays:
-            yield (key["scene"], key["engine"], key["dt"]), {name: arrays[name] for name in names}
+            yield (key["scene"], key["engine"], key["dt"]), {name: arrays[name] for name in names if name in arrays}
 
 
 def _file_name(text: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from comparisons import Results
 from comparisons.store import restore, save
-from reports.html import PLOTS, html_report, markdown_report, svg_plots
+from reports.html import FIGURES, html_report, markdown_report, svg_plots
 from scenarios import DropspinError
 
 OURS = frozenset({"run.json", "results.parquet", "results.csv", "report.html", "report.md", "plots", "trajectories", "ensembles"})
@@ -154,5 +154,5 @@ def _files_of_run(folder: Path) -> set[str]:
         arrays, scenes = {*content["trajectories"], *content["ensembles"]}, content["scenes"]
     except (OSError, ValueError, TypeError, KeyError):
         return set()
-    plots = {f"plots/{number:02d}-{kind}.svg" for number in range(len(scenes)) for kind in PLOTS}
+    plots = {f"plots/{number:02d}-{kind}.svg" for number in range(len(scenes)) for kind in FIGURES}
     return {*OURS, *arrays, *plots}

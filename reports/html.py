@@ -1,9 +1,9 @@
 """The report: one HTML file that needs no network."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
@@ -23,11 +23,22 @@ from reports.findings import (
     verdict_sentence,
     worst_verdicts,
 )
-from reports.plots import convergence_figure, ensemble_figure, time_figure
+from reports.plots import bounce_figure, convergence_figure, ensemble_figure, flight_figure, time_figure
+from reports.plots.spins import wobbles_freely
 from reports.svg import svg
 from scenarios import Scenario, truth_for
 
-PLOTS = ("time", "convergence", "ensemble")
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FIGURES: dict[str, Callable[[Results, str], "Figure | None"]] = {
+    "time": time_figure,
+    "flight": flight_figure,
+    "bounces": bounce_figure,
+    "convergence": convergence_figure,
+    "ensemble": ensemble_figure,
+}
+"""What is drawn of a scene, where it has it."""
 
 
 @cache
@@ -63,13 +74,10 @@ def markdown_report(results: Results) -> str:
 def svg_plots(results: Results) -> Iterator[tuple[str, str]]:
     """Name and SVG of each plot of the report."""
     for number, scene in enumerate(results.scenes):
-        yield f"{number:02d}-time", svg(time_figure(results, scene), f"s{number:02d}-time")
-        figure = convergence_figure(results, scene)
-        if figure is not None:
-            yield f"{number:02d}-convergence", svg(figure, f"s{number:02d}-convergence")
-        figure = ensemble_figure(results, scene)
-        if figure is not None:
-            yield f"{number:02d}-ensemble", svg(figure, f"s{number:02d}-ensemble")
+        for kind, draw in FIGURES.items():
+            figure = draw(results, scene)
+            if figure is not None:
+                yield f"{number:02d}-{kind}", svg(figure, f"s{number:02d}-{kind}")
 
 
 def _markdown_cell(text: str) -> str:
@@ -119,9 +127,9 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
         "agreement": _agreement(frame, min(dts)),
         "ensemble": _ensemble(frame, min(dts)),
-        "time_plot": Markup(plots.get(f"{number:02d}-time", "")),  # our own SVG; its text is escaped by matplotlib
-        "convergence_plot": Markup(plots.get(f"{number:02d}-convergence", "")),
-        "ensemble_plot": Markup(plots.get(f"{number:02d}-ensemble", "")),
+        "wobbles": wobbles_freely(scene),
+        # Our own SVG; its text is escaped by matplotlib.
+        **{f"{kind}_plot": Markup(plots.get(f"{number:02d}-{kind}", "")) for kind in FIGURES},
     }
 
 

@@ -1,4 +1,4 @@
-"""Energy, angular momentum and lowest point of a scene's body along a trajectory."""
+"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,12 @@ def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Ar
     origin = np.array([0.0, scene.body.resting_height, 0.0]) if scene.floor else np.array(scene.start.position)
     total = kinetic_energy(scene, motion) - mass * (motion.position - origin) @ g
     return total + motion.velocity_lag * mass * motion.velocity @ g if synchronised else total
+
+
+def apex(scene: Scenario, motion: Trajectory) -> Array:
+    """v²/2g + y: how high a body in flight rises, or has risen [m], alike from each of its states, shape (n,); gravity straight down."""
+    v = motion.velocity[:, 1]
+    return v * v / (-2.0 * scene.acceleration[1]) + motion.position[:, 1] - motion.velocity_lag * v
 
 
 def lowest_height(scene: Scenario, motion: Trajectory) -> Array:

@@ -70,9 +70,11 @@ def test_folder_holds_everything(results, folder):
     expected = {"run.json", "results.parquet", "results.csv", "report.html", "report.md"}
     assert expected <= found
     others = found - expected
-    assert all(re.fullmatch(r"plots/\d\d-(time|convergence)\.svg|trajectories/[\w.=-]+\.npz", name) for name in others), others
+    assert all(re.fullmatch(r"plots/\d\d-(time|flight|bounces|convergence)\.svg|trajectories/[\w.=-]+\.npz", name) for name in others), (
+        others
+    )
     assert len([name for name in others if name.endswith(".npz")]) == 3 * 2 * 2
-    assert sum(name.startswith("plots/") for name in others) == 6
+    assert sum(name.startswith("plots/") for name in others) == 8
 
 
 def test_page_is_whole_and_offline(folder):
@@ -88,7 +90,7 @@ def test_page_is_whole_and_offline(folder):
     assert not re.search(r"url\((?!#)", text)
     assert not re.search(r"@import|<script|<link", text)
     assert len(text) < 3_000_000
-    assert page.tags.count("svg") == 6
+    assert page.tags.count("svg") == 8
 
 
 def test_names_with_markup_are_inert(folder):

@@ -1,0 +1,40 @@
+"""Plots: each function takes results and draws into axes, for the report and for notebooks alike.
+
+A plot function makes no figure and no legend: `axes.legend()` does, from the labels that it gave. docs/examples.md has a picture of each,
+and the lines that make it.
+"""
+
+from reports.plots.bounces import plot_bounce_ladder
+from reports.plots.convergence import plot_error_over_dt
+from reports.plots.ensembles import plot_angular_momentum_of_ensemble, plot_energy_of_ensemble, plot_rest_of_ensemble
+from reports.plots.figures import bounce_figure, convergence_figure, ensemble_figure, flight_figure, time_figure, tradeoff_figure
+from reports.plots.growth import plot_error_growth
+from reports.plots.over_time import Quantity, angular_momentum_length, height, plot_over_time, quantities, tilt
+from reports.plots.spins import plot_polhode
+from reports.plots.style import FAINT, INK
+from reports.plots.tradeoff import plot_tradeoff
+
+__all__ = [
+    "FAINT",
+    "INK",
+    "Quantity",
+    "angular_momentum_length",
+    "bounce_figure",
+    "convergence_figure",
+    "ensemble_figure",
+    "flight_figure",
+    "height",
+    "plot_angular_momentum_of_ensemble",
+    "plot_bounce_ladder",
+    "plot_energy_of_ensemble",
+    "plot_error_growth",
+    "plot_error_over_dt",
+    "plot_over_time",
+    "plot_polhode",
+    "plot_rest_of_ensemble",
+    "plot_tradeoff",
+    "quantities",
+    "tilt",
+    "time_figure",
+    "tradeoff_figure",
+]

@@ -1,0 +1,80 @@
+"""The bounce ladder: how high each bounce rises."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from comparisons import Results
+from comparisons.comparison import SHORTEST_FLIGHT, Comparison
+from reports.colours import engine_colours, engine_markers
+from reports.plots.style import Array, ink, label_powers, thinner
+from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+from scenarios.mechanics import apex
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw the apex of each bounce over the drop, logarithmic: every engine's at the finest step, and the truth's e²ᵏ as stairs.
+
+    An engine's flights are its own, between the steps in which the floor changes its velocity; they end with the first that lasts less than
+    16 steps.
+
+    Args:
+        results: The run.
+        scene_name: One of its scenes; its truth must have an impact.
+        axes: What to draw into.
+
+    Raises:
+        DropspinError: The scene's truth has no impact.
+    """
+    scene = results.scenes[scene_name]
+    truth = truth_for(scene)
+    if truth is None or not truth.events or not scene.starts_above_floor:
+        raise DropspinError(f"{scene_name} has no bounces that are known; choose a scene that has, such as drop-ball.")
+    colours, markers = engine_colours(results.engines), engine_markers(results.engines)
+    finest = min((dt for name, _, dt in results.trajectories if name == scene_name), default=0.0)
+    exact = _exact_apexes(scene, truth, SHORTEST_FLIGHT * finest)
+    shown = [len(exact)]
+    for number, engine in enumerate(results.engines):
+        motion = results.trajectories.get((scene_name, engine, finest))
+        if motion is not None:
+            heights = apexes(scene, motion) / exact[0]
+            size = thinner(9.0, 4.0, number, len(results.engines))
+            style = {"color": colours[engine], "marker": markers[engine], "markersize": size, "linestyle": "none"}
+            axes.semilogy(range(len(heights)), heights, markerfacecolor="none", label=engine, **style)
+            shown.append(len(heights))
+    axes.step(range(len(exact)), exact / exact[0], where="mid", color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
+    axes.set_xticks(np.arange(0, max(shown), 1 + max(shown) // 8))
+    label_powers(axes, "y")
+    axes.set_xlabel("bounce")
+    axes.set_ylabel("apex, over the drop")
+
+
+def apexes(scene: Scenario, motion: Trajectory) -> Array:
+    """Apex above the floor [m] of the drop and of the flight after each bounce, the mean over its inner half, shape (flights,)."""
+    touching = Comparison(scene, motion).touching
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], touching, [True]])))
+    found = []
+    for start, end in edges.reshape(-1, 2):  # rows at which a flight begins and ends
+        if end - start < SHORTEST_FLIGHT:
+            break
+        quarter = (end - start) // 4
+        with np.errstate(all="ignore"):  # an engine may say 1e300
+            found.append(float(np.mean(apex(scene, motion[start + quarter : end + 1 - quarter]))))
+    return np.array(found) - _floor_height(scene)
+
+
+def _exact_apexes(scene: Scenario, truth: Truth, shortest: float) -> Array:
+    """The truth's, of flights that last no less than this [s]."""
+    states = np.array([truth.events[0].before, *(event.after for event in truth.events)])
+    heights = apex(scene, Trajectory.from_states(np.zeros(len(states)), states)) - _floor_height(scene)
+    lasting = 2.0 * states[:, 8] / -scene.acceleration[1] >= shortest
+    lasting[0] = True
+    return heights[: int(np.argmin(lasting))] if not lasting.all() else heights
+
+
+def _floor_height(scene: Scenario) -> float:
+    """Where the centre of mass is when the body touches the floor as it is turned at the start [m]."""
+    return scene.start.position[1] - scene.clearance

@@ -1,0 +1,72 @@
+"""What becomes of many starts, at the finest step: energy and angular momentum left, and who is at rest."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from comparisons import Results
+from comparisons.ensembles import Outcome
+from reports.colours import engine_colours
+from reports.plots.style import Array, thinner
+from scenarios import DropspinError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw the energy left over time: each engine's median, and between which values eight of ten lie."""
+    for outcome, style in _outcomes(results, scene_name):
+        _draw_spread(outcome.t, outcome.energy, style, axes)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("energy, over the scene's")
+
+
+def plot_angular_momentum_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw |L| over time: each engine's median, and between which values eight of ten lie.
+
+    It is relative to r √(2 E M), E the scene's energy and r the body's size: to |L| if all of E were in the spin of a ring of that radius.
+    So it means the same for starts with and without spin.
+
+    Raises:
+        DropspinError: The run was made before this was kept.
+    """
+    if not keeps_angular_momentum(results, scene_name):
+        raise DropspinError(f"{scene_name}: this run was made before angular momenta of ensembles were kept; run it again.")
+    for outcome, style in _outcomes(results, scene_name):
+        if outcome.angular_momentum is not None:
+            _draw_spread(outcome.t, outcome.angular_momentum, style, axes)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("|L|, over r √(2 E M)")
+
+
+def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw which share is at rest by when."""
+    for outcome, style in _outcomes(results, scene_name):
+        axes.ecdf(outcome.rest_time, **style)
+    axes.set_xlim(0.0, results.scenes[scene_name].duration)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("share at rest")
+
+
+def keeps_angular_momentum(results: Results, scene_name: str) -> bool:
+    """Whether a run has kept |L| of a scene's ensemble."""
+    return any(outcome.angular_momentum is not None for outcome, _ in _outcomes(results, scene_name))
+
+
+def _outcomes(results: Results, scene_name: str) -> Iterator[tuple[Outcome, dict[str, Any]]]:
+    """What became of each engine's ensemble at the finest step, and how its line looks."""
+    colours = engine_colours(results.engines)
+    finest = min((dt for name, _, dt in results.ensembles if name == scene_name), default=0.0)
+    for number, engine in enumerate(results.engines):
+        outcome = results.ensembles.get((scene_name, engine, finest))
+        if outcome is not None:
+            width = thinner(3.8, 1.2, number, len(results.engines))
+            yield outcome, {"color": colours[engine], "linewidth": width, "label": engine}
+
+
+def _draw_spread(t: Array, values: Array, style: dict[str, Any], axes: "Axes") -> None:
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9], axis=0)
+    axes.fill_between(t, low, high, color=style["color"], alpha=0.15, linewidth=0.0)
+    axes.plot(t, middle, **style)

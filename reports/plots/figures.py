@@ -1,0 +1,142 @@
+"""The report's figures: plots side by side, in the colours of the page, under one legend."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from comparisons import Results
+from reports.plots.bounces import plot_bounce_ladder
+from reports.plots.convergence import plot_error_over_dt
+from reports.plots.ensembles import (
+    keeps_angular_momentum,
+    plot_angular_momentum_of_ensemble,
+    plot_energy_of_ensemble,
+    plot_rest_of_ensemble,
+)
+from reports.plots.growth import plot_error_growth
+from reports.plots.over_time import plot_over_time, quantities
+from reports.plots.spins import plot_polhode, wobbles_freely
+from reports.plots.style import REPORT
+from reports.plots.tradeoff import plot_tradeoff
+from scenarios import truth_for
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from comparisons.tradeoff import TradeOff
+
+CONVERGENCE = (
+    "energy_error",
+    "bounce_height_error",
+    "horizontal_momentum_error",
+    "angular_momentum_direction_error",
+    "orientation_error",
+    "restitution_error",
+    "position_error",
+)
+GROWTH = ("orientation_error", "position_error", "energy_error")
+WORTH_A_POINT, WORTH_A_LINE = 1e-13, 1e-11
+"""Errors that are nowhere larger are rounding; over many steps it adds up."""
+MOST_PANELS = 3
+
+
+def tradeoff_figure(found: "TradeOff") -> "Figure":
+    """Error over cost in one scene."""
+    with _figure(["", ""]) as (figure, panels):
+        plot_tradeoff(found, panels[0])
+        panels[0].set_title(found.scene.name)
+        panels[1].axis("off")
+        panels[1].legend(*panels[0].get_legend_handles_labels(), loc="center left", frameon=False)
+    return figure
+
+
+def ensemble_figure(results: Results, scene_name: str) -> "Figure | None":
+    """Energy and |L| left in an ensemble and the share of it at rest, over time; None if nothing has an outcome."""
+    if not any(name == scene_name for name, _, _ in results.ensembles):
+        return None
+    plots = [plot_energy_of_ensemble, plot_rest_of_ensemble]
+    if keeps_angular_momentum(results, scene_name):
+        plots.insert(1, plot_angular_momentum_of_ensemble)
+    with _figure([""] * len(plots)) as (figure, panels):
+        for axes, plot in zip(panels, plots, strict=True):
+            plot(results, scene_name, axes)
+        _add_legend(figure, panels)
+    return figure
+
+
+def time_figure(results: Results, scene_name: str) -> "Figure":
+    """Height or tilt, energy and |L| over time, side by side."""
+    shown = quantities(results.scenes[scene_name])
+    with _figure([""] * len(shown)) as (figure, panels):
+        for axes, (label, quantity) in zip(panels, shown.items(), strict=True):
+            plot_over_time(results, scene_name, quantity, axes)
+            axes.set_ylabel(label)
+        _add_legend(figure, panels)
+    return figure
+
+
+def convergence_figure(results: Results, scene_name: str) -> "Figure | None":
+    """The scene's first three errors that are not zero everywhere, over the time step; None if all are."""
+    present = _errors(results, scene_name, CONVERGENCE, WORTH_A_POINT)[:MOST_PANELS]
+    if not present:
+        return None
+    with _figure([""] * len(present)) as (figure, panels):
+        for axes, metric in zip(panels, present, strict=True):
+            plot_error_over_dt(results, scene_name, metric, axes)
+        _add_legend(figure, panels)
+    return figure
+
+
+def flight_figure(results: Results, scene_name: str) -> "Figure | None":
+    """The polhode of a body that turns about no principal axis, and the growth of errors, for a scene without a floor; None for others."""
+    scene = results.scenes[scene_name]
+    if scene.floor is not None or truth_for(scene) is None:
+        return None
+    wobbles = wobbles_freely(scene)
+    growing = _errors(results, scene_name, GROWTH, WORTH_A_LINE)[: MOST_PANELS - wobbles]
+    if not (growing or wobbles):
+        return None
+    with _figure(["3d"] * wobbles + [""] * len(growing)) as (figure, panels):
+        if wobbles:
+            plot_polhode(results, scene_name, panels[0])
+        for axes, metric in zip(panels[wobbles:], growing, strict=True):
+            plot_error_growth(results, scene_name, metric, axes)
+        _add_legend(figure, panels)
+    return figure
+
+
+def bounce_figure(results: Results, scene_name: str) -> "Figure | None":
+    """The bounce ladder, and the growth of the error of place; None where the truth is no ladder."""
+    truth = truth_for(results.scenes[scene_name])
+    if truth is None or truth.name != "bounce-ladder" or not truth.events or not results.scenes[scene_name].starts_above_floor:
+        return None
+    with _figure(["", ""]) as (figure, panels):
+        plot_bounce_ladder(results, scene_name, panels[0])
+        plot_error_growth(results, scene_name, "position_error", panels[1])
+        _add_legend(figure, panels)
+    return figure
+
+
+def _errors(results: Results, scene_name: str, metrics: Sequence[str], worth: float) -> list[str]:
+    """Those of some metrics by which some engine is wrong by so much."""
+    mine = results.measurements[results.measurements["scene"] == scene_name]
+    return [name for name in metrics if (mine.loc[mine["metric"] == name, "value"].abs() > worth).any()]
+
+
+@contextmanager
+def _figure(projections: Sequence[str]) -> "Iterator[tuple[Figure, list[Axes]]]":
+    """A figure with a panel for each projection, `3d` or none, in the report's style."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    with rc_context(REPORT):
+        figure = Figure(figsize=(3.7 * len(projections), 2.9), layout=ConstrainedLayoutEngine(w_pad=0.12))
+        yield figure, [figure.add_subplot(1, len(projections), place, projection=one or None) for place, one in enumerate(projections, 1)]
+
+
+def _add_legend(figure: "Figure", panels: "list[Axes]") -> None:
+    named = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    handles, labels = list(named.values()), list(named)
+    figure.legend(handles, labels, loc="outside upper left", ncols=len(labels), fontsize=9)

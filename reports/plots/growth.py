@@ -1,0 +1,63 @@
+"""How an error grows."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from comparisons import Results
+from comparisons.comparison import Comparison, Unresolved
+from comparisons.errors import ERRORS
+from reports.colours import engine_colours
+from reports.plots.style import ROUNDING, Array, label_powers, metric_label, stride, thinner
+from scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
+    """Draw the size of an error over time, logarithmic, of every engine at the finest step.
+
+    The largest value of a line is the metric's, of one start. Velocities are compared as the metrics do it, in the inner half of each
+    flight: an impact that comes a step late is an error of time, and would be a spike in energy. Lines are broken there, and end where
+    the body gets out of step with the truth.
+
+    Args:
+        results: The run.
+        scene_name: One of its scenes; it must have a truth.
+        metric: A key of `comparisons.errors.ERRORS`, such as `orientation_error`.
+        axes: What to draw into.
+
+    Raises:
+        DropspinError: The scene has no truth, or the metric is not one that can be told at each moment.
+    """
+    scene = results.scenes[scene_name]
+    truth = truth_for(scene)
+    if truth is None:
+        raise DropspinError(f"{scene_name} has no truth to hold errors against; choose a scene that has, see dropspin list.")
+    if metric not in ERRORS:
+        raise UnknownName("metric over time", metric, list(ERRORS))
+    colours = engine_colours(results.engines)
+    finest = min((dt for name, _, dt in results.trajectories if name == scene_name), default=0.0)
+    for number, engine in enumerate(results.engines):
+        motion = results.trajectories.get((scene_name, engine, finest))
+        if motion is not None:
+            width = thinner(3.8, 1.2, number, len(results.engines))
+            axes.semilogy(*_sizes(scene, motion, truth, metric), color=colours[engine], linewidth=width, label=engine)
+    label_powers(axes, "y")
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(metric_label(metric))
+
+
+def _sizes(scene: Scenario, motion: Trajectory, truth: Truth, metric: str) -> tuple[Array, Array]:
+    """Times and sizes of an error after the start, which all share; NaN where it is not told, nothing where the step is too coarse."""
+    case = Comparison.with_truth(scene, motion, truth)
+    try:
+        with np.errstate(all="ignore"):  # an engine may say 1e300; what comes of it is not drawn
+            sizes = np.maximum(np.abs(ERRORS[metric].at_each_row(case)), ROUNDING)
+    except Unresolved:
+        return np.empty(0), np.empty(0)
+    told = np.concatenate(case.flights) if ERRORS[metric].in_flight else np.arange(len(sizes))
+    is_told = np.isin(np.arange(len(sizes)), told) & np.isfinite(sizes)
+    shown = slice(1, None, stride(len(sizes)))
+    return case.compared.t[shown], np.where(is_told, sizes, np.nan)[shown]

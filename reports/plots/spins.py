@@ -1,0 +1,148 @@
+"""The polhode: how the angular velocity moves in the body.
+
+    2 T = I₁ω₁² + I₂ω₂² + I₃ω₃²,   L² = I₁²ω₁² + I₂²ω₂² + I₃²ω₃²
+
+A free body keeps both, so its ω runs on the curve in which the two ellipsoids meet.
+
+Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37.
+"""
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from comparisons import Results
+from reports.colours import engine_colours, engine_markers
+from reports.plots.style import MOST_POINTS, Array, ink, thinned, thinner
+from scenarios import DropspinError, Scenario, Trajectory, truth_for
+from scenarios.rotations import cross, unrotate
+
+FARTHEST = 1.6
+"""Of the ellipsoid's half axes: what drifts off farther is not drawn, so that the ellipsoid stays in sight."""
+FLATTEST = 0.4
+"""Of the longest half axis: how short the shortest is drawn at least."""
+NEARLY_PARALLEL = 1e-9
+"""Sine of the angle between two vectors below which a body is taken to spin about a principal axis."""
+VIEWS = tuple(product((-40, -20, 20, 40), range(-165, 180, 30)))
+"""Elevations and azimuths [degrees], none along an axis."""
+OUTWARD, SUBSCRIPTS = 1.2, "₁₂₃"
+
+
+def plot_polhode(results: Results, scene_name: str, axes: Any) -> None:
+    """Draw the path of the angular velocity in the body, on the ellipsoid of the start's energy: engines at the coarsest step, and truth.
+
+    A marker shows where each engine ends. One without gyroscopic term ends where it starts; with an explicit one it leaves the ellipsoid.
+
+    Args:
+        results: The run.
+        scene_name: One of its scenes; it must start with a spin.
+        axes: What to draw into, made with `projection="3d"`.
+
+    Raises:
+        DropspinError: The scene starts without spin.
+    """
+    scene = results.scenes[scene_name]
+    half_axes = energy_ellipsoid(scene)
+    if not half_axes.any():
+        raise DropspinError(f"{scene_name} starts without spin: its polhode is a point; choose a scene with start.angular_velocity.")
+    _draw_ellipsoid(half_axes, axes)
+    paths = []
+    dts = [dt for name, _, dt in results.trajectories if name == scene_name]
+    colours, markers, count = engine_colours(results.engines), engine_markers(results.engines), len(results.engines)
+    for number, engine in enumerate(results.engines):
+        motion = results.trajectories.get((scene_name, engine, max(dts, default=0.0)))
+        if motion is not None:
+            paths.append(_in_sight(principal_spin(scene, thinned(motion)), half_axes))
+            (line,) = axes.plot(*paths[-1].T, color=colours[engine], linewidth=thinner(3.8, 1.2, number, count), label=engine)
+            line.set(marker=markers[engine], markevery=[-1], markerfacecolor="none", markersize=thinner(9.0, 5.0, number, count))
+    truth = truth_for(scene)
+    if truth is not None:
+        paths.append(principal_spin(scene, truth(np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS))))
+        axes.plot(*paths[-1].T, color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
+    _frame(half_axes, paths, axes)
+
+
+def principal_spin(scene: Scenario, motion: Trajectory) -> Array:
+    """Angular velocity along the body's principal axes, least moment first [rad/s], shape (n, 3)."""
+    return unrotate(motion.orientation, motion.angular_velocity) @ _principal(scene)[1]
+
+
+def energy_ellipsoid(scene: Scenario) -> Array:
+    """Half axes √(2 T / I) of the ellipsoid of all angular velocities with the energy of the start's spin [rad/s], shape (3,)."""
+    moments, _ = _principal(scene)
+    half_axes: Array = np.sqrt(moments @ _start(scene) ** 2 / moments)
+    return half_axes
+
+
+def wobbles_freely(scene: Scenario) -> bool:
+    """Whether the body's angular velocity moves in it: it points another way than the angular momentum, by more than rounding."""
+    start = _start(scene)
+    momentum = _principal(scene)[0] * start
+    torque = np.linalg.norm(cross(momentum, start))
+    return bool(torque > NEARLY_PARALLEL * np.linalg.norm(momentum) * np.linalg.norm(start))
+
+
+def facing(path: Array, half_axes: Array) -> tuple[int, int]:
+    """The elevation and azimuth of `VIEWS` in which most of a path on an ellipsoid is on the near side, and stretched out.
+
+    Counted is length, not time: a body that turns over lingers where there is little to see.
+
+    Args:
+        path: Shape (n, 3).
+        half_axes: Of the ellipsoid, shape (3,).
+    """
+    steps, middles = np.diff(path, axis=0), 0.5 * (path[1:] + path[:-1])
+    speck = 1e-9 * float(half_axes.max())  # so that a path that is a point faces the reader too
+    lengths = np.linalg.norm(steps, axis=1) + speck
+    scores = []
+    for view in VIEWS:
+        towards = _towards(view)
+        near = lengths @ (middles / half_axes**2 @ towards > 0.0)
+        seen = np.linalg.norm(cross(steps, towards), axis=1).sum() + speck
+        scores.append(near * seen)
+    return VIEWS[int(np.argmax(scores))]
+
+
+def _principal(scene: Scenario) -> tuple[Array, Array]:
+    """Moments of inertia, least first [kg m²], and their axes in the body, the columns of a right-handed triad."""
+    moments, axes = np.linalg.eigh(scene.body.inertia_tensor)
+    return moments, axes * np.linalg.det(axes)
+
+
+def _start(scene: Scenario) -> Array:
+    return principal_spin(scene, Trajectory.from_states(np.zeros(1), scene.initial_state[None]))[0]
+
+
+def _in_sight(path: Array, half_axes: Array) -> Array:
+    """The path up to where it is too far off the ellipsoid to be drawn."""
+    with np.errstate(all="ignore"):  # an engine may say 1e300
+        is_far = ~(np.linalg.norm(path / half_axes, axis=1) <= FARTHEST)
+    return path[: int(np.argmax(is_far))] if is_far.any() else path
+
+
+def _draw_ellipsoid(half_axes: Array, axes: Any) -> None:
+    longitude, latitude = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), np.linspace(0.0, np.pi, 13))
+    ball = np.array([np.cos(longitude) * np.sin(latitude), np.sin(longitude) * np.sin(latitude), np.cos(latitude)])
+    axes.plot_wireframe(*(half_axes[:, None, None] * ball), color=ink(), alpha=0.15, linewidth=0.5, rstride=2, cstride=2)
+
+
+def _frame(half_axes: Array, paths: list[Array], axes: Any) -> None:
+    """The view, limits that hold everything, and for axes the half axes on the near side: ticks would fall onto each other."""
+    if paths and len(paths[-1]) > 1:
+        axes.view_init(*facing(paths[-1], half_axes))
+    drawn = np.vstack([half_axes, *(np.abs(path) for path in paths)]).max(axis=0)
+    near = np.where(_towards((axes.elev, axes.azim)) < 0.0, -1.0, 1.0)
+    for number, tip in enumerate(np.diag(near * half_axes)):
+        axes.plot(*np.array([tip, OUTWARD * tip]).T, color=ink(), linewidth=0.8)
+        axes.text(*(1.15 * OUTWARD * tip), f"{'−' if near[number] < 0.0 else ''}ω{SUBSCRIPTS[number]}", ha="center", va="center")
+    axes.text2D(0.5, -0.1, "half axes {:.3g}, {:.3g}, {:.3g} rad/s".format(*half_axes), ha="center", transform=axes.transAxes)
+    axes.set(xlim=(-drawn[0], drawn[0]), ylim=(-drawn[1], drawn[1]), zlim=(-drawn[2], drawn[2]))
+    axes.set_box_aspect(np.maximum(drawn, FLATTEST * drawn.max()), zoom=1.25)
+    axes.set_axis_off()
+
+
+def _towards(view: tuple[float, float]) -> Array:
+    """The direction to the reader, from an elevation and an azimuth [degrees]."""
+    elevation, azimuth = np.radians(view)
+    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])

@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: report test test-slow faults bench lint clean
+.PHONY: report test test-slow faults bench examples lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
@@ -19,6 +19,9 @@ faults: $(VENV)/.installed-dev        ## engines with one planted fault each aga
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py
+
+examples: $(VENV)/.installed         ## the pictures of docs/examples.md, each by its own lines
+	$(BIN)/python docs/examples/draw.py
 
 lint: $(VENV)/.installed-dev          ## style, types, import contracts
 	$(BIN)/ruff check .

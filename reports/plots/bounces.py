@@ -35,8 +35,8 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
         raise DropspinError(f"{scene_name} has no bounces that are known; choose a scene that has, such as drop-ball.")
     colours, markers = engine_colours(results.engines), engine_markers(results.engines)
     finest = min((dt for name, _, dt in results.trajectories if name == scene_name), default=0.0)
-    exact = _exact_apexes(scene, truth, SHORTEST_FLIGHT * finest)
-    shown = [len(exact)]
+    exact, lasting = _exact_apexes(scene, truth, SHORTEST_FLIGHT * finest)
+    shown = [lasting]
     for number, engine in enumerate(results.engines):
         motion = results.trajectories.get((scene_name, engine, finest))
         if motion is not None:
@@ -45,7 +45,8 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
             style = {"color": colours[engine], "marker": markers[engine], "markersize": size, "linestyle": "none"}
             axes.semilogy(range(len(heights)), heights, markerfacecolor="none", label=engine, **style)
             shown.append(len(heights))
-    axes.step(range(len(exact)), exact / exact[0], where="mid", color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
+    stairs = exact[: max(shown)] / exact[0]
+    axes.step(range(len(stairs)), stairs, where="mid", color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
     axes.set_xticks(np.arange(0, max(shown), 1 + max(shown) // 8))
     label_powers(axes, "y")
     axes.set_xlabel("bounce")
@@ -66,13 +67,12 @@ def apexes(scene: Scenario, motion: Trajectory) -> Array:
     return np.array(found) - _floor_height(scene)
 
 
-def _exact_apexes(scene: Scenario, truth: Truth, shortest: float) -> Array:
-    """The truth's, of flights that last no less than this [s]."""
+def _exact_apexes(scene: Scenario, truth: Truth, shortest: float) -> tuple[Array, int]:
+    """The truth's, and how many of its flights last no less than this [s], the drop among them."""
     states = np.array([truth.events[0].before, *(event.after for event in truth.events)])
     heights = apex(scene, Trajectory.from_states(np.zeros(len(states)), states)) - _floor_height(scene)
-    lasting = 2.0 * states[:, 8] / -scene.acceleration[1] >= shortest
-    lasting[0] = True
-    return heights[: int(np.argmin(lasting))] if not lasting.all() else heights
+    is_short = 2.0 * states[1:, 8] / -scene.acceleration[1] < shortest
+    return heights, 1 + int(np.argmax(is_short)) if is_short.any() else len(heights)
 
 
 def _floor_height(scene: Scenario) -> float:

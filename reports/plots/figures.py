@@ -69,9 +69,8 @@ def time_figure(results: Results, scene_name: str) -> "Figure":
     """Height or tilt, energy and |L| over time, side by side."""
     shown = quantities(results.scenes[scene_name])
     with _figure([""] * len(shown)) as (figure, panels):
-        for axes, (label, quantity) in zip(panels, shown.items(), strict=True):
+        for axes, quantity in zip(panels, shown.values(), strict=True):
             plot_over_time(results, scene_name, quantity, axes)
-            axes.set_ylabel(label)
         _add_legend(figure, panels)
     return figure
 

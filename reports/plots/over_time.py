@@ -33,18 +33,21 @@ def angular_momentum_length(scene: Scenario, motion: Trajectory) -> Array:
     return np.linalg.norm(angular_momentum(scene, motion), axis=1)
 
 
+LABELS: dict[Quantity, str] = {
+    height: "height [m]",
+    tilt: "body's y axis, upward part",
+    energy: "energy [J]",
+    angular_momentum_length: "|L| [kg m²/s]",
+}
+
+
 def quantities(scene: Scenario) -> dict[str, Quantity]:
     """What to show of a scene over time, by axis label."""
-    shown: dict[str, Quantity] = {}
     moves = scene.gravity is not None or any(scene.start.velocity)
-    if moves:
-        shown["height [m]"] = height
-    else:
-        shown["body's y axis, upward part"] = tilt
-    shown["energy [J]"] = energy
+    shown: list[Quantity] = [height if moves else tilt, energy]
     if any(scene.start.angular_velocity):
-        shown["|L| [kg m²/s]"] = angular_momentum_length
-    return shown
+        shown.append(angular_momentum_length)
+    return {LABELS[quantity]: quantity for quantity in shown}
 
 
 def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: "Axes") -> None:
@@ -63,4 +66,5 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
         times = np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS)
         axes.plot(times, quantity(scene, truth(times)), color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
     axes.set_xlabel("time [s]")
+    axes.set_ylabel(LABELS.get(quantity, ""))
     axes.ticklabel_format(axis="y", useOffset=False)

@@ -1,0 +1,39 @@
+"""Draw the pictures of docs/examples.md: the page's own lines are run, block after block, and what they draw is the picture below them."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAGE = Path(__file__).parents[1] / "examples.md"
+BLOCK = re.compile(r"^```python\n(?P<lines>.*?)^```\n(?:\n!\[[^]]+\]\((?P<picture>[^)]+)\)$)?", re.DOTALL | re.MULTILINE)
+
+
+def drawn(page: Path) -> "Iterator[tuple[Path, Figure]]":
+    """The figure of each block that has a picture, and where the picture is."""
+    import matplotlib.pyplot as plt
+
+    names: dict[str, Any] = {}
+    for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
+        exec(block["lines"], names)
+        if block["picture"]:
+            yield page.parent / block["picture"], plt.gcf()
+            plt.close("all")
+
+
+def draw(page: Path) -> None:
+    """Write every picture of the page."""
+    from matplotlib import rc_context
+
+    style: Any = {"backend": "agg", "figure.figsize": (5.5, 3.4), "figure.constrained_layout.use": True}
+    style |= {"font.size": 9.0, "svg.hashsalt": "dropspin"}
+    with rc_context(style):
+        for path, figure in drawn(page):
+            figure.savefig(path, metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    draw(PAGE)

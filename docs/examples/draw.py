@@ -29,7 +29,7 @@ def draw(page: Path) -> None:
     from matplotlib import rc_context
 
     style: Any = {"backend": "agg", "figure.figsize": (5.5, 3.4), "figure.constrained_layout.use": True}
-    style |= {"font.size": 9.0, "svg.hashsalt": "dropspin"}
+    style |= {"font.size": 9.0, "savefig.bbox": "tight", "svg.hashsalt": "dropspin"}
     with rc_context(style):
         for path, figure in drawn(page):
             figure.savefig(path, metadata={"Date": None})

@@ -53,6 +53,7 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
     axes.set_ylabel("apex, over the drop")
 
 
+@np.errstate(all="ignore")  # an engine may say 1e300
 def apexes(scene: Scenario, motion: Trajectory) -> Array:
     """Apex above the floor [m] of the drop and of the flight after each bounce, the mean over its inner half, shape (flights,)."""
     touching = Comparison(scene, motion).touching
@@ -62,8 +63,7 @@ def apexes(scene: Scenario, motion: Trajectory) -> Array:
         if end - start < SHORTEST_FLIGHT:
             break
         quarter = (end - start) // 4
-        with np.errstate(all="ignore"):  # an engine may say 1e300
-            found.append(float(np.mean(apex(scene, motion[start + quarter : end + 1 - quarter]))))
+        found.append(float(np.mean(apex(scene, motion[start + quarter : end + 1 - quarter]))))
     return np.array(found) - _floor_height(scene)
 
 

@@ -49,12 +49,12 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
     axes.set_ylabel(metric_label(metric))
 
 
+@np.errstate(all="ignore")  # an engine may say 1e300
 def _sizes(scene: Scenario, motion: Trajectory, truth: Truth, metric: str) -> tuple[Array, Array]:
     """Times and sizes of an error after the start, which all share; NaN where it is not told, nothing where the step is too coarse."""
     case = Comparison.with_truth(scene, motion, truth)
     try:
-        with np.errstate(all="ignore"):  # an engine may say 1e300; what comes of it is not drawn
-            sizes = np.maximum(np.abs(ERRORS[metric].at_each_row(case)), ROUNDING)
+        sizes = np.maximum(np.abs(ERRORS[metric].at_each_row(case)), ROUNDING)
     except Unresolved:
         return np.empty(0), np.empty(0)
     told = np.concatenate(case.flights) if ERRORS[metric].in_flight else np.arange(len(sizes))

@@ -26,9 +26,12 @@ NEARLY_PARALLEL = 1e-9
 """Sine of the angle between two vectors below which a body is taken to spin about a principal axis."""
 VIEWS = tuple(product((-40, -20, 20, 40), range(-165, 180, 30)))
 """Elevations and azimuths [degrees], none along an axis."""
-OUTWARD, SUBSCRIPTS = 1.2, "₁₂₃"
+OUTWARD, APART = (1.35, 1.6, 1.9, 2.2), 0.12
+"""Of a half axis, where its name may stand; and how far from any path, of the longest."""
+SUBSCRIPTS = "₁₂₃"
 
 
+@np.errstate(all="ignore")  # an engine may say 1e300
 def plot_polhode(results: Results, scene_name: str, axes: Any) -> None:
     """Draw the path of the angular velocity in the body, on the ellipsoid of the start's energy: engines at the coarsest step, and truth.
 
@@ -116,8 +119,7 @@ def _start(scene: Scenario) -> Array:
 
 def _in_sight(path: Array, half_axes: Array) -> Array:
     """The path up to where it is too far off the ellipsoid to be drawn."""
-    with np.errstate(all="ignore"):  # an engine may say 1e300
-        is_far = ~(np.linalg.norm(path / half_axes, axis=1) <= FARTHEST)
+    is_far = ~(np.linalg.norm(path / half_axes, axis=1) <= FARTHEST)
     return path[: int(np.argmax(is_far))] if is_far.any() else path
 
 
@@ -132,14 +134,27 @@ def _frame(half_axes: Array, paths: list[Array], axes: Any) -> None:
     if paths and len(paths[-1]) > 1:
         axes.view_init(*facing(paths[-1], half_axes))
     drawn = np.vstack([half_axes, *(np.abs(path) for path in paths)]).max(axis=0)
-    near = np.where(_towards((axes.elev, axes.azim)) < 0.0, -1.0, 1.0)
+    towards = _towards((axes.elev, axes.azim))
+    near = np.where(towards < 0.0, -1.0, 1.0)
     for number, tip in enumerate(np.diag(near * half_axes)):
-        axes.plot(*np.array([tip, OUTWARD * tip]).T, color=ink(), linewidth=0.8)
-        axes.text(*(1.15 * OUTWARD * tip), f"{'−' if near[number] < 0.0 else ''}ω{SUBSCRIPTS[number]}", ha="center", va="center")
+        place = _clear_of(np.vstack(paths), tip, towards) if paths else OUTWARD[0] * tip
+        axes.plot(*np.array([tip, 0.9 * place]).T, color=ink(), linewidth=0.8)
+        axes.text(*place, f"{'−' if near[number] < 0.0 else ''}ω{SUBSCRIPTS[number]}", ha="center", va="center")
     axes.text2D(0.5, -0.1, "half axes {:.3g}, {:.3g}, {:.3g} rad/s".format(*half_axes), ha="center", transform=axes.transAxes)
     axes.set(xlim=(-drawn[0], drawn[0]), ylim=(-drawn[1], drawn[1]), zlim=(-drawn[2], drawn[2]))
     axes.set_box_aspect(np.maximum(drawn, FLATTEST * drawn.max()), zoom=1.25)
     axes.set_axis_off()
+
+
+def _clear_of(points: Array, tip: Array, towards: Array) -> Array:
+    """The first place on a half axis and beyond in which its name hides no point, as the reader sees it; the last if none does."""
+    for outward in OUTWARD:
+        offsets = points - outward * tip
+        apart = np.linalg.norm(offsets - (offsets @ towards)[:, None] * towards, axis=1)
+        if apart.min() > APART * np.linalg.norm(points, axis=1).max():
+            break
+    place: Array = outward * tip
+    return place
 
 
 def _towards(view: tuple[float, float]) -> Array:

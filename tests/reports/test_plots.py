@@ -1,5 +1,6 @@
 """What plots draw: numbers read back from the axes against closed forms."""
 
+import io
 from dataclasses import replace
 
 import numpy as np
@@ -238,3 +239,22 @@ def test_runs_from_before_angular_momenta_were_kept(ensemble, tmp_path):
 def test_plain_text_powers():
     """As a reader writes them."""
     assert [power(value) for value in (1.0, 1e-3, 2e-3, 5e12, 2.5e-11)] == ["10⁰", "10⁻³", "2×10⁻³", "5×10¹²", "2.5×10⁻¹¹"]
+
+
+@pytest.mark.parametrize("nonsense", [np.nan, np.inf, 1e300])
+def test_an_engine_that_talks_nonsense_is_drawn_as_far_as_it_makes_sense(nonsense):
+    """From the tenth of a second on every number is nonsense: no warning, and what came before is drawn."""
+    for name, plot, projection in [
+        ("drop-ball", plots.plot_bounce_ladder, None),
+        ("spin-asymmetric", plots.plot_polhode, "3d"),
+        ("fall-spin", lambda results, name, axes: plots.plot_error_growth(results, name, "energy_error", axes), None),
+    ]:
+        scene = load(name)
+        states = exactly(scene).states.copy()
+        states[100:, 7:] = nonsense
+        motion = Trajectory.from_states(DT * np.arange(len(states)), states)
+        axes = axes_of(projection)
+        plot(made(scene, motion), name, axes)
+        axes.figure.savefig(io.BytesIO())
+        if name != "drop-ball":
+            assert len(line(axes, "made")[0]) >= 2

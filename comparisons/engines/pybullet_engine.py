@@ -62,7 +62,7 @@ REASONS = {
     "linearDamping": "1 - exp(-rate), 0 for none; a multibody's default is 0.04",
     "angularDamping": "as linearDamping",
     "activationState": "never falls asleep",
-    "maxJointVelocity": "no clamp of a multibody's speeds, at 100 m/s and 100 rad/s by default",
+    "maxJointVelocity": "no clamp of a multibody's speeds, at 100 m/s and 100 rad/s by default (velocity_clamp=kept leaves it)",
 }
 """Effects were measured on a ball dropped from 1 m and a box at rest, restitution 0.5, with the one setting left out."""
 
@@ -73,12 +73,14 @@ class PyBullet(Engine):
     name = "pybullet"
     order = 1.0
     reasons = REASONS
-    choices: ClassVar = {"coordinates": ("maximal", "multibody"), "profile": PROFILES}
+    choices: ClassVar = {"coordinates": ("maximal", "multibody"), "profile": PROFILES, "velocity_clamp": ("lifted", "kept")}
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.is_default and "coordinates" in self.options:
-            raise DropspinError(f"engine {self.label!r}: profile=default has the coordinates of the default, multibody; leave them out.")
+        if self.is_default and {"coordinates", "velocity_clamp"} & self.options.keys():
+            raise DropspinError(f"engine {self.label!r}: profile=default is a multibody that clamps its speeds; leave the rest out.")
+        if self.option("velocity_clamp") == "kept" and not self.is_multibody:
+            raise DropspinError(f"engine {self.label!r}: only multibodies clamp speeds; add coordinates=multibody.")
 
     @property
     def is_default(self) -> bool:
@@ -89,6 +91,11 @@ class PyBullet(Engine):
     def is_multibody(self) -> bool:
         """Whether the body is Bullet's btMultiBody, its default, rather than a btRigidBody."""
         return self.is_default or self.option("coordinates") == "multibody"
+
+    @property
+    def is_unclamped(self) -> bool:
+        """Whether the clamp of a multibody's speeds is to be lifted."""
+        return self.is_multibody and not self.is_default and self.option("velocity_clamp") == "lifted"
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Maximal coordinates solve the gyroscopic term implicitly, by one Newton step; multibodies do not, nor share contacts."""
@@ -135,7 +142,7 @@ class PyBullet(Engine):
         moments = np.diag(scene.body.inertia_tensor)[[2, 0, 1]].tolist()
         sizes = [2.0 * scene.body.half_extents[axis] for axis in (2, 0, 1)] if isinstance(scene.body, Box) else []
         surface = {**_contact_properties(scene, default=False), **_damping(scene, default=False)}
-        surface |= {"maxJointVelocity": FASTEST} if self.is_multibody else {}
+        surface |= {"maxJointVelocity": FASTEST} if self.is_unclamped else {}
         parameters = {name: value for name, value in _parameters(scene, dt).items() if name != "fixedTimeStep"}
         values = {"engine": "PyBullet", "dt": dt, "maximal": not self.is_multibody, "surface": surface}
         return {
@@ -144,7 +151,7 @@ class PyBullet(Engine):
         }
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return PyBulletSimulation(scene, dt, default=self.is_default, multibody=self.is_multibody)
+        return PyBulletSimulation(scene, dt, default=self.is_default, multibody=self.is_multibody, unclamped=self.is_unclamped)
 
 
 class PyBulletSimulation(Simulation):
@@ -152,7 +159,7 @@ class PyBulletSimulation(Simulation):
 
     staggered = True
 
-    def __init__(self, scene: Scenario, dt: float, *, default: bool, multibody: bool) -> None:
+    def __init__(self, scene: Scenario, dt: float, *, default: bool, multibody: bool, unclamped: bool) -> None:
         self._bullet = _import_quietly()
         self._dt, self._fall = dt, dt * scene.acceleration
         self._grips = scene.floor is not None and scene.floor.friction == "infinite"
@@ -160,12 +167,12 @@ class PyBulletSimulation(Simulation):
         if self._client < 0:
             raise RuntimeError("PyBullet gave no connection")
         try:
-            self._build(scene, dt, default, multibody)
+            self._build(scene, dt, default, multibody, unclamped)
         except BaseException:
             self.close()
             raise
 
-    def _build(self, scene: Scenario, dt: float, default: bool, multibody: bool) -> None:
+    def _build(self, scene: Scenario, dt: float, default: bool, multibody: bool, unclamped: bool) -> None:
         bullet, client = self._bullet, self._client
         parameters = {"fixedTimeStep": dt} if default else _parameters(scene, dt)
         bullet.setPhysicsEngineParameter(physicsClientId=client, **parameters)
@@ -184,7 +191,7 @@ class PyBulletSimulation(Simulation):
         dynamics = contact | _damping(scene, default)
         if not default:
             dynamics["activationState"] = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
-        if multibody and not default:
+        if unclamped:
             dynamics["maxJointVelocity"] = FASTEST
         bullet.changeDynamics(
             self._body,

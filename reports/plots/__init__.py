@@ -5,6 +5,7 @@ and the lines that make it.
 """
 
 from reports.plots.bounces import plot_bounce_ladder
+from reports.plots.conditions import extremes_figure, plot_conditions, plot_stability_map, stability_figure
 from reports.plots.convergence import plot_error_over_dt
 from reports.plots.ensembles import plot_angular_momentum_of_ensemble, plot_energy_of_ensemble, plot_rest_of_ensemble
 from reports.plots.figures import bounce_figure, convergence_figure, ensemble_figure, flight_figure, time_figure, tradeoff_figure
@@ -22,18 +23,22 @@ __all__ = [
     "bounce_figure",
     "convergence_figure",
     "ensemble_figure",
+    "extremes_figure",
     "flight_figure",
     "height",
     "plot_angular_momentum_of_ensemble",
     "plot_bounce_ladder",
+    "plot_conditions",
     "plot_energy_of_ensemble",
     "plot_error_growth",
     "plot_error_over_dt",
     "plot_over_time",
     "plot_polhode",
     "plot_rest_of_ensemble",
+    "plot_stability_map",
     "plot_tradeoff",
     "quantities",
+    "stability_figure",
     "tilt",
     "time_figure",
     "tradeoff_figure",

@@ -29,12 +29,13 @@ def test_every_block_runs_and_draws(drawer):
         for path, figure in drawer.drawn(PAGE):
             [axes] = figure.axes
             lines = [line for line in axes.get_lines() if len(line.get_xdata())]
-            assert len(lines) >= 3, path
+            assert len(lines) + len(axes.patches) >= 3, path
             assert all(np.isfinite(np.asarray(line.get_ydata(), dtype=float)).any() for line in lines), path
+            assert all(np.isfinite(patch.get_bbox().extents).all() and patch.get_width() >= 0.0 for patch in axes.patches), path
             assert len(axes.get_legend().get_texts()) >= 3
             assert axes.name == "3d" or (axes.get_xlabel() and axes.get_ylabel()), path
             found[path.name] = figure
-    assert len(found) == 9
+    assert len(found) == 11
 
 
 def test_pictures_and_page_belong_together(drawer):

@@ -1,0 +1,190 @@
+"""What has become of an engine: a condition, by the worst of named criteria that its motion meets.
+
+Accuracy is judged over the scene's own duration, everything else over the whole of a run that may go on for longer.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.comparison import Comparison, Unresolved
+from comparisons.metrics import metrics_for
+from scenarios import Scenario, Trajectory, Truth
+from scenarios.body import Sphere
+from scenarios.mechanics import energy, lowest_height
+from scenarios.model import TOUCHING
+from scenarios.rotations import rotate
+
+Array = NDArray[np.float64]
+
+Condition = Literal["declined", "sound", "inaccurate", "gains_energy", "sinks", "tunnels", "clamped", "diverged", "crashed", "timed_out"]
+CONDITIONS: tuple[Condition, ...] = get_args(Condition)
+"""From the mildest to the worst; `declined` is none, but what an engine says instead."""
+
+ERRORS_OF_FEW_ROWS = ("orientation_error", "angular_momentum_error", "energy_error")
+ERRORS = (*ERRORS_OF_FEW_ROWS, "bounce_height_error", "landing_error")
+"""What must be within the tolerance for a motion to be accurate: ratios, and angles in radians; an impact needs every step to be seen."""
+GAIN = 0.01  # of the scene's energy
+BLOWN_UP = 1e6  # times the scene's energy
+DEEPER = 1e-3  # of the body's size
+RESTLESS = 1.5  # times what gravity adds to a speed in a step; 1 is what a resting body may have between two solutions
+HELD = 3  # rows in which a speed stays the same to the last digit
+SUDDEN = 1e-6  # of a speed; how much it still changes from row to row before that, while one that settles has come to rest by then
+
+
+class Finding(NamedTuple):
+    """A condition, the criterion it is met by, the criterion's figure, and all of it in words."""
+
+    condition: Condition
+    criterion: str
+    figure: float
+    said: str
+
+
+SOUND = Finding("sound", "", 0.0, "")
+
+
+class Run(NamedTuple):
+    """What an engine did with a scene.
+
+    Attributes:
+        scene: The scene.
+        dt: The engine's step [s].
+        own: Its motion for as long as the scene lasts.
+        whole: Its motion to the end, the start first; rows may be farther apart than in `own`.
+        truth: The scene's.
+    """
+
+    scene: Scenario
+    dt: float
+    own: Trajectory
+    whole: Trajectory
+    truth: Truth | None
+
+
+def worst(findings: list[Finding]) -> Finding:
+    """The worst of several, of equals the one with the largest figure; sound without errors if there is none."""
+    return max(findings, key=lambda one: (CONDITIONS.index(one.condition), one.figure), default=SOUND)
+
+
+def judged(run: Run, within: float) -> Finding:
+    """The worst that a run shows; `within` is how large an error may be."""
+    if run.own.first_bad_row is not None or run.whole.first_bad_row is not None:
+        bad = next(motion for motion in (run.own, run.whole) if motion.first_bad_row is not None)
+        return Finding("diverged", "not finite", math.inf, f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s")
+    with np.errstate(all="ignore"):  # numbers may be too large for their squares
+        case = Comparison(run.scene, run.whole, None)
+        found = [*_energy_that_rises(run, case), *_tunnels(run), *_sinks(run), *_errors(run, within), *_restless(run)]
+    return worst(found)
+
+
+def _energy_that_rises(run: Run, case: Comparison) -> Iterator[Finding]:
+    """Above the start's; on a floor that grips, Newton's restitution may add some, so there it is judged by the truth alone."""
+    try:
+        scale = case.energy_scale
+    except Unresolved:
+        return
+    over_time = energy(run.scene, run.whole)
+    gain = float(np.max(over_time) - over_time[0]) / scale
+    if not gain <= BLOWN_UP:
+        yield Finding("diverged", "blows up", gain, f"the energy rises by {gain:.1e} of the scene's")
+    elif gain > GAIN and not _may_gain(run.scene):
+        yield Finding("gains_energy", "gains energy", gain, f"the energy rises by {gain:.2g} of the scene's")
+
+
+def _may_gain(scene: Scenario) -> bool:
+    floor = scene.floor
+    return floor is not None and floor.friction != "none" and floor.restitution > 0.0 and not isinstance(scene.body, Sphere)
+
+
+def _tunnels(run: Run) -> Iterator[Finding]:
+    if run.scene.floor is None:
+        return
+    end = run.whole[-1:]
+    body = run.scene.body
+    highest = float(end.position[0, 1] + rotate(end.orientation[0], body.vertices)[:, 1].max() + body.rounding)
+    if highest < -TOUCHING * body.size:
+        depth = -float(lowest_height(run.scene, end)[0])
+        yield Finding("tunnels", "below the floor", depth, f"all of it is below the floor at the end, down to {depth:.3g} m")
+
+
+def _sinks(run: Run) -> Iterator[Finding]:
+    """Under the floor half way through a run, for a tenth of it, and deeper all through the last tenth: it does not come up in between."""
+    if run.scene.floor is None:
+        return
+    heights, share = lowest_height(run.scene, run.whole), run.whole.t / run.whole.t[-1]
+    half_way, end = (float(-heights[(share >= since) & (share <= since + 0.1)].max(initial=-math.inf)) for since in (0.5, 0.9))
+    deeper = DEEPER * run.scene.body.size
+    if half_way > 0.0 and end > half_way + deeper:
+        yield Finding("sinks", "sinks", end, f"sinks: {end:.2g} m below the floor after {run.whole.t[-1]:.3g} s, {half_way:.2g} m half way")
+
+
+def _errors(run: Run, within: float) -> Iterator[Finding]:
+    case = Comparison.with_truth(run.scene, run.own, run.truth)
+    known = ERRORS if run.own.t[1] < 1.5 * run.dt else ERRORS_OF_FEW_ROWS
+    for metric in metrics_for(run.scene, run.truth):
+        if metric.name not in known:
+            continue
+        try:
+            size = abs(metric.average([case]).value)
+        except Unresolved:
+            continue
+        if size <= within:
+            yield Finding("sound", metric.name, size, "")
+        else:
+            unit = "" if metric.unit == "1" else f" {metric.unit}"
+            name = metric.name.replace("_", " ")
+            said = f"{name} is {size:.2g}{unit}" if math.isfinite(size) else f"no {name} to be had: nothing like the impact happened"
+            yield Finding("inaccurate", metric.name, size if math.isfinite(size) else math.inf, said)
+
+
+def _restless(run: Run) -> Iterator[Finding]:
+    """Moving on where the truth rests, in the last tenth of the run."""
+    truth, times = run.truth, run.whole.t
+    late = times >= 0.9 * times[-1]
+    if truth is None or run.scene.floor is None or not truth.covers(times[late]).all() or truth(times[late]).velocity.any():
+        return
+    fastest = float(np.linalg.norm(run.whole.velocity[late], axis=1).max())
+    allowed = run.dt * float(np.linalg.norm(run.scene.acceleration))
+    if fastest > RESTLESS * allowed:
+        said = f"never rests: moves at {fastest:.2g} m/s, {fastest / allowed:.3g} times g dt, when the truth is at rest"
+        yield Finding("inaccurate", "never rests", fastest / allowed, said)
+
+
+def held_speeds(motion: Trajectory) -> dict[str, float]:
+    """Largest components of velocity [m/s] and angular velocity [rad/s] that look as if cut off there.
+
+    They are less than the start's after one step already, or stay the same to the last digit, all of a sudden. That may have other reasons;
+    that the same value comes of another start has not.
+    """
+    found = {}
+    for name in ("velocity", "angular_velocity"):
+        sizes = np.abs(getattr(motion, name))
+        largest = float(sizes[1:].max())
+        if largest > 0.0 and any(_is_held(component, largest, sizes[0].max()) for component in sizes.T):
+            found[name] = largest
+    return found
+
+
+def _is_held(sizes: Array, largest: float, at_start: float) -> bool:
+    """Whether a component that varied, or was larger at the start, stays at the largest value for some rows."""
+    held = sizes == largest
+    if at_start > largest * (1.0 + SUDDEN) and held[1]:
+        return True
+    in_a_row = np.logical_and.reduce([held[shift : len(held) - HELD + 1 + shift] for shift in range(HELD)])
+    first = int(np.argmax(in_a_row))
+    return bool(in_a_row.any()) and first > 1 and abs(sizes[first - 1] - sizes[first - 2]) > SUDDEN * largest
+
+
+def clamped(motion: Trajectory, other: Trajectory) -> list[Finding]:
+    """Speeds that come out the same, to the last digit, of two different starts."""
+    units = {"velocity": "m/s", "angular_velocity": "rad/s"}
+    first, second = held_speeds(motion), held_speeds(other)
+    return [
+        Finding("clamped", f"{name} clamped", value, f"{name.replace('_', ' ')} is cut off at {value:.6g} {units[name]}")
+        for name, value in first.items()
+        if math.isclose(value, second.get(name, math.nan), rel_tol=1e-9)
+    ]

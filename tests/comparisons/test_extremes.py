@@ -1,0 +1,353 @@
+"""Extremes: the axes keep what they promise, the conditions mean what they say, and what is planted is found where it was planted."""
+
+import math
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from comparisons import engine
+from comparisons.extremes import AXES, Explored, Extremes, limits, surprises
+from comparisons.extremes.axes import Setting, restored
+from comparisons.extremes.conditions import SOUND, Finding, Run, clamped, held_speeds, judged
+from comparisons.extremes.exploring import Point, explored
+from comparisons.extremes.running import Runner
+from comparisons.isolation import Cells, Limits
+from comparisons.simulating import contestant_named
+from scenarios import DropspinError, Trajectory, load, truth_for
+
+sys.path.insert(0, str(Path(__file__).parent))
+from engines_for_tests import Exact, ExactSimulation
+
+DT = 5e-3
+SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")
+QUICK = Limits(processor_time=20.0)
+
+
+def along(scene_name, axis, name, near=1.03):
+    """An engine, or its name, along an axis of a scene of the catalogue."""
+    with Cells(QUICK) as cells:
+        return explored(Runner(contestant_named(name), 0.1, cells), Setting(load(scene_name), DT), AXES[axis], near)
+
+
+def first(found, condition):
+    """The edge, outwards from the scene's own value or at it, at which a condition begins: the values just inside and just outside."""
+    pairs = [(edge.before.value, edge.after.value) for edge in found.edges if edge.after.condition == condition]
+    assert pairs, [(point.value, point.condition) for point in found.points]
+    return pairs[0]
+
+
+# The axes.
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_scene_s_own_value_gives_the_scene(name):
+    setting = Setting(load(name), DT)
+    for axis in AXES.values():
+        if not axis.applies(setting.scene):
+            continue
+        at = axis.at(setting, axis.base(setting))
+        tolerance = 1e-12 if axis.name != "inertia-ratio" else math.inf  # keeps the ratio, not the moment in the middle
+        assert at.dt == pytest.approx(DT)
+        assert at.scene.initial_state == pytest.approx(setting.scene.initial_state, abs=1e-12), axis.name
+        assert at.scene.duration == pytest.approx(setting.scene.duration), axis.name
+        assert np.abs(at.scene.body.inertia_tensor - setting.scene.body.inertia_tensor).max() <= tolerance
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("axis", ["mass", "scale"])
+@pytest.mark.parametrize("factor", [2.0**-20, 0.25, 16.0, 2.0**20])
+def test_physics_keeps_its_promise(name, axis, factor):
+    """The truth of a scaled scene, in the units of the scene it is scaled from, is the scene's: lengths λ, times √λ, gravity 1."""
+    setting = Setting(load(name), DT)
+    value = AXES[axis].base(setting) * factor
+    scaled = AXES[axis].at(setting, value)
+    exact = truth_for(setting.scene)
+    times = np.linspace(0.0, min(setting.scene.duration, exact.horizon), 23)
+    time = math.sqrt(factor) if axis == "scale" else 1.0
+    found = restored(truth_for(scaled.scene)(times * time).states, AXES[axis], AXES[axis].base(setting), value)
+    assert found == pytest.approx(exact(times).states, abs=1e-10)  # measured 2e-12
+
+
+@given(ratio=st.floats(1.0, 1e6))
+def test_any_ratio_of_moments_is_a_body_s(ratio):
+    """The triangle inequality, which loading checks; the ratio is the one asked for, and the largest moment stays."""
+    setting = Setting(load("spin-asymmetric"), DT)
+    moved = AXES["inertia-ratio"].at(setting, ratio)
+    moments = np.linalg.eigvalsh(moved.scene.body.inertia_tensor)
+    assert moments[2] / moments[0] == pytest.approx(ratio, rel=1e-9)
+    assert moments[2] == pytest.approx(np.linalg.eigvalsh(setting.scene.body.inertia_tensor)[2])
+
+
+@given(size=st.floats(1e-4, 1e3))
+def test_a_body_of_any_size_falls_from_as_high(size):
+    setting = Setting(load("drop-box-edge"), DT)
+    moved = AXES["size"].at(setting, size).scene
+    assert moved.body.size == pytest.approx(size, rel=1e-12)
+    assert moved.clearance == pytest.approx(setting.scene.clearance, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["drop-ball-lively", "drop-box-flat", "rock-block"])
+@pytest.mark.parametrize("axis", ["mass", "scale"])
+def test_the_note_s_method_has_no_scale_of_its_own(name, axis):
+    """Times powers of two its motion is the same to the last bit, so that whatever differs there is a constant of the engine's."""
+    setting = Setting(load(name), DT)
+    value = 1024.0 * AXES[axis].base(setting)
+    moved = AXES[axis].at(setting, value)
+    steps = setting.scene.steps(DT)
+    with engine("document").prepare(setting.scene, DT) as own, engine("document").prepare(moved.scene, moved.dt) as other:
+        assert np.array_equal(own.record(steps), restored(other.record(steps), AXES[axis], AXES[axis].base(setting), value))
+
+
+# The conditions, of motions made for them.
+
+
+def run_of(name, distort=lambda t, states: states, duration=None):
+    """The truth of a scene, distorted."""
+    scene = load(name)
+    truth = truth_for(scene)
+    t = DT * np.arange(1 + scene.steps(DT), dtype=float)
+    t = t[truth.covers(t)]
+    motion = Trajectory.from_states(t, distort(t, truth(t).states))
+    return Run(scene, DT, motion, motion, truth)
+
+
+def moved(column, change):
+    """A distortion of one column of the states."""
+
+    def distort(t, states):
+        states = states.copy()
+        states[:, column] += change(t, states)
+        return states
+
+    return distort
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_exact_motion_is_sound(name):
+    assert judged(run_of(name), 0.1).condition == "sound"
+
+
+HEIGHT, UPWARD = 1, 8
+FALSE_MOTIONS = {
+    "not finite": ("spin-principal", moved(10, lambda t, x: np.where(t > 1, np.nan, 0)), "diverged"),
+    "blows up": ("spin-principal", moved(10, lambda t, x: 1e4 * t), "diverged"),
+    "gains energy": ("spin-principal", moved(10, lambda t, x: 0.007 * 5.0 * t / 10.0), "gains_energy"),
+    "below the floor": ("drop-ball-lively", moved(HEIGHT, lambda t, x: np.where(t > 3.9, -2.3, 0)), "tunnels"),
+    "sinks": ("rock-block", moved(HEIGHT, lambda t, x: -0.01 * t), "sinks"),
+    "orientation_error": ("spin-principal", moved(4, lambda t, x: 0.1 * (t > 5)), "inaccurate"),
+    "energy_error": ("spin-principal", moved(10, lambda t, x: -0.06 * 5.0 * t / 10.0), "inaccurate"),
+}
+
+
+@pytest.mark.parametrize("criterion", FALSE_MOTIONS)
+def test_each_criterion_is_met_by_a_motion_made_for_it(criterion):
+    name, distort, condition = FALSE_MOTIONS[criterion]
+    found = judged(run_of(name, distort), 0.1)
+    assert (found.condition, found.criterion) == (condition, criterion)
+    assert found.said
+
+
+def test_what_stays_where_an_impact_left_it_does_not_sink():
+    """Deep, but no deeper: that is no sinking, and neither is a bounce that is caught in the deep."""
+    assert judged(run_of("rock-block", moved(HEIGHT, lambda t, x: -0.02)), 0.5).condition == "sound"
+    assert judged(run_of("drop-ball-lively", moved(HEIGHT, lambda t, x: np.where(t > 3.95, -0.3, 0))), 0.5).condition != "sinks"
+
+
+def test_restless_is_what_moves_when_the_truth_rests():
+    scene = AXES["duration"].at(Setting(load("drop-ball"), DT), 3.0).scene
+    truth = truth_for(scene)
+    t = DT * np.arange(601.0)
+    for speed, condition in ((0.04, "sound"), (0.1, "inaccurate")):  # g dt is .049 m/s
+        states = truth(t).states
+        states[t > 2.0, UPWARD] += speed
+        motion = Trajectory.from_states(t, states)
+        assert judged(Run(scene, DT, motion, motion, truth), 0.1).condition == condition
+
+
+def falling(speeds):
+    states = np.zeros((len(speeds), 13))
+    states[:, 6], states[:, UPWARD] = 1.0, speeds
+    return Trajectory.from_states(DT * np.arange(len(speeds), dtype=float), states)
+
+
+def test_a_terminal_speed_is_no_clamp_and_a_clamp_is():
+    """Both end at the same speed from every start; a clamp does so all of a sudden."""
+    steps = np.arange(3000)
+    cut = [falling(np.maximum(start - 0.049 * steps, -100.0)) for start in (-60.0, -70.0)]
+    assert [finding.figure for finding in clamped(*cut)] == [100.0]
+    settling = falling(-15.0 * (1.0 - np.exp(-0.05 * steps)))
+    assert settling.velocity[-1, 1] == settling.velocity[-2, 1]
+    assert held_speeds(settling) == {}
+    steady = falling(np.full(50, -3.0))
+    assert held_speeds(steady) == {}
+
+
+def test_a_speed_that_is_cut_in_the_first_step():
+    cut = [falling([start, *(-100.0 * 0.98 ** np.arange(30))]) for start in (-150.0, -300.0)]
+    assert [finding.figure for finding in clamped(*cut)] == [100.0]
+    braked = [falling([start, *(0.5 * start * 0.98 ** np.arange(30))]) for start in (-150.0, -300.0)]
+    assert clamped(*braked) == []
+
+
+# Finding edges.
+
+
+class Planted(Exact):
+    """The exact motion, with a fault beyond a value."""
+
+    name = "planted"
+
+    def prepare(self, scene, dt):
+        spin = np.linalg.norm(scene.start.angular_velocity)
+        state = scene.initial_state
+        if spin > 37.0:  # a clamp
+            state[10:13] *= 37.0 / spin
+        simulation = ExactSimulation(scene.starting_at(state), dt)
+        simulation._start = scene.initial_state
+        if scene.body.mass < 1e-6:
+            raise RuntimeError("too light")
+        if scene.body.mass > 1e3:  # a millionth faster
+            simulation._dt *= 1.0 + 1e-6
+        return simulation
+
+
+def test_planted_faults_are_found_where_they_are():
+    inside, outside = first(along("spin-principal", "spin", Planted()), "clamped")
+    assert inside <= 37.0 < outside <= 1.03 * inside
+    found = along("spin-principal", "mass", Planted())
+    inside, outside = first(found, "inaccurate")
+    assert (inside, outside) == (512.0, 1024.0)
+    assert next(point for point in found.points if point.value == 1024.0).finding.criterion == "depends on mass"
+    light = [point.value for point in found.points if point.condition == "crashed"]
+    assert max(light) == 2.0**-20 < 1e-6 < 2.0**-19
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_an_exact_engine_is_sound_everywhere(name):
+    """On every axis, as far as it goes."""
+    found = limits(load(name), [Exact()], pairs=[], time_limits=QUICK, axes=[a.name for a in AXES.values() if a.applies(load(name))])
+    accused = [(one.axis.name, point.value, point.finding) for one in found.explored for point in one.points if point.condition != "sound"]
+    assert accused == []
+
+
+def test_what_breaks_costs_a_point():
+    class Leaving(Exact):
+        name = "leaving"
+
+        def prepare(self, scene, dt):
+            if dt > 0.1:
+                os.abort()
+            return ExactSimulation(scene, dt)
+
+    found = along("spin-principal", "step", Leaving())
+    inside, outside = first(found, "crashed")
+    assert inside <= 0.1 < outside <= 1.03 * inside
+
+
+# What is known of the engines, found without being told.
+
+
+def test_finds_pybullet_s_clamps():
+    kept = "pybullet[coordinates=multibody,velocity_clamp=kept]"
+    for name in (kept, "pybullet[profile=default]"):
+        found = along("spin-principal", "spin", name)
+        inside, outside = first(found, "clamped")
+        assert inside <= 104.0
+        assert outside >= 100.0
+    falls = along("drop-ball-lively", "height", kept, near=1.1)
+    inside, outside = first(falls, "clamped")
+    assert inside <= 100.0**2 / (2 * 9.8) <= outside  # falls at 100 m/s from 510 m
+    assert next(point for point in falls.points if point.value == outside).finding.figure == 100.0
+    assert "clamped" not in {point.condition for point in along("spin-principal", "spin", "pybullet[coordinates=multibody]").points}
+
+
+def test_finds_pybullet_s_short_turns():
+    """Beyond π/4 a step, all of a sudden; the tolerance is passed 1 % later."""
+    found = along("spin-principal", "step", "pybullet")
+    outside = 5.0 * first(found, "inaccurate")[1]
+    assert math.pi / 4 < outside < 1.03 * math.pi / 4
+    [surprise] = surprises([found])
+    assert surprise.sudden
+    [gradual] = surprises([along("spin-principal", "step", "document")])
+    assert not gradual.sudden
+
+
+@pytest.mark.parametrize("name", ["document[rotation=gyroscopic]", "mujoco"])
+def test_finds_the_explicit_gyroscopic_term_s_blow_up(name):
+    """The energy rises, then there is no state; MuJoCo's Euler has the same term."""
+    found = along("spin-asymmetric", "spin", name)
+    assert "gains_energy" in {point.condition for point in found.points}
+    _, outside = first(found, "diverged")
+    assert outside == pytest.approx(23.5, rel=0.05)  # measured 23.5 rad/s, .12 rad a step
+
+
+def test_finds_what_the_note_does_wrong():
+    """Sinks at restitution 0, gains energy near 1, never rests between."""
+    assert first(along("rock-block", "duration", "document"), "sinks")[1] == pytest.approx(6.2, rel=0.1)
+    inside, outside = first(along("drop-ball-lively", "restitution", "document"), "gains_energy")
+    assert 0.98 < inside < outside < 1.0
+    restless = along("drop-ball-lively", "duration", "document")
+    assert first(restless, "inaccurate")[1] == pytest.approx(9.7, rel=0.05)  # it comes to rest at 8.6 s, a tenth before the end
+    assert restless.points[-1].finding.criterion == "never rests"
+    # Its limit cycle strikes the floor at g h/(1 - e), ten times g h.
+    assert 9.0 <= restless.points[-1].finding.figure <= 19.0
+
+
+def test_finds_that_thin_things_pass_the_floor():
+    """A box of restitution 1/2 that falls at 4.4 m/s goes 22 mm deep in a step; at rest it is as deep as its last step was long."""
+    assert first(along("drop-box-flat", "step", "mujoco"), "tunnels")[0] > 0.1
+    smallest = along("drop-box-flat", "size", "document").points[0]
+    assert (smallest.condition, smallest.value < 2e-4) == ("tunnels", True)
+
+
+# What is told.
+
+
+def made(name, conditions, axis="spin"):
+    """An engine with a condition at 1, 10, 100, … rad/s; its scene's own value is 1."""
+    points = tuple(Point(10.0**n, Finding(condition, condition, 1.0, "")) for n, condition in enumerate(conditions))
+    return Explored(SPIN, AXES[axis], name, 1.0, points)
+
+
+SPIN = load("spin-principal")
+
+
+def test_surprises_come_first_that_others_are_spared():
+    found = surprises(
+        [
+            made("a", ["sound", "inaccurate", "diverged"]),
+            made("b", ["sound", "sound", "diverged"]),
+            made("c", ["sound", "sound", "diverged"]),
+            made("d", ["sound", "clamped", "clamped"]),
+        ]
+    )
+    told = [(one.engines, one.outside.condition, one.outside.value, one.sound) for one in found]
+    assert told[0] == (("d",), "clamped", 10.0, ("b", "c"))
+    assert told[1] == (("a",), "inaccurate", 10.0, ("b", "c"))
+    assert told[2] == (("a", "b", "c"), "diverged", 100.0, ())
+
+
+def test_what_is_as_it_is_is_told_once():
+    found = surprises([made("a", ["inaccurate"] * 3), made("a", ["inaccurate"] * 2, axis="mass"), made("b", ["inaccurate"] * 2)])
+    assert [(one.engines, one.inside) for one in found] == [(("a", "b"), None)]
+
+
+def test_largest_steps_count_with_all_finer_ones():
+    points = tuple(
+        Point(value, SOUND._replace(condition=condition))
+        for value, condition in ((0.001, "sound"), (0.01, "inaccurate"), (0.1, "sound"), (1.0, "diverged"))
+    )
+    study = Extremes(SPIN, DT, 0.1, (Explored(SPIN, AXES["step"], "exact", 0.001, points),), (), {})
+    assert study.largest_steps("exact") == (0.001, 0.1)
+
+
+def test_what_cannot_be_asked():
+    with pytest.raises(DropspinError, match="axis 'spn' is unknown"):
+        limits(SPIN, [Exact()], ["spn"])
+    with pytest.raises(DropspinError, match="spin-principal has none; it has step, spin"):
+        limits(SPIN, [Exact()], ["restitution"])

@@ -1,0 +1,116 @@
+"""The study of extremes as people read it: files, sentences, maps."""
+
+import csv
+import json
+import math
+
+import pytest
+from click.testing import CliRunner
+
+from comparisons.extremes import AXES, Explored, Extremes, Mapped, Point
+from comparisons.extremes.conditions import Finding
+from reports import extremes, plots
+from reports.cli import dropspin
+from scenarios import load
+
+SPIN = load("spin-principal")
+
+
+def line(engine, conditions, axis="spin"):
+    """An engine with a condition at 1, 10, … rad/s, of which the first is the scene's own."""
+    points = tuple(Point(10.0**n, Finding(one, "orientation_error", 0.2, "it is off by 0.2")) for n, one in enumerate(conditions))
+    return Explored(SPIN, AXES[axis], engine, 1.0, points)
+
+
+@pytest.fixture
+def study():
+    lines = (
+        line("a", ["sound", "sound", "diverged"]),
+        line("b", ["sound", "clamped", "clamped"]),
+        line("a", ["sound", "inaccurate"], "step"),
+    )
+    planes = (Mapped(SPIN, (AXES["spin"], AXES["inertia-ratio"]), "a", ((1.0, lines[0]), (10.0, lines[1]))),)
+    return Extremes(SPIN, 5e-3, 0.1, lines, planes, {"c": "not installed"})
+
+
+def test_sentences(study):
+    """Where, what, in whom, how it shows, who is spared; an edge with as many digits as tell its two values apart."""
+    told = extremes.sentences([study])
+    assert (
+        told[0]
+        == "spin-principal, spin above 1 rad/s (0.005 rad a step is well, 0.05 not): clamped in b; it is off by 0.2. Sound there: a."
+    )
+    assert "step above 1 s (5 rad a step is well, 50 not): inaccurate in a" in "".join(told)
+
+
+def test_tables(study):
+    assert extremes.step_rows([study]) == [
+        {"scene": "spin-principal", "engine": "a", "accurate up to": "1 s, 5 rad", "stable up to": "10 s, 50 rad"}
+    ]
+    ranges = extremes.range_rows([study])
+    assert ranges[0]["sound from"], ranges[0]["to"] == ("1", "10")
+    assert ranges[0]["beyond"] == "diverged at 100"
+
+
+def test_files(study, tmp_path):
+    """Each point once, numbers as numbers; the page names its pictures, which are there."""
+    extremes.write([study], tmp_path)
+    with (tmp_path / "limits.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 3 + 3 + 2 + 6
+    assert {row["across_value"] for row in rows} == {"", "1.0", "10.0"}
+    content = json.loads((tmp_path / "limits.json").read_text(encoding="utf-8"))
+    assert [row["condition"] for row in content[:3]] == ["sound", "sound", "diverged"]
+    page = (tmp_path / "limits.md").read_text(encoding="utf-8")
+    for name in ("spin-principal.svg", "spin-principal-spin-inertia-ratio.svg"):
+        assert f"({name})" in page
+        assert (tmp_path / name).stat().st_size > 1000
+    assert "Left out: c, not installed." in page
+
+
+def test_a_map_changes_colour_half_way_between_two_points(study):
+    """On the axis's own scale: 1 and 10 meet at √10, 10 and 100 at √1000; a condition that goes on is one bar."""
+    import matplotlib.pyplot as plt
+
+    axes = plt.figure().gca()
+    plots.plot_conditions(study, "spin", axes)
+    bars = [(patch.get_y() + 0.5 * patch.get_height(), patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
+    plt.close("all")
+    expected = [(0, 0.0, 1.5), (0, 1.5, 2.0), (1, 0.0, 0.5), (1, 0.5, 2.0)]
+    assert bars == [pytest.approx((row, math.log(10) * left, math.log(10) * right)) for row, left, right in expected]
+    assert axes.get_legend_handles_labels()[1] == ["sound", "diverged", "clamped"]
+
+
+def test_from_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    asked = ["limits", "spin-principal", "-e", "mujoco", "-e", "pybullet", "--axis", "step", "--pair", "spin,mass"]
+    result = CliRunner().invoke(dropspin, asked)
+    assert result.exit_code == 0, result.output
+    first, *_ = result.stdout.splitlines()
+    assert first.startswith("1. spin-principal, step above 0.158 s (0.79")
+    assert "inaccurate, all of a sudden, in pybullet; orientation error is" in first
+    assert (tmp_path / "out/limits/spin-principal-spin-mass.svg").exists()
+    told = CliRunner().invoke(dropspin, [*asked[:5], "--axis", "mass", "--json"])
+    assert {row["condition"] for row in json.loads(told.stdout)} == {"sound", "declined"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (["--axis", "spinn"], "axis 'spinn' is unknown. Did you mean 'spin'?"),
+        (["--axis", "height"], "axis 'height': spin-principal has none; it has step, spin"),
+        (["--pair", "spin"], "name two axes, such as spin,inertia-ratio"),
+        (["-e", "mujocoo"], "engine 'mujocoo' is unknown."),
+        (["--dt", "7"], "dt: got 7.0 s"),
+    ],
+)
+def test_bad_input(asked, said, capfd, monkeypatch):
+    import sys
+
+    from reports import cli
+
+    monkeypatch.setattr(sys, "argv", ["dropspin", "limits", "spin-principal", *asked])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == 2
+    assert said in capfd.readouterr().err

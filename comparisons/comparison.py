@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios import Scenario, Trajectory, Truth
-from scenarios.mechanics import kinetic_energy
+from scenarios.mechanics import angular_momentum, energy, kinetic_energy
 from scenarios.model import TOUCHING
 from scenarios.rotations import rotate
 
@@ -26,6 +26,11 @@ SHORTEST_FLIGHT = 16  # steps; a flight of fewer is not resolved, and not judged
 
 class Unresolved(Exception):
     """The time step is too coarse for a metric; the text says why."""
+
+
+def exactly(truth: Truth, times: Array) -> Trajectory:
+    """The truth at those of some times that it covers."""
+    return truth(times[truth.covers(times)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +51,11 @@ class Comparison:
     impacts: tuple[float, ...] = ()
 
     @classmethod
-    def with_truth(cls, scene: Scenario, motion: Trajectory, truth: Truth | None) -> "Comparison":
-        """Hold a motion against the truth, as far as the truth goes."""
+    def with_truth(cls, scene: Scenario, motion: Trajectory, truth: Truth | None, exact: Trajectory | None = None) -> "Comparison":
+        """Hold a motion against the truth, as far as the truth goes; `exact` is what `exactly` gave for its times, if that is at hand."""
         if truth is None:
             return cls(scene, motion)
-        return cls(scene, motion, truth(motion.t[truth.covers(motion.t)]), tuple(event.time for event in truth.events))
+        return cls(scene, motion, exactly(truth, motion.t) if exact is None else exact, tuple(event.time for event in truth.events))
 
     @cached_property
     def exact(self) -> Trajectory:
@@ -73,6 +78,26 @@ class Comparison:
     def compared(self) -> Trajectory:
         """The motion at the reference's times."""
         return self.motion[: len(self.exact)]
+
+    @cached_property
+    def energy(self) -> Array:
+        """Of the motion, velocity synchronised with position [J], shape (n,)."""
+        return energy(self.scene, self.motion)
+
+    @cached_property
+    def exact_energy(self) -> Array:
+        """Of the reference [J], shape (m,)."""
+        return energy(self.scene, self.exact)
+
+    @cached_property
+    def angular_momentum(self) -> Array:
+        """Of the motion at the reference's times [kg m²/s], shape (m, 3)."""
+        return angular_momentum(self.scene, self.compared)
+
+    @cached_property
+    def exact_angular_momentum(self) -> Array:
+        """Of the reference [kg m²/s], shape (m, 3)."""
+        return angular_momentum(self.scene, self.exact)
 
     @cached_property
     def dt(self) -> float:

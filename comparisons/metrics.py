@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from comparisons import errors
 from comparisons.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
 from scenarios import Scenario, Trajectory, Truth
-from scenarios.mechanics import angular_momentum, apex, energy, kinetic_energy, lowest_height
+from scenarios.mechanics import angular_momentum, apex, kinetic_energy, lowest_height
 
 Array = NDArray[np.float64]
 NEAR_FLOOR = 0.05  # of the body's size: engines may take what is so near for contact
@@ -193,14 +193,14 @@ def energy_error_raw(case: Comparison) -> Array:
 def energy_drift(case: Comparison) -> float:
     """Change of energy from the start to the end of the first flight, over the scene's energy."""
     rows = case.flights[0]
-    over_time = energy(case.scene, case.motion[rows])
+    over_time = case.energy[rows]
     return float(over_time[-1] - over_time[0]) / case.energy_scale
 
 
 @_metric("1", "invariant", "no damping", _keeps_energy)
 def energy_gain(case: Comparison) -> float:
     """Largest rise of energy above any earlier value, over the scene's energy."""
-    over_time = energy(case.scene, case.motion)
+    over_time = case.energy
     return float(np.max(over_time - np.minimum.accumulate(over_time))) / case.energy_scale
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.agreement import agreement_rows
-from comparisons.comparison import Comparison, Unresolved
+from comparisons.comparison import Comparison, Unresolved, exactly
 from comparisons.engines.base import Engine, calibrated_label
 from comparisons.ensembles import Outcome, ensemble_rows
 from comparisons.isolation import Cells, Limits
@@ -91,10 +91,12 @@ def _run_scene(
     settings: dict[str, dict[str, Any]] = {}
     for dt in dts:
         phases = start_phases(scene, truth, dt)
+        times = dt * np.arange(1 + scene.steps(dt), dtype=float)
+        exact = [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
         attempts: list[Attempt] = []
         for contestant in contestants:
             attempt = cells.attempt(contestant, scene, dt, phases)
-            measured[contestant.label] += _truth_rows(written, dt, attempt, phases)
+            measured[contestant.label] += _truth_rows(written, dt, attempt, phases, exact)
             rows += prediction_rows(scene, truth, contestant.label, dt, attempt.predicted)
             if contestant.engine is not None and attempt.motion is not None:
                 trajectories[scene.name, contestant.label, dt] = attempt.motion
@@ -125,7 +127,7 @@ def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:
     return {metric.name: _value_or_nan(metric, case) for metric in metrics_for(scene, truth)}
 
 
-def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Phase]) -> list[Row]:
+def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Phase], exact: Sequence[Trajectory | None]) -> list[Row]:
     scene, truth = written
     steps = scene.steps(dt)
     shared: Row = {"scene": scene.name, "engine": attempt.label, "dt": dt, "time_per_step": attempt.time_per_step, "steps": steps}
@@ -136,7 +138,8 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
     if bad is not None:
         reason = f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s"
         return [shared | {"verdict": "diverged", "reason": reason}]
-    cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in zip(phases, attempt.phases, strict=True)]
+    beside = zip(phases, attempt.phases, exact, strict=True)
+    cases = [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in beside]
     rows = [shared | {"verdict": "limited", "reason": limit.said} for limit in attempt.limits]
     for metric in metrics_for(scene, truth):
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}

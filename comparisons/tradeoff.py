@@ -8,12 +8,13 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.comparison import Comparison, Unresolved
-from comparisons.engines.base import Diverged
+from comparisons.engines.base import Diverged, Engine
 from comparisons.isolation import Cells, Failed, Limits
 from comparisons.metrics import METRICS, metrics_for
 from comparisons.phases import Phase, start_phases
@@ -62,6 +63,10 @@ FEWEST_POINTS = 6
 CONVERGED = 0.3
 """Of the largest error of the motion, that the least must be below."""
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
+SIDE_BY_SIDE = 256
+"""Bodies of an ensemble."""
+SIDE_BY_SIDE_ROUNDS = 3
+MOST_SIDE_BY_SIDE = 100_000  # steps of all of them, that a timing takes
 LEVEL = 1.25
 """Contestants whose times are nearer than this, or that change places from round to round, are level."""
 
@@ -75,12 +80,14 @@ class Point:
         dt: [s].
         error: Size of the metric's value.
         cost: Time a simulated second, in each round [s/s], shape (rounds,).
+        side_by_side: The same for each of `SIDE_BY_SIDE` bodies that the engine takes together, the least of some; NaN if it has no way to.
     """
 
     engine: str
     dt: float
     error: float
     cost: Array
+    side_by_side: float = math.nan
 
     @property
     def typical(self) -> float:
@@ -114,11 +121,12 @@ class TradeOff:
     @property
     def front(self) -> list[Point]:
         """The points that no other is both as accurate and as cheap as; cheapest first."""
-        front: list[Point] = []
-        for point in sorted(self.points, key=lambda one: (one.typical, one.error)):
-            if not front or point.error < front[-1].error:
-                front.append(point)
-        return front
+        return _front(self.points, lambda point: point.typical)
+
+    @property
+    def front_side_by_side(self) -> list[Point]:
+        """The same by the cost of each of many bodies, of the engines that can take them side by side."""
+        return _front([point for point in self.points if np.isfinite(point.side_by_side)], lambda point: point.side_by_side)
 
     @property
     def dominated(self) -> list[str]:
@@ -131,6 +139,24 @@ class TradeOff:
 
         Of each engine that is the coarsest step that is within it together with all finer ones: a step whose error crosses 0 is luck.
         """
+        coarsest = self._coarsest(within)
+        if not coarsest:
+            return None
+        best, *others = sorted(coarsest, key=lambda one: one.typical)
+        if not others:
+            return Recommendation(within, best, None, math.nan, False)
+        ratios = others[0].cost / best.cost
+        ratio = float(np.median(ratios))
+        level = ratio < LEVEL or float(np.quantile(ratios, 0.25)) <= 1.0
+        return Recommendation(within, best, others[0], ratio, level)
+
+    def best_side_by_side(self, within: float) -> Point | None:
+        """The cheapest within a tolerance where many bodies are taken together; None if no engine that can gets there."""
+        together = [point for point in self._coarsest(within) if np.isfinite(point.side_by_side)]
+        return min(together, key=lambda point: point.side_by_side, default=None)
+
+    def _coarsest(self, within: float) -> list[Point]:
+        """Of each engine the coarsest step that is within a tolerance together with all finer ones."""
         coarsest: dict[str, Point] = {}
         lost: set[str] = set()
         for point in sorted(self.points, key=lambda one: one.dt):
@@ -138,15 +164,15 @@ class TradeOff:
                 lost.add(point.engine)
             if point.engine not in lost:
                 coarsest[point.engine] = point
-        if not coarsest:
-            return None
-        best, *others = sorted(coarsest.values(), key=lambda one: one.typical)
-        if not others:
-            return Recommendation(within, best, None, math.nan, False)
-        ratios = others[0].cost / best.cost
-        ratio = float(np.median(ratios))
-        level = ratio < LEVEL or float(np.quantile(ratios, 0.25)) <= 1.0
-        return Recommendation(within, best, others[0], ratio, level)
+        return list(coarsest.values())
+
+
+def _front(points: Sequence[Point], cost: Callable[[Point], float]) -> list[Point]:
+    front: list[Point] = []
+    for point in sorted(points, key=lambda one: (cost(one), one.error)):
+        if not front or point.error < front[-1].error:
+            front.append(point)
+    return front
 
 
 def default_metric(scene: Scenario) -> str:
@@ -206,8 +232,14 @@ def tradeoff(
         for number in range(ROUNDS):
             for cost, (contestant, dt, _) in zip(costs, points, strict=True):
                 cost.append(cells.call(contestant, _cost, scene, dt))
-            progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.5 * (number + 1) / ROUNDS)
-    found = tuple(Point(one.label, dt, error, np.array(cost)) for (one, dt, error), cost in zip(points, costs, strict=True))
+            progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
+        together: list[float] = []
+        for contestant, some in groupby(points, lambda point: point[0]):
+            together += cells.call(contestant, _costs_side_by_side, scene, [dt for _, dt, _ in some])
+        progress("ensembles", 1.0)
+    found = tuple(
+        Point(one.label, dt, error, np.array(cost), apiece) for (one, dt, error), cost, apiece in zip(points, costs, together, strict=True)
+    )
     return TradeOff(scene, chosen, tuple(point for point in found if np.isfinite(point.cost).all()), left_out)
 
 
@@ -320,3 +352,33 @@ def _timed(contestant: Contestant, scene: Scenario, dt: float, steps: int) -> fl
             return math.nan
         taken = time.perf_counter() - start
         return taken if np.isfinite(simulation.state()).all() else math.nan
+
+
+def _costs_side_by_side(contestant: Contestant, scene: Scenario, dts: Sequence[float]) -> list[float]:
+    """Time a simulated second and body [s/s] of native stepping of an ensemble, at each step; NaN if the engine has none.
+
+    In flight a step takes what it takes, whatever its size; on a floor whole runs are timed, where they are not too long.
+    """
+    assert contestant.engine is not None
+    if scene.floor is not None:
+        return [_timed_side_by_side(contestant.engine, scene, dt, scene.steps(dt)) / (scene.steps(dt) * dt) for dt in dts]
+    steps = MOST_SIDE_BY_SIDE // SIDE_BY_SIDE
+    taken = _timed_side_by_side(contestant.engine, scene, dts[-1], steps)
+    return [taken / (steps * dt) for dt in dts]
+
+
+def _timed_side_by_side(engine: Engine, scene: Scenario, dt: float, steps: int) -> float:
+    """How long some native steps of an ensemble take, the least of some [s a body]; NaN if it cannot be told."""
+    members, timings = [scene] * SIDE_BY_SIDE, []
+    if steps * SIDE_BY_SIDE > MOST_SIDE_BY_SIDE:
+        return math.nan
+    for _ in range(1 + SIDE_BY_SIDE_ROUNDS):
+        ensemble = engine.prepare_ensemble(members, dt)
+        if ensemble is None:
+            return math.nan
+        start = time.perf_counter()
+        ensemble.advance(steps)
+        timings.append(time.perf_counter() - start)
+        if not np.isfinite(ensemble.states()).all():
+            return math.nan
+    return min(timings[1:]) / SIDE_BY_SIDE  # the first one compiles

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from comparisons.metrics import METRICS
-from comparisons.tradeoff import Point, TradeOff
+from comparisons.tradeoff import SIDE_BY_SIDE, Point, TradeOff
 
-COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "on_front")
+COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "side_by_side", "on_front")
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
@@ -27,6 +28,7 @@ def rows(found: TradeOff) -> list[dict[str, Any]]:
             "cost": point.typical,
             "cost_best": float(point.cost.min()),
             "cost_quartiles": [float(value) for value in np.quantile(point.cost, [0.25, 0.75])],
+            "side_by_side": None if math.isnan(point.side_by_side) else point.side_by_side,
             "on_front": point in front,
         }
         for point in found.points
@@ -41,7 +43,9 @@ def front_rows(found: TradeOff) -> list[dict[str, str]]:
             "engine": point.engine,
             "step": f"{1e3 * point.dt:.4g} ms",
             "error": f"{point.error:.2e}{unit}",
-            "time per simulated second": f"{_time(point.typical)} (best {_time(float(point.cost.min()))})",
+            "a simulated second": _time(point.typical),
+            "best": _time(float(point.cost.min())),
+            f"each of {SIDE_BY_SIDE}": "–" if math.isnan(point.side_by_side) else _time(point.side_by_side),
         }
         for point in found.front
     ]
@@ -66,6 +70,9 @@ def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
             sentence += f"; level with {_named(advice.next_best)}, {advice.ratio:.2f} times that."
         else:
             sentence += f"; next best {_named(advice.next_best)}, {advice.ratio:.1f} times that."
+        together = found.best_side_by_side(tolerance)
+        if together is not None:
+            sentence += f" Of {SIDE_BY_SIDE} side by side, {_named(together)}: {_time(together.side_by_side)} each."
         told.append(sentence)
     if found.dominated:
         told.append(f"Dominated, less accurate or slower than something else at every step: {', '.join(found.dominated)}.")
@@ -103,4 +110,5 @@ def _unit(found: TradeOff) -> str:
 
 
 def _time(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"
+    scale, unit = next((scale, unit) for scale, unit in ((1e3, "ms"), (1e6, "µs"), (1e9, "ns")) if seconds * scale >= 1.0 or unit == "ns")
+    return f"{seconds * scale:.3g} {unit}"

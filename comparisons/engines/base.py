@@ -101,6 +101,18 @@ class Simulation:
         self.close()
 
 
+class Ensemble:
+    """Many starts of a scene at one time step, that an engine takes side by side."""
+
+    def advance(self, steps: int) -> None:
+        """Take some native steps and do nothing else: this is what gets timed."""
+        raise NotImplementedError
+
+    def states(self) -> Array:
+        """As `Simulation.state`, of each, shape (size, 13)."""
+        raise NotImplementedError
+
+
 class Number(NamedTuple):
     """What a numeric option may be."""
 
@@ -222,6 +234,10 @@ class Engine:
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         """Build a scene at a time step [s], start included."""
         raise NotImplementedError
+
+    def prepare_ensemble(self, members: Sequence[Scenario], dt: float) -> Ensemble | None:
+        """Build one scene from many starts, or None: the engine has no way of its own to take them side by side."""
+        return None
 
     def record_ensemble(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
         """Record one scene from many starts, shape (len(members), 1 + steps, 13); default loops; override with a native one."""

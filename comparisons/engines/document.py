@@ -15,6 +15,7 @@ from comparisons.engines.base import (
     Array,
     AsBuilt,
     Engine,
+    Ensemble,
     Simulation,
     may_tumble,
     version,
@@ -85,9 +86,10 @@ class Document(Engine):
 
     def record_ensemble(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
         """All side by side."""
-        scene = members[0]
-        simulator = reference_impl.Simulator(_body(scene.body), _world(scene), dt, self.methods())
-        return simulator.run(np.array([member.initial_state for member in members]), steps)
+        return DocumentEnsemble(members, dt, self.methods()).run(steps, every=1)
+
+    def prepare_ensemble(self, members: Sequence[Scenario], dt: float) -> Ensemble:
+        return DocumentEnsemble(members, dt, self.methods())
 
 
 class DocumentSimulation(Simulation):
@@ -124,6 +126,25 @@ class DocumentSimulation(Simulation):
     def as_built(self) -> AsBuilt:
         gravity = np.zeros(3) if self._world.gravity is None else self._world.gravity
         return AsBuilt(float(self._body.mass), self._body.inertia, gravity)
+
+
+class DocumentEnsemble(Ensemble):
+    """States that the reference implementation moves on, in lanes and threads."""
+
+    def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
+        scene = members[0]
+        self._simulator = reference_impl.Simulator(_body(scene.body), _world(scene), dt, methods)
+        self._states = np.array([member.initial_state for member in members])
+
+    def advance(self, steps: int) -> None:
+        self._states = self.run(steps, max(steps, 1))[:, -1]
+
+    def states(self) -> Array:
+        return self._states.copy()
+
+    def run(self, steps: int, every: int) -> Array:
+        """States now and after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
+        return self._simulator.run(self._states, steps, every)
 
 
 def _body(body: Body) -> reference_impl.Body:

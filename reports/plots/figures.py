@@ -42,12 +42,14 @@ MOST_PANELS = 3
 
 
 def tradeoff_figure(found: "TradeOff") -> "Figure":
-    """Error over cost in one scene."""
-    with _figure(["", ""]) as (figure, panels):
-        plot_tradeoff(found, panels[0])
+    """Error over cost in one scene: of one body, and of each of many where an engine takes them side by side."""
+    together = [False, True] if found.front_side_by_side else [False]
+    with _figure([""] * (len(together) + 1)) as (figure, panels):
+        for axes, side_by_side in zip(panels, together, strict=False):
+            plot_tradeoff(found, axes, side_by_side)
         panels[0].set_title(found.scene.name)
-        panels[1].axis("off")
-        panels[1].legend(*panels[0].get_legend_handles_labels(), loc="center left", frameon=False)
+        panels[-1].axis("off")
+        panels[-1].legend(*panels[0].get_legend_handles_labels(), loc="center left", frameon=False)
     return figure
 
 

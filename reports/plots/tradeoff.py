@@ -1,26 +1,36 @@
 """What accuracy costs."""
 
+from math import isfinite
 from typing import TYPE_CHECKING
 
+from comparisons.tradeoff import SIDE_BY_SIDE
 from reports.colours import engine_colours, engine_markers
 from reports.plots.style import ROUNDING, ink, label_powers, metric_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from comparisons.tradeoff import TradeOff
+    from comparisons.tradeoff import Point, TradeOff
 
 
-def plot_tradeoff(found: "TradeOff", axes: "Axes") -> None:
-    """Draw error over cost, both logarithmic: each engine's steps joined, and the front, which nothing beats in both."""
+def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -> None:
+    """Draw error over cost, both logarithmic: each engine's steps joined, and the front, which nothing beats in both.
+
+    `side_by_side` draws the cost of each of many bodies instead, of the engines that take them together.
+    """
+    front = found.front_side_by_side if side_by_side else found.front
+
+    def cost(point: "Point") -> float:
+        return point.side_by_side if side_by_side else point.typical
+
     engines = list(dict.fromkeys(point.engine for point in found.points))
     colours, markers = engine_colours(engines), engine_markers(engines)
-    cheapest, best = zip(*((point.typical, max(point.error, ROUNDING)) for point in found.front), strict=True)
+    cheapest, best = zip(*((cost(point), max(point.error, ROUNDING)) for point in front), strict=True)
     axes.loglog(cheapest, best, color=ink(), linewidth=5.0, alpha=0.25, label="front")
     for engine in engines:
-        mine = [point for point in found.points if point.engine == engine]
+        mine = [point for point in found.points if point.engine == engine and isfinite(cost(point))]
         axes.loglog(
-            [point.typical for point in mine],
+            [cost(point) for point in mine],
             [max(point.error, ROUNDING) for point in mine],
             color=colours[engine],
             marker=markers[engine],
@@ -30,5 +40,5 @@ def plot_tradeoff(found: "TradeOff", axes: "Axes") -> None:
         )
     label_powers(axes, "x")
     label_powers(axes, "y")
-    axes.set_xlabel("time per simulated second [s]")
+    axes.set_xlabel(f"time per simulated second{f', each of {SIDE_BY_SIDE}' if side_by_side else ''} [s]")
     axes.set_ylabel(metric_label(found.metric))

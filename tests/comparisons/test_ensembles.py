@@ -31,6 +31,17 @@ def test_side_by_side_is_one_by_one():
     np.testing.assert_array_equal(document.record_ensemble(drawn, 1e-3, 600), Engine.record_ensemble(document, drawn, 1e-3, 600))
 
 
+@pytest.mark.parametrize("name", ["document", "document[rotation=exact]", "mujoco", "mujoco[profile=default]"])
+def test_what_is_timed_of_an_ensemble_is_its_motion(name):
+    """Each of many that an engine takes side by side ends where it ends alone; MuJoCo sets out with a cold solver after a stop."""
+    drawn, chosen = members(FEW), engine(name)
+    together = chosen.prepare_ensemble(drawn, 1e-3)
+    together.advance(400)
+    together.advance(200)
+    alone = Engine.record_ensemble(chosen, drawn, 1e-3, 600)[:, -1]
+    np.testing.assert_allclose(together.states(), alone, rtol=0, atol=0.0 if name.startswith("document") else 1e-6)
+
+
 def test_a_ball_s_ensemble_is_its_one_motion():
     """Whatever way a ball is turned it bounces alike: energy e^2k after k bounces, rebound e² H, and no spread."""
     ball = load("drop-ball").model_dump(exclude_none=True, exclude={"expect", "origin"}) | {"ensemble": {"size": 4, "seed": 1}}

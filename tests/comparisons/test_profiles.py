@@ -108,8 +108,10 @@ def test_profiles_and_coordinates():
     assert calibrated_label("mujoco[integrator=implicitfast,profile=default]") == "mujoco[integrator=implicitfast]"
     assert calibrated_label("mujoco") is calibrated_label("mujoco[kappa=0.002]") is None
     assert engine("pybullet[profile=calibrated]").label == "pybullet"
-    with pytest.raises(DropspinError, match="profile=default has the coordinates of the default"):
+    with pytest.raises(DropspinError, match="profile=default is a multibody that clamps its speeds"):
         engine("pybullet[coordinates=multibody,profile=default]")
+    with pytest.raises(DropspinError, match="only multibodies clamp speeds"):
+        engine("pybullet[velocity_clamp=kept]")
     assert "law of their own" in engine("pybullet[coordinates=multibody]").declines(load("fall-damped"))
     for name in ("mujoco", "pybullet"):
         with engine(f"{name}[profile=default]").prepare(ball(0.5), 1e-3) as simulation:

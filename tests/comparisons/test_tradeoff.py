@@ -43,6 +43,17 @@ def test_the_cheapest_within_a_tolerance():
     assert found.recommendation(1e-1).best.engine == "c"
 
 
+def test_side_by_side_is_a_choice_of_its_own():
+    """The cheapest of each of many is among the engines that can take many, at the step that the tolerance asks for."""
+    ways = [("lanes", 0.2, 1e-2, 1e-8), ("lanes", 0.1, 1e-4, 2e-8), ("threads", 0.1, 1e-4, 3e-8), ("alone", 0.1, 1e-5, np.nan)]
+    points = tuple(Point(engine, dt, error, np.array([1.0]), cost) for engine, dt, error, cost in ways)
+    found = TradeOff(SPIN, "orientation_error", points)
+    best = found.best_side_by_side(1e-3)
+    assert (best.engine, best.dt) == ("lanes", 0.1)
+    assert found.best_side_by_side(1e-5) is None
+    assert [(point.engine, point.dt) for point in found.front_side_by_side] == [("lanes", 0.2), ("lanes", 0.1)]
+
+
 @pytest.mark.parametrize("costs", [([2, 2, 2], [2.2, 2.2, 2.2]), ([2, 2, 2], [1.9, 3.5, 1.9, 3.5][:3])])
 def test_what_changes_places_is_level(costs):
     found = made(("a", 0.1, 1e-4, costs[0]), ("b", 0.1, 1e-4, costs[1]))

@@ -401,6 +401,7 @@ angular_velocity = [1.0, 5.0, 0.5]
     assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]"}
     assert all(row["cost_best"] <= row["cost"] for row in rows)
     assert any(row["on_front"] for row in rows)
+    assert all(row["side_by_side"] > 0.0 for row in rows)
 
 
 def test_tradeoff_of_what_has_no_truth(tmp_path):

@@ -90,7 +90,7 @@ def test_from_the_command_line(tmp_path, monkeypatch):
     assert first.startswith("1. spin-principal, step above 0.158 s (0.79")
     assert "inaccurate, all of a sudden, in pybullet; orientation error is" in first
     assert (tmp_path / "out/limits/spin-principal-spin-mass.svg").exists()
-    told = CliRunner().invoke(dropspin, [*asked[:5], "--axis", "mass", "--json"])
+    told = CliRunner().invoke(dropspin, [*asked[:6], "--axis", "mass", "--json"])
     assert {row["condition"] for row in json.loads(told.stdout)} == {"sound", "declined"}
 
 

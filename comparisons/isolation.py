@@ -5,6 +5,7 @@ not use up; a leak ends at a limit of memory; what an engine prints is dropped. 
 work. One engine works at a time, so that nobody's timing is disturbed.
 """
 
+import ctypes
 import faulthandler
 import os
 import signal
@@ -59,9 +60,16 @@ class Failed(Exception):
 
 
 class Cells:
-    """One process for each engine; a context manager."""
+    """One process for each engine; a context manager.
 
-    def __init__(self, limits: Limits) -> None:
+    Args:
+        limits: What each may use.
+        start_method: How processes start, a word of `multiprocessing`. None: forked, if the system can do that.
+    """
+
+    def __init__(self, limits: Limits, start_method: str | None = None) -> None:
+        # A forked process has the engine already, whatever it is made of; and no script of a user's is run again.
+        self._start_method = start_method or ("fork" if "fork" in get_all_start_methods() else "spawn")
         self._limits = limits
         self._pools: dict[str, ProcessPool] = {}
         self._processes: dict[str, Synchronized[int]] = {}
@@ -124,9 +132,7 @@ class Cells:
         return "crashed", f"its process ended with exit code {exit_code}"
 
     def _pool(self, contestant: Contestant) -> ProcessPool:
-        # A forked process has the engine already, whatever it is made of; and no script of a user's is run again.
-        method = "fork" if "fork" in get_all_start_methods() else "spawn"
-        context = get_context(method)
+        context = get_context(self._start_method)
         self._processes[contestant.label] = process = context.Value("l", 0)
         return ProcessPool(max_workers=1, initializer=_move_in, initargs=[contestant, self._limits.memory, process], context=context)
 
@@ -159,9 +165,18 @@ def _move_in(contestant: Contestant, memory: int, process: "Synchronized[int]") 
     if sys.platform == "linux":
         import resource
 
+        _end_with_parent()
         with open("/proc/self/statm", encoding="ascii") as file:
             taken = int(file.read().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
+
+
+PR_SET_PDEATHSIG = 1
+
+
+def _end_with_parent() -> None:
+    """Have the system end this process when the one that started it is killed: processes of many engines would keep each other waiting."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _work_here(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:

@@ -71,12 +71,12 @@ def _interrupt(number: int, frame: object) -> None:
 
 
 def _tell_unless_interrupted(found: "sys.UnraisableHookArgs") -> None:
-    """Say what went wrong where nothing can be raised; an interrupt that came there is not lost, see `_stop_if_interrupted`."""
+    """Say what went wrong where nothing can be raised; an interrupt that came there is not lost, see `stop_if_interrupted`."""
     if not isinstance(found.exc_value, KeyboardInterrupt):
         sys.__unraisablehook__(found)
 
 
-def _stop_if_interrupted() -> None:
+def stop_if_interrupted() -> None:
     """Raise the interrupt again: one that arrives within a callback of an engine or of the compiler is swallowed there."""
     if _interrupts:
         raise KeyboardInterrupt
@@ -166,12 +166,12 @@ def run(
             with progress_bar(len(loaded) * len(chosen) * len(steps)) as progress:
 
                 def told(scene: str, engine: str, dt: float) -> None:
-                    _stop_if_interrupted()
+                    stop_if_interrupted()
                     progress(scene, engine, dt)
 
                 limits = comparisons.Limits(processor_time=time_limit)
                 results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
-            _stop_if_interrupted()
+            stop_if_interrupted()
             if not json_output:
                 reports.print_table(results)
             with status("writing the report"):
@@ -247,7 +247,7 @@ def conform(engine_name: str, time_limit: float, json_output: bool) -> int:
     chosen = engine(engine_name)
     with status(f"checking {chosen.label}"):
         found = findings(chosen, Limits(processor_time=time_limit))
-    _stop_if_interrupted()
+    stop_if_interrupted()
     print_rows([{"check": one.check, "verdict": one.verdict, "what was found": one.said} for one in found], json_output)
     verdicts = {one.verdict for one in found}
     return 3 if verdicts & {"crashed", "timed_out"} else int("failed" in verdicts)
@@ -285,7 +285,7 @@ def calibrate(
     chosen = engine(engine_name)
     with status(f"measuring {chosen.label}"):
         found = calibrated(chosen, restitution, dt, look.friction(friction), shape)
-    _stop_if_interrupted()
+    stop_if_interrupted()
     if language is not None:
         if language not in found.programs:
             raise UnknownName(f"{chosen.label}'s language", language, found.programs)
@@ -334,7 +334,7 @@ def tradeoff(
         with share_bar(name) as progress:
 
             def told(what: str, share: float) -> None:
-                _stop_if_interrupted()
+                stop_if_interrupted()
                 progress(what, share)
 
             found.append(traded(load(name), engines, metric, told))
@@ -347,3 +347,13 @@ def tradeoff(
         click.echo(json.dumps([row for one in found for row in trade.rows(one)], indent=1))
     else:
         click.echo(f"Written: {os.path.join(output, 'tradeoff.md')}")
+
+
+def _add_verbs() -> None:
+    """Those that have a file of their own."""
+    from reports.verbs.sweep import sweep
+
+    dropspin.add_command(sweep)
+
+
+_add_verbs()

@@ -36,7 +36,7 @@ def run_on_cluster(work: Work, parts: Iterator[Part], folder: Folder, told: Call
         client = Client(scheduler, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise DropspinError(f"--scheduler {scheduler}: no scheduler answers ({error}); start one with: dask scheduler.") from None
-    with client:
+    with client, client.as_current():
         try:
             _all_done(client, work, parts, folder, told)
         finally:

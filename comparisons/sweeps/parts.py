@@ -52,7 +52,7 @@ class Folder:
                 ) from None
             return None
         except NotADirectoryError:
-            raise DropspinError(f"{self.where}: is in a file; choose a folder with -o.") from None
+            raise DropspinError(f"{self.where}: is a file, or in one; choose a folder with -o.") from None
         try:
             content: dict[str, Any] = json.loads(text)
             assert {"identity", "jobs", "part_size", "provenance"} <= content.keys()

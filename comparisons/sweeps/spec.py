@@ -73,7 +73,7 @@ class Spec(_Table):
 
     scenes: Names
     engines: Names
-    dts: Annotated[tuple[Positive, ...], Field(min_length=1), AfterValidator(_different)] = ()
+    dts: Annotated[tuple[Positive, ...], AfterValidator(_different)] = ()
     seeds: Count | Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_different)] | None = None
     metrics: Annotated[tuple[str, ...], AfterValidator(_different)] = ()
     grid: dict[str, Any] = {}
@@ -97,6 +97,7 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
     for name in names:
         if names.count(name) > 1:
             raise DropspinError(f"{where}: {name}: is in [grid] and in [random]; it can be in one of them.")
+    _assert_apart(where, names)
     if ("dt" in names) == bool(written.dts):
         fault = "is given twice" if written.dts else "is missing"
         raise DropspinError(f"{where}: the time step {fault}; give dts = [...], or dt in [grid] or [random] [s].")
@@ -184,6 +185,14 @@ def _random(where: str, table: Mapping[str, Any]) -> list[Axis]:
     if not axes:
         raise DropspinError(f"{where}: random: nothing to draw; name a field and its range, such as body.mass = {{from = 1.0, to = 2.0}}.")
     return axes
+
+
+def _assert_apart(where: str, names: list[str]) -> None:
+    """Raise `DropspinError` if one axis sets a part of what another sets."""
+    for whole in names:
+        for part in names:
+            if part.startswith((f"{whole}.", f"{whole}[")):
+                raise DropspinError(f"{where}: {part}: sets what {whole} sets; leave one of them out.")
 
 
 def _assert_sound(where: str, sweep: Sweep) -> None:

@@ -157,6 +157,7 @@ def _move_in(contestant: Contestant, memory: int, process: "Synchronized[int]") 
     _residents.append(contestant)
     _at_work.append(process)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, whatever the parent does at one itself
     faulthandler.disable()
     nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
     for stream in (1, 2):

@@ -5,7 +5,9 @@ at; another does that again, and finds written what had been.
 """
 
 import multiprocessing
+import re
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
@@ -21,13 +23,18 @@ PATIENCE = 30.0  # s, for a scheduler to answer
 TICK = 0.5  # s
 
 
-def run_on_cluster(work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[int], None], scheduler: str) -> None:
-    """Have parts done by the workers of a scheduler; the other arguments are those of `local.run_here`.
+@contextmanager
+def connected(scheduler: str) -> Iterator[Any]:
+    """A client of a scheduler; on leaving, the workers' engines end.
 
     Raises:
         EngineMissing: Dask is not installed.
-        DropspinError: The scheduler does not answer, or a worker cannot do its part. The text says why, and what to do.
+        DropspinError: The scheduler does not answer.
     """
+    if not re.fullmatch(r"[a-z]+://[^\s:]+:\d+", scheduler):
+        raise DropspinError(
+            f"--scheduler {scheduler}: is no address; it is what dask scheduler says when it starts, such as tcp://host:8786."
+        )
     if find_spec("distributed") is None:
         raise EngineMissing("--scheduler needs Dask, which is not installed: pip install 'dropspin[cluster]'.")
     from distributed import Client
@@ -38,12 +45,17 @@ def run_on_cluster(work: Work, parts: Iterator[Part], folder: Folder, told: Call
         raise DropspinError(f"--scheduler {scheduler}: no scheduler answers ({error}); start one with: dask scheduler.") from None
     with client, client.as_current():
         try:
-            _all_done(client, work, parts, folder, told)
+            yield client
         finally:
             client.run(_leave, on_error="ignore")
 
 
-def _all_done(client: Any, work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[int], None]) -> None:
+def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[int], None]) -> None:
+    """Have parts done by the workers of a client's scheduler; the other arguments are those of `local.run_here`.
+
+    Raises:
+        DropspinError: A worker cannot do its part. The text says why, and what to do.
+    """
     from distributed import KilledWorker, wait
 
     shared = client.scatter(work, broadcast=True, hash=False)
@@ -105,9 +117,17 @@ def _do(work: Work, part: Part, where: str) -> None:
             raise DropspinError(f"a worker has {package} {version}, here it is {work.versions[package]}; install the same on both.")
     cells = _idle.pop() if _idle else Cells(work.limits, start_method="spawn")
     try:
-        folder.write(*part, work.table(part, cells))
+        folder.write(*part, work.table(part, cells, _go_on_unless_closing))
     finally:
         _idle.append(cells)
+
+
+def _go_on_unless_closing() -> None:
+    """On a worker that is asked to end, its engines may have been ended already: that is no failure of theirs."""
+    from distributed import Reschedule, Status, get_worker
+
+    if get_worker().status != Status.running:
+        raise Reschedule  # elsewhere
 
 
 def _leave() -> None:

@@ -30,7 +30,7 @@ def run_here(work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[
     # The engines end before the threads that wait for them.
     with ThreadPoolExecutor(usable_cores()) as threads, ExitStack() as homes:
         idle = [homes.enter_context(Cells(work.limits)) for _ in range(usable_cores())]
-        homes.callback(stopping.set)
+        homes.callback(stopping.set)  # first of all: what ends with the sweep is no engine's failure
         flying: dict[Future[None], tuple[Part, Cells]] = {}
         while True:
             while idle and (part := next(parts, None)) is not None:

@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow as pa
 
 from comparisons.isolation import Limits
-from comparisons.sweeps.cluster import run_on_cluster
+from comparisons.sweeps.cluster import connected, run_on_cluster
 from comparisons.sweeps.jobs import Sweep
 from comparisons.sweeps.local import run_here
 from comparisons.sweeps.parts import TOGETHER, Folder
@@ -50,12 +50,19 @@ def run_sweep(
     else:
         kept = 0
     told(kept)
-    folder.begin(work.about)
     parts = work.missing(folder)
     if scheduler is None:
+        folder.begin(work.about)
         run_here(work, parts, folder, told)
-    else:
-        run_on_cluster(work, parts, folder, told, scheduler)
+        return
+    with connected(scheduler) as client:
+        folder.begin(work.about)
+        run_on_cluster(client, work, parts, folder, told)
+
+
+def count(where: str) -> int:
+    """How many jobs a folder has; 0 if no sweep has begun there."""
+    return sum(jobs for jobs, _ in _parts(where)) if Folder(where).about() is not None else 0
 
 
 def read(where: str) -> pd.DataFrame:
@@ -69,13 +76,20 @@ def read(where: str) -> pd.DataFrame:
 
 def read_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
     """The same part by part, for tables that are larger than memory."""
+    folder = Folder(where)
+    for _, path in _parts(where):
+        yield folder.read(path, columns)
+
+
+def _parts(where: str) -> Iterator[tuple[int, str]]:
+    """How many jobs are in each part that is there, and its path."""
     about = Folder(where).about()
     if about is None:
         raise DropspinError(f"{where}: no sweep is there; give the folder that dropspin sweep -o wrote.")
-    folder = Folder(where, about["identity"])
-    for group in range(-(-about["jobs"] // (about["part_size"] * TOGETHER))):
-        for path in folder.listed(group).values():
-            yield folder.read(path, columns)
+    folder, size = Folder(where, about["identity"]), about["part_size"]
+    for group in range(-(-about["jobs"] // (size * TOGETHER))):
+        for first, path in folder.listed(group).items():
+            yield min(size, about["jobs"] - first), path
 
 
 def _assert_the_same(where: str, earlier: dict[str, Any], work: Work) -> None:

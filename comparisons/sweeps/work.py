@@ -115,22 +115,28 @@ class Work:
         Args:
             part: Which.
             cells: The engines' processes.
-            go_on: Called before each piece of work; raises if there is to be none.
+            go_on: Called before each piece of work, and after one that failed; raises if the sweep is over.
         """
-        lots, outcomes = self.sweep.jobs(part.first, part.last), []
-        for jobs in lots:
-            first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
-            outcomes.append(self._outcomes(jobs, first, last, cells, go_on))
-        return _as_table(self.sweep, lots, joined(outcomes))
+        lots = self.sweep.jobs(part.first, part.last)
+        return _as_table(self.sweep, lots, joined([self._outcomes(jobs, cells, go_on) for jobs in lots]))
 
-    def _outcomes(self, jobs: Jobs, first: int, last: int, cells: Cells, go_on: Callable[[], None]) -> Outcomes:
-        """Jobs of one engine in its process; where they break it, one by one, to find which of them does."""
+    def _outcomes(self, jobs: Jobs, cells: Cells, go_on: Callable[[], None]) -> Outcomes:
+        """Jobs of one engine in its process; where they break it, once more one by one, to find which of them does."""
+        contestant = Contestant(jobs.engine.label, jobs.engine)
+        first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
         go_on()
         try:
-            return cells.call(Contestant(jobs.engine.label, jobs.engine), _measured_here, self.sweep, first, last)
+            return cells.call(contestant, _measured_here, self.sweep, first, last)
+        except Failed:
+            return joined([self._outcome(contestant, number, cells, go_on) for number in range(first, last)])
+
+    def _outcome(self, contestant: Contestant, number: int, cells: Cells, go_on: Callable[[], None]) -> Outcomes:
+        """A job alone; if it breaks its engine, that."""
+        go_on()
+        try:
+            return cells.call(contestant, _measured_here, self.sweep, number, number + 1)
         except Failed as failure:
-            if last - first > 1:
-                return joined([self._outcomes(jobs, number, number + 1, cells, go_on) for number in range(first, last)])
+            go_on()  # or it was ended with the sweep, and is to be run again
             lost = Outcomes.blank(1, len(self.sweep.metrics))
             lost.tell(0, failure.verdict, failure.reason)
             return lost

@@ -34,26 +34,24 @@ def sweep(spec: str, output: str, resume: bool, scheduler: str | None, time_limi
     Exit code: 0 all jobs were run, 2 bad input, 3 an engine broke down in a job or is missing.
     """
     from comparisons import Limits
-    from comparisons.sweeps import load_sweep, run_sweep
+    from comparisons.sweeps import count, load_sweep, run_sweep
     from reports.cli import stop_if_interrupted
     from reports.sweeps import exit_code, summary_rows, tallies, written_rows
     from reports.terminal import jobs_bar, print_rows
 
     asked = load_sweep(spec)
-    done = 0
     try:
         with jobs_bar(asked.size) as progress:
 
             def told(jobs: int) -> None:
-                nonlocal done
                 stop_if_interrupted()
-                done += jobs
                 progress(jobs)
 
             run_sweep(asked, output, resume=resume, scheduler=scheduler, limits=Limits(processor_time=time_limit), told=told)
         stop_if_interrupted()
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"{done:,} of {asked.size:,} jobs are kept, --resume goes on") from None
+        kept = count(output)
+        raise KeyboardInterrupt(f"{kept:,} of {asked.size:,} jobs are kept, --resume goes on" if kept else "nothing was written") from None
     found = tallies(output)
     if json_output:
         click.echo(json.dumps(summary_rows(found), indent=1, ensure_ascii=False))

@@ -1,5 +1,6 @@
 """What a sweep measures: what the metrics measure, what paper says, and the same bits however jobs are put together."""
 
+import itertools
 import warnings
 
 import numpy as np
@@ -168,7 +169,7 @@ def test_a_job_is_what_it_is_in_any_company(cuts):
     """However a sweep is cut."""
     edges = [0, *sorted(cuts), TUMBLES.size]
     WHOLE[:] = WHOLE or [measured(TUMBLES, 0, TUMBLES.size)]
-    the_same(joined([measured(TUMBLES, first, last) for first, last in zip(edges, edges[1:], strict=False)]), WHOLE[0])
+    the_same(joined([measured(TUMBLES, first, last) for first, last in itertools.pairwise(edges)]), WHOLE[0])
 
 
 @pytest.mark.parametrize("label", ["mujoco", "pybullet"])

@@ -61,7 +61,7 @@ class Breaking(made.Exact):
 
 
 def test_an_engine_that_breaks_costs_its_own_rows(tmp_path):
-    """A segmentation fault, an endless loop, an exception, NaN: each told in its row; the other rows are those of the engine that is sound."""
+    """A segmentation fault, an endless loop, an exception, NaN: each told in its row; the other rows are as ever."""
     sweep = load_sweep(SPEC)
     whole = replace(sweep, engines=(*sweep.engines, Breaking(), made.Exact()))
     run_sweep(whole, str(tmp_path / "whole"), limits=Limits(processor_time=1.0))

@@ -59,6 +59,10 @@ class Failed(Exception):
         return self.reason
 
 
+class Closed(Exception):
+    """Nobody waits for this work any more."""
+
+
 class Cells:
     """One process for each engine; a context manager.
 
@@ -73,6 +77,7 @@ class Cells:
         self._limits = limits
         self._pools: dict[str, ProcessPool] = {}
         self._processes: dict[str, Synchronized[int]] = {}
+        self._closed = False
 
     def attempt(self, contestant: Contestant, scene: Scenario, dt: float, phases: Sequence[Phase]) -> Attempt:
         """Run a scene through an engine in its process; whatever goes wrong is told in the attempt."""
@@ -88,6 +93,7 @@ class Cells:
 
         Raises:
             Failed: It ended the process, ran out of time or memory, or raised.
+            Closed: Another thread has left the context meanwhile.
         """
         if contestant.label not in self._pools:
             self._pools[contestant.label] = self._pool(contestant)
@@ -97,6 +103,8 @@ class Cells:
         )
         try:
             while not wait([task], timeout=POLL).done:
+                if self._closed:
+                    raise Closed
                 if self._has_left(contestant.label) and not wait([task], timeout=GRACE).done:
                     self._forget(contestant.label)
                     raise Failed("crashed", "its process ended by itself, as if all were well")
@@ -140,6 +148,7 @@ class Cells:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._closed = True
         for pool in self._pools.values():
             pool.stop()  # type: ignore[no-untyped-call]
         for pool in self._pools.values():

@@ -19,7 +19,7 @@ SPEC = {
     "scenes": ["bounce-95"],
     "engines": ["document", "mujoco"],
     "dts": [4e-3],
-    "random": {"count": 60, "seed": 1, "floor.restitution": {"from": 0.5, "to": 1.0}},
+    "random": {"count": 40, "seed": 1, "floor.restitution": {"from": 0.5, "to": 1.0}},
 }
 CLUSTER = """
 import sys, dask

@@ -58,13 +58,12 @@ def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Folde
     """
     from distributed import KilledWorker, wait
 
-    shared = client.scatter(work, broadcast=True, hash=False)
     flying: dict[Any, Part] = {}
     tries: dict[Part, int] = {}
 
     def send(part: Part) -> None:
         flying[
-            client.submit(_do, shared, part, folder.address, key=f"{work.identity}-{part.first}-{tries.setdefault(part, 0)}", pure=False)
+            client.submit(_do, work, part, folder.address, key=f"{work.identity}-{part.first}-{tries.setdefault(part, 0)}", pure=False)
         ] = part
 
     while True:

@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from comparisons.sweeps.axes import Drawn, Spaced, between
 from scenarios import DropspinError, load
 from scenarios.drawing import uniform
 from scenarios.ensemble import spread_start, spread_starts
+from scenarios.loading import CATALOGUE
 
 SPEC = {
     "scenes": ["drop-box-anyhow", "drop-ball"],
@@ -216,6 +218,14 @@ def test_values_are_judged_in_company():
     """A tall box fits where it is also put higher: what only some combination refuses is told of its jobs, not of the spec."""
     grid = {"body.half_extents[1]": [0.1, 2.0], "start.position[1]": [0.7, 2.5]}
     assert load_sweep(BALL | {"scenes": ["drop-box-anyhow"], "grid": grid}).size == 4
+
+
+def test_the_spec_of_the_page_is_one(tmp_path):
+    """docs/sweeps.md, with a scene of one's own."""
+    page = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    (tmp_path / "spec.toml").write_text(page.split("```toml\n")[1].split("```")[0])
+    (tmp_path / "mine.toml").write_text((CATALOGUE / "drop-box-anyhow.toml").read_text(encoding="utf-8"))
+    assert load_sweep(tmp_path / "spec.toml").size == 2 * 2 * 2 * 100 * 11 * 3 * 2 * 1000
 
 
 def test_paths_of_scenes_are_seen_from_the_spec(tmp_path):

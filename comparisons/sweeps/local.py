@@ -5,7 +5,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from threading import Event
 
-from comparisons.isolation import Cells
+from comparisons.isolation import Cells, Closed
 from comparisons.sweeps.parts import Folder
 from comparisons.sweeps.work import Part, Work
 from reference_impl.simulate import usable_cores
@@ -48,10 +48,6 @@ def run_here(work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[
             told(done)
 
 
-class _Stopped(Exception):
-    """Nobody waits for this part any more."""
-
-
 def _go_on_unless(stopping: Event) -> None:
     if stopping.is_set():
-        raise _Stopped
+        raise Closed

@@ -16,7 +16,9 @@ import pandas as pd
 import pytest
 
 from comparisons import Diverged, Limits
+from comparisons.isolation import Closed, Failed
 from comparisons.sweeps import load_sweep, read, run_sweep
+from comparisons.sweeps.work import Work
 from scenarios import DropspinError
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -116,6 +118,8 @@ def test_a_folder_is_never_two_sweeps(tmp_path):
     about.write_text(json.dumps(told))
     with pytest.raises(DropspinError, match=r"made with mujoco 3.1, now \d.*; choose another folder"):
         run_sweep(load_sweep(SPEC), where, resume=True)
+    work = Work.of(load_sweep(SPEC), Limits())
+    assert replace(work, versions=work.versions | {"mujoco": "3.1"}).identity != work.identity
     about.write_text("{}")
     with pytest.raises(DropspinError, match=r"its sweep.json is none of a sweep's"):
         run_sweep(load_sweep(SPEC), where, resume=True)
@@ -149,6 +153,24 @@ def test_what_is_there_is_not_run_again(tmp_path):
     assert told[0] == 8 - told[-1]
     assert sum(told) == 8
     same(tmp_path / "out", tmp_path / "whole")
+
+
+def test_an_engine_that_ends_with_its_sweep_has_not_failed():
+    """A job whose process is gone because all is being stopped has no row; it is run when the sweep goes on."""
+    over = []
+
+    class Ending:
+        def call(self, *given):
+            over.append(True)
+            raise Failed("crashed", "its process was ended by SIGKILL")
+
+    def go_on():
+        if len(over) == 2:  # the second time it is alone
+            raise Closed
+
+    work = Work.of(load_sweep(SPEC | {"grid": {}}), Limits())
+    with pytest.raises(Closed):
+        work.table(next(work.parts), Ending(), go_on)
 
 
 def write_spec(folder, count, scene, engines):

@@ -5,6 +5,7 @@ not use up; a leak ends at a limit of memory; what an engine prints is dropped. 
 work. One engine works at a time, so that nobody's timing is disturbed.
 """
 
+import ctypes
 import faulthandler
 import os
 import signal
@@ -58,13 +59,25 @@ class Failed(Exception):
         return self.reason
 
 
-class Cells:
-    """One process for each engine; a context manager."""
+class Closed(Exception):
+    """Nobody waits for this work any more."""
 
-    def __init__(self, limits: Limits) -> None:
+
+class Cells:
+    """One process for each engine; a context manager.
+
+    Args:
+        limits: What each may use.
+        start_method: How processes start, a word of `multiprocessing`. None: forked, if the system can do that.
+    """
+
+    def __init__(self, limits: Limits, start_method: str | None = None) -> None:
+        # A forked process has the engine already, whatever it is made of; and no script of a user's is run again.
+        self._start_method = start_method or ("fork" if "fork" in get_all_start_methods() else "spawn")
         self._limits = limits
         self._pools: dict[str, ProcessPool] = {}
         self._processes: dict[str, Synchronized[int]] = {}
+        self._closed = False
 
     def attempt(self, contestant: Contestant, scene: Scenario, dt: float, phases: Sequence[Phase]) -> Attempt:
         """Run a scene through an engine in its process; whatever goes wrong is told in the attempt."""
@@ -80,6 +93,7 @@ class Cells:
 
         Raises:
             Failed: It ended the process, ran out of time or memory, or raised.
+            Closed: Another thread has left the context meanwhile.
         """
         if contestant.label not in self._pools:
             self._pools[contestant.label] = self._pool(contestant)
@@ -89,6 +103,8 @@ class Cells:
         )
         try:
             while not wait([task], timeout=POLL).done:
+                if self._closed:
+                    raise Closed
                 if self._has_left(contestant.label) and not wait([task], timeout=GRACE).done:
                     self._forget(contestant.label)
                     raise Failed("crashed", "its process ended by itself, as if all were well")
@@ -124,9 +140,7 @@ class Cells:
         return "crashed", f"its process ended with exit code {exit_code}"
 
     def _pool(self, contestant: Contestant) -> ProcessPool:
-        # A forked process has the engine already, whatever it is made of; and no script of a user's is run again.
-        method = "fork" if "fork" in get_all_start_methods() else "spawn"
-        context = get_context(method)
+        context = get_context(self._start_method)
         self._processes[contestant.label] = process = context.Value("l", 0)
         return ProcessPool(max_workers=1, initializer=_move_in, initargs=[contestant, self._limits.memory, process], context=context)
 
@@ -134,6 +148,7 @@ class Cells:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._closed = True
         for pool in self._pools.values():
             pool.stop()  # type: ignore[no-untyped-call]
         for pool in self._pools.values():
@@ -151,6 +166,7 @@ def _move_in(contestant: Contestant, memory: int, process: "Synchronized[int]") 
     _residents.append(contestant)
     _at_work.append(process)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, whatever the parent does at one itself
     faulthandler.disable()
     nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
     for stream in (1, 2):
@@ -159,9 +175,18 @@ def _move_in(contestant: Contestant, memory: int, process: "Synchronized[int]") 
     if sys.platform == "linux":
         import resource
 
+        _end_with_parent()
         with open("/proc/self/statm", encoding="ascii") as file:
             taken = int(file.read().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
+
+
+PR_SET_PDEATHSIG = 1
+
+
+def _end_with_parent() -> None:
+    """Have the system end this process when the one that started it is killed: processes of many engines would keep each other waiting."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _work_here(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:

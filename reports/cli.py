@@ -4,34 +4,22 @@ import io
 import json
 import math
 import os
-import signal
 import sys
 import traceback
-from collections.abc import Callable
 from importlib.metadata import version
-from typing import Any, Literal, TypeVar
+from typing import Literal
 
 import click
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+from reports.interrupts import heed_interrupts, stop_if_interrupted
+from reports.verbs.limits import limits
+from reports.verbs.options import as_json, time_limit_option
+from reports.verbs.sweep import sweep
+from reports.verbs.tradeoff import tradeoff
 
 CORE_ENGINES = ("document", "mujoco", "pybullet")
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 OWN_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor the user's mistake
-
-as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
-
-
-def _time_limit(default: float, of: str) -> Callable[[Command], Command]:
-    """The option of what an engine's process may use."""
-    return click.option(
-        "--time-limit",
-        type=click.FloatRange(min=0.0, min_open=True),
-        default=default,
-        show_default=True,
-        metavar="SECONDS",
-        help=f"Processor time that {of}.",
-    )
 
 
 def main() -> None:
@@ -40,10 +28,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a sign gets a question mark, not a traceback
     sys.path.append(os.getcwd())  # where a user's my_module:MyEngine is; last, so that nothing there hides what is installed
-    # SIGTERM like Ctrl-C, so that nothing unfinished is left behind.
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, _interrupt)
-    sys.unraisablehook = _tell_unless_interrupted
+    heed_interrupts()
     try:
         sys.exit(_run())
     except (click.Abort, KeyboardInterrupt) as interrupt:
@@ -60,26 +45,6 @@ def main() -> None:
         click.echo("dropspin: an error of dropspin's own; please report what follows.", err=True)
         traceback.print_exc()
         sys.exit(OWN_ERROR)
-
-
-_interrupts: list[int] = []
-
-
-def _interrupt(number: int, frame: object) -> None:
-    _interrupts.append(number)
-    raise KeyboardInterrupt
-
-
-def _tell_unless_interrupted(found: "sys.UnraisableHookArgs") -> None:
-    """Say what went wrong where nothing can be raised; an interrupt that came there is not lost, see `_stop_if_interrupted`."""
-    if not isinstance(found.exc_value, KeyboardInterrupt):
-        sys.__unraisablehook__(found)
-
-
-def _stop_if_interrupted() -> None:
-    """Raise the interrupt again: one that arrives within a callback of an engine or of the compiler is swallowed there."""
-    if _interrupts:
-        raise KeyboardInterrupt
 
 
 def _run() -> int:
@@ -129,7 +94,7 @@ def dropspin() -> None:
     metavar="DIR",
     help="Folder for the report and the data; an earlier run there is replaced.",
 )
-@_time_limit(300.0, "an engine may take for one scene at one step")
+@time_limit_option(300.0, "an engine may take for one scene at one step")
 @click.option("--resume", is_flag=True, help="Go on with a run that was interrupted: measured scenes are not run again.")
 @as_json
 def run(
@@ -166,12 +131,12 @@ def run(
             with progress_bar(len(loaded) * len(chosen) * len(steps)) as progress:
 
                 def told(scene: str, engine: str, dt: float) -> None:
-                    _stop_if_interrupted()
+                    stop_if_interrupted()
                     progress(scene, engine, dt)
 
                 limits = comparisons.Limits(processor_time=time_limit)
                 results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
-            _stop_if_interrupted()
+            stop_if_interrupted()
             if not json_output:
                 reports.print_table(results)
             with status("writing the report"):
@@ -231,7 +196,7 @@ def doctor(json_output: bool) -> None:
 
 @dropspin.command()
 @click.argument("engine_name", metavar="ENGINE")
-@_time_limit(60.0, "each check may take")
+@time_limit_option(60.0, "each check may take")
 @as_json
 def conform(engine_name: str, time_limit: float, json_output: bool) -> int:
     """Is this adapter right? Hold an engine's adapter against the protocol and against motions that tell mistakes apart.
@@ -247,7 +212,7 @@ def conform(engine_name: str, time_limit: float, json_output: bool) -> int:
     chosen = engine(engine_name)
     with status(f"checking {chosen.label}"):
         found = findings(chosen, Limits(processor_time=time_limit))
-    _stop_if_interrupted()
+    stop_if_interrupted()
     print_rows([{"check": one.check, "verdict": one.verdict, "what was found": one.said} for one in found], json_output)
     verdicts = {one.verdict for one in found}
     return 3 if verdicts & {"crashed", "timed_out"} else int("failed" in verdicts)
@@ -285,7 +250,7 @@ def calibrate(
     chosen = engine(engine_name)
     with status(f"measuring {chosen.label}"):
         found = calibrated(chosen, restitution, dt, look.friction(friction), shape)
-    _stop_if_interrupted()
+    stop_if_interrupted()
     if language is not None:
         if language not in found.programs:
             raise UnknownName(f"{chosen.label}'s language", language, found.programs)
@@ -300,128 +265,5 @@ def calibrate(
         click.echo(f"To paste, as {name}:\n\n{text}")
 
 
-@dropspin.command()
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
-@click.option("--metric", metavar="METRIC", help="What the error is of. [default: what the scene is about]")
-@click.option(
-    "--within",
-    multiple=True,
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=(1e-3,),
-    show_default=True,
-    metavar="TOLERANCE",
-    help="How large the error may be; repeat for more.",
-)
-@click.option("-o", "--output", default="out/tradeoff", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
-@as_json
-def tradeoff(
-    scenes: tuple[str, ...], engines: tuple[str, ...], metric: str | None, within: tuple[float, ...], output: str, json_output: bool
-) -> None:
-    """What accuracy costs: error against time over a ladder of steps, and the cheapest engine, method and step within a tolerance.
-
-    Without arguments: a spin, the methods that it lets differ.
-    """
-    from pathlib import Path
-
-    from comparisons.tradeoff import tradeoff as traded
-    from reports import trade
-    from reports.terminal import print_rows, share_bar
-    from scenarios import load
-
-    found = []
-    for name in scenes or ("spin-asymmetric",):
-        with share_bar(name) as progress:
-
-            def told(what: str, share: float) -> None:
-                _stop_if_interrupted()
-                progress(what, share)
-
-            found.append(traded(load(name), engines, metric, told))
-        if not json_output:
-            print_rows(trade.front_rows(found[-1]), json_output=False)
-            for sentence in trade.sentences(found[-1], within):
-                click.echo(sentence)
-    trade.write(found, within, Path(output))
-    if json_output:
-        click.echo(json.dumps([row for one in found for row in trade.rows(one)], indent=1))
-    else:
-        click.echo(f"Written: {os.path.join(output, 'tradeoff.md')}")
-
-
-@dropspin.command()
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
-@click.option(
-    "--axis", "axes", multiple=True, metavar="AXIS", help="What to vary, such as spin; repeat for more. [default: all a scene has]"
-)
-@click.option(
-    "--pair", "pairs", multiple=True, metavar="AXIS,AXIS", help="Two to vary together, such as spin,inertia-ratio; repeat for more."
-)
-@click.option("--dt", default=5e-3, show_default=True, type=float, metavar="SECONDS", help="The step, where it is not what is varied.")
-@click.option(
-    "--within",
-    default=0.1,
-    show_default=True,
-    type=click.FloatRange(min=0.0, min_open=True),
-    metavar="TOLERANCE",
-    help="How large an error may be to count as sound: a ratio, or an angle in radians.",
-)
-@_time_limit(60.0, "an engine may take at one point")
-@click.option("-o", "--output", default="out/limits", show_default=True, metavar="DIR", help="Folder for the tables and the maps.")
-@as_json
-def limits(
-    scenes: tuple[str, ...],
-    engines: tuple[str, ...],
-    axes: tuple[str, ...],
-    pairs: tuple[str, ...],
-    dt: float,
-    within: float,
-    time_limit: float,
-    output: str,
-    json_output: bool,
-) -> None:
-    """Where engines break: steps, spins, heights, inertias, masses, restitutions, durations and sizes at their extremes.
-
-    Without arguments: a spin about an axis, a tumble, a ball, a box and a block, the methods that they let differ; some minutes.
-    """
-    from pathlib import Path
-
-    from comparisons import Limits
-    from comparisons.extremes import SCENES
-    from comparisons.extremes import limits as extremes
-    from reports import extremes as told
-    from reports.terminal import print_rows, share_bar
-    from scenarios import load
-
-    planes = [_pair(pair) for pair in pairs]
-    loaded = [load(name) for name in scenes or SCENES]
-    found = []
-    for scene in loaded:
-        with share_bar(scene.name) as progress:
-
-            def advance(what: str, share: float) -> None:
-                _stop_if_interrupted()
-                progress(what, share)
-
-            chosen = planes if pairs else None
-            found.append(extremes(scene, engines, axes, chosen, dt, within, advance, Limits(processor_time=time_limit)))
-    told.write(found, Path(output))
-    if json_output:
-        click.echo(json.dumps([row for one in found for row in told.rows(one)], indent=1))
-        return
-    surprising = told.sentences(found)
-    for number, sentence in enumerate(surprising[: told.AS_SURPRISING], start=1):
-        click.echo(f"{number}. {sentence}")
-    if len(surprising) > told.AS_SURPRISING:
-        click.echo(f"and {len(surprising) - told.AS_SURPRISING} more")
-    if steps := told.step_rows(found):
-        print_rows(steps, json_output=False)
-    click.echo(f"Written: {os.path.join(output, 'limits.md')}")
-
-
-def _pair(text: str) -> tuple[str, str]:
-    names = [name.strip() for name in text.split(",")]
-    if len(names) != 2:
-        raise click.UsageError(f"--pair: got {text!r}; name two axes, such as spin,inertia-ratio.")
-    return names[0], names[1]
+for verb in (limits, sweep, tradeoff):
+    dropspin.add_command(verb)

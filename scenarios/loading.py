@@ -46,7 +46,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         str(path).encode()
     except UnicodeEncodeError:
         raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
-    return _validate(path.stem, str(scene), _read(path, str(scene)))
+    return _validate(path.stem, str(scene), read_toml(path, str(scene)))
 
 
 def _find(scene: str | Path) -> Path:
@@ -62,23 +62,33 @@ def _find(scene: str | Path) -> Path:
     )
 
 
-def _read(path: Path, given: str) -> dict[str, Any]:
+def read_toml(path: Path, given: str, what: str = "scene") -> dict[str, Any]:
+    """The content of a TOML file.
+
+    Args:
+        path: The file.
+        given: As it was asked for.
+        what: The word for what such a file is.
+
+    Raises:
+        SceneError: It is no TOML file, or cannot be read.
+    """
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
         if len(content) > LARGEST_FILE:
-            raise SceneError(f"{given}: more than {LARGEST_FILE:,} bytes; no scene is that long.")
+            raise SceneError(f"{given}: more than {LARGEST_FILE:,} bytes; no {what} is that long.")
         return tomllib.loads(content.decode("utf-8"))
     except IsADirectoryError:
-        raise SceneError(f"{given}: is a directory; a scene is one TOML file.") from None
+        raise SceneError(f"{given}: is a directory; a {what} is one TOML file.") from None
     except OSError as error:
         raise SceneError(f"{given}: {error.strerror}; give the path of a readable .toml file.") from None
     except UnicodeDecodeError as error:
-        raise SceneError(f"{given}: byte {error.start} is not UTF-8 text; a scene is a TOML file in UTF-8.") from None
+        raise SceneError(f"{given}: byte {error.start} is not UTF-8 text; a {what} is a TOML file in UTF-8.") from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{given}: not TOML: {error}.") from None
     except RecursionError:
-        raise SceneError(f"{given}: nested too deeply to be a scene.") from None
+        raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
 
 
 def _validate(name: str, where: str, content: dict[str, Any]) -> Scenario:

@@ -14,7 +14,8 @@ TOUCHING = 1e-9
 """Of the body's size: how near to the floor counts as on it."""
 
 
-def _unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
+def unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
+    """The quaternion with length 1; one that has it, to rounding, stays as it is."""
     length = math.hypot(*quaternion)
     if length == 0.0:
         raise ValueError("must not be the zero quaternion")
@@ -23,7 +24,7 @@ def _unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(component / length for component in quaternion)
 
 
-Orientation = Annotated[tuple[Number, ...], Field(min_length=4, max_length=4), AfterValidator(_unit)]
+Orientation = Annotated[tuple[Number, ...], Field(min_length=4, max_length=4), AfterValidator(unit)]
 
 
 class Start(Table):

@@ -98,8 +98,8 @@ class DocumentSimulation(Simulation):
     staggered = True
 
     def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
-        self._body = _body(scene.body)
-        self._world = _world(scene)
+        self._body = reference_body(scene.body)
+        self._world = reference_world(scene)
         self._simulator = reference_impl.Simulator(self._body, self._world, dt, methods)
         self._state = scene.initial_state
         self._steps = 0
@@ -133,7 +133,7 @@ class DocumentEnsemble(Ensemble):
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         scene = members[0]
-        self._simulator = reference_impl.Simulator(_body(scene.body), _world(scene), dt, methods)
+        self._simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene), dt, methods)
         self._states = np.array([member.initial_state for member in members])
 
     def advance(self, steps: int) -> None:
@@ -147,7 +147,8 @@ class DocumentEnsemble(Ensemble):
         return self._simulator.run(self._states, steps, every)
 
 
-def _body(body: Body) -> reference_impl.Body:
+def reference_body(body: Body) -> reference_impl.Body:
+    """A scene's body as the reference implementation takes it."""
     return reference_impl.Body(body.mass, _inertia(body), body.vertices, body.rounding)
 
 
@@ -166,7 +167,8 @@ def _inertia(body: Body) -> Array:
     return reference_impl.vertex_inertia(body.vertices, share)
 
 
-def _world(scene: Scenario) -> reference_impl.World:
+def reference_world(scene: Scenario) -> reference_impl.World:
+    """What acts on it, as the reference implementation takes it."""
     floor = scene.floor
     return reference_impl.World(
         gravity=None if scene.gravity is None else scene.acceleration,

@@ -231,7 +231,7 @@ def test_an_interrupt_that_is_swallowed_still_stops_the_run(tmp_path, monkeypatc
 
     from reports import cli
 
-    monkeypatch.setattr(cli, "_interrupts", [signal.SIGINT])
+    monkeypatch.setattr("reports.interrupts._interrupts", [signal.SIGINT])
     done = CliRunner().invoke(cli.dropspin, ["run", "spin-principal", "-e", "document", "--dt", "0.01", "-o", str(tmp_path / "out")])
     assert done.exit_code != 0
     assert list(tmp_path.iterdir()) == []

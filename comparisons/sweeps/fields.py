@@ -1,0 +1,72 @@
+"""The fields of a scene by dotted names, such as `floor.restitution` and `start.position[1]`."""
+
+import re
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
+from typing import Any
+
+from scenarios import DropspinError, Scenario, load
+from scenarios.errors import did_you_mean
+from scenarios.loading import FEATURES
+
+TABLES = ("body", *(name for name in FEATURES if name != "expect"))
+Path = tuple[str | int, ...]
+
+
+class NoSuchField(DropspinError):
+    """A field that a scene has not."""
+
+
+def path_of(name: str) -> Path:
+    """The keys and indices of a dotted name."""
+    if not re.fullmatch(r"[a-z_]+((\.[a-z_]+)|(\[\d{1,6}\]))*", name):
+        raise NoSuchField(f"{name!r} is no field; write it as floor.restitution or start.position[1].")
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[a-z_]+|\d+", name))
+
+
+def content_of(scene: Scenario) -> dict[str, Any]:
+    """What the scene's file says of its physics, as a mapping; absent tables are left out."""
+    return scene.model_dump(include={"duration", *TABLES}, exclude_none=True)
+
+
+def assert_has(scene: Scenario, name: str) -> None:
+    """Raise `NoSuchField` unless the scene has a field that may be set."""
+    path = path_of(name)
+    if path[0] not in ("duration", *TABLES) or (path[0] != "duration" and len(path) == 1):
+        raise NoSuchField(f"no such field.{did_you_mean(str(path[0]), TABLES)} It is duration, or a field of {', '.join(TABLES)}.")
+    found: Any = content_of(scene)
+    for depth, key in enumerate(path):
+        if isinstance(key, int):
+            if not isinstance(found, tuple) or key >= len(found):
+                raise NoSuchField(f"{_written(path[:depth])} is {found!r}, which has no entry {key}.")
+        elif not isinstance(found, Mapping) or (key not in found and depth == 0):
+            raise NoSuchField(f"scene {scene.name!r} has no [{path[0]}]; what is absent is not modelled.")
+        elif key not in found:
+            return  # an optional key; the scene's own schema says whether there is one
+        found = found[key]
+
+
+def with_fields(scene: Scenario, values: Iterable[tuple[str, Any]]) -> Scenario:
+    """The scene with some fields set.
+
+    Raises:
+        SceneError: There is no such scene.
+    """
+    content = content_of(scene)
+    for name, value in values:
+        put(content, path_of(name), value)
+    return load({"name": scene.name, **content})
+
+
+def put(content: dict[str, Any], path: Path, value: Any) -> None:
+    """Set a field of a mapping; the tuples on its way become lists."""
+    found: Any = content
+    for key, following in pairwise(path):
+        if isinstance(following, int):
+            found[key] = list(found[key])
+        found = found[key]
+    found[path[-1]] = value
+
+
+def _written(path: Path) -> str:
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")

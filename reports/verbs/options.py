@@ -1,0 +1,22 @@
+"""Options that several verbs have."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
+
+
+def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
+    """The option of what an engine's process may use."""
+    return click.option(
+        "--time-limit",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=default,
+        show_default=True,
+        metavar="SECONDS",
+        help=f"Processor time that {of}.",
+    )

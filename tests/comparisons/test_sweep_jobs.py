@@ -1,0 +1,234 @@
+"""What a sweep's jobs are: by their numbers alone, with keys that tell apart what moves differently, and specs that say what is wrong."""
+
+import itertools
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from comparisons.sweeps import load_sweep
+from comparisons.sweeps.axes import Drawn, Spaced, between
+from scenarios import DropspinError, load
+from scenarios.drawing import uniform
+from scenarios.ensemble import spread_start, spread_starts
+from scenarios.loading import CATALOGUE
+
+SPEC = {
+    "scenes": ["drop-box-anyhow", "drop-ball"],
+    "engines": ["document", "document[law=poisson]"],
+    "dts": [4e-3, 2e-3, 1e-3],
+    "grid": {"floor.restitution": [0.1, 0.5], "body": {"mass": {"from": 1.0, "to": 4.0, "count": 3, "spacing": "log"}}},
+    "random": {"count": 5, "seed": 3, "start.position[1]": {"from": 0.6, "to": 2.0}},
+}
+SWEEP = load_sweep(SPEC)
+
+
+def rows(sweep, first, last):
+    """The jobs as tuples: scene, engine, step, start, values."""
+    return [
+        (jobs.scene.name, jobs.engine.label, dt, seed, *values)
+        for jobs in sweep.jobs(first, last)
+        for dt, seed, *values in zip(jobs.dts, jobs.starts(), *jobs.values.values(), strict=True)
+    ]
+
+
+def hashes(sweep, first, last):
+    return [key for jobs in sweep.jobs(first, last) for key in jobs.hashes()]
+
+
+def test_the_jobs_are_the_product():
+    """In the order of nested loops, the draws innermost; a log axis meets its ends and the geometric mean."""
+    heights = 0.6 + 1.4 * uniform(3, "start.position[1]", np.arange(5))
+    nested = itertools.product(SPEC["scenes"], SPEC["engines"], SPEC["dts"], [None], [0.1, 0.5], [1.0, 2.0, 4.0], heights)
+    assert rows(SWEEP, 0, SWEEP.size) == list(nested)
+
+
+@given(st.data())
+def test_any_stretch_of_jobs_is_that_stretch(data):
+    """Nothing depends on where one starts to look: not the values, not the keys."""
+    first = data.draw(st.integers(0, SWEEP.size - 1))
+    last = data.draw(st.integers(first + 1, SWEEP.size))
+    assert rows(SWEEP, first, last) == rows(SWEEP, 0, SWEEP.size)[first:last]
+    assert hashes(SWEEP, first, last) == hashes(SWEEP, 0, SWEEP.size)[first:last]
+
+
+def test_the_last_of_very_many_jobs_is_at_hand():
+    """A million million jobs: the last thousand are there at once, and a draw far out is even in its range."""
+    vast = load_sweep(SPEC | {"random": SPEC["random"] | {"count": 10**11}})
+    assert vast.size > 10**12
+    [jobs] = vast.jobs(vast.size - 1000, vast.size)
+    assert jobs.numbers[-1] == vast.size - 1
+    heights = jobs.values["start.position[1]"]
+    assert (heights.min() >= 0.6) & (heights.max() < 2.0)
+    assert heights.mean() == pytest.approx(1.3, abs=0.05)
+
+
+@given(st.integers(0, 2**62), st.lists(st.integers(0, 10**12), min_size=1, max_size=50))
+def test_draws_depend_on_their_number_alone(seed, numbers):
+    """Prefix stability: any draws, in any order and company, are those drawn one by one."""
+    together = uniform(seed, "x", np.array(numbers))
+    assert list(together) == [uniform(seed, "x", np.array([number]))[0] for number in numbers]
+    assert ((together >= 0.0) & (together < 1.0)).all()
+
+
+def test_draws_of_different_purposes_have_nothing_to_do_with_each_other():
+    """Correlations of 20,000 pairs are within 4/√n; so are those of neighbours."""
+    n = np.arange(20_000)
+    a, b, c = uniform(1, "a", n), uniform(1, "b", n), uniform(2, "a", n)
+    for pair in ((a, b), (a, c), (a[1:], a[:-1])):
+        assert abs(np.corrcoef(*pair)[0, 1]) < 4 / np.sqrt(len(n))
+
+
+def test_more_draws_begin_with_the_fewer():
+    more = load_sweep(SPEC | {"random": SPEC["random"] | {"count": 5000}})
+    assert rows(more, 0, 5) == rows(SWEEP, 0, 5)
+    assert hashes(more, 0, 5) == hashes(SWEEP, 0, 5)
+
+
+def test_keys_tell_jobs_apart_and_nothing_else():
+    """All different; the same for the same job in another sweep, whatever its number and however its numbers are written."""
+    assert len(set(hashes(SWEEP, 0, SWEEP.size))) == SWEEP.size
+    fewer = load_sweep(SPEC | {"scenes": ["drop-ball"], "engines": ["document[law=poisson]"], "dts": [1e-3]})
+    assert hashes(fewer, 0, fewer.size) == hashes(SWEEP, SWEEP.size - fewer.size, SWEEP.size)
+    plain = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [1e-3]}
+    one, same, other = (load_sweep(plain | {"grid": {"body.mass": masses}}) for masses in ([2], [2.0], [3.0]))
+    assert hashes(one, 0, 1) == hashes(same, 0, 1) != hashes(other, 0, 1)
+
+
+def test_keys_do_not_depend_on_where_the_engine_s_options_are_written():
+    plain = {"scenes": ["drop-ball"], "dts": [1e-3]}
+    named = load_sweep(plain | {"engines": ["mujoco[spring_steps=20]"]})
+    swept = load_sweep(plain | {"engines": ["mujoco"], "grid": {"engine.spring_steps": [20]}})
+    assert hashes(named, 0, 1) == hashes(swept, 0, 1)
+    assert swept.jobs(0, 1)[0].labels() == ["mujoco[spring_steps=20]"]
+
+
+def test_a_key_stays_what_it_is():
+    """Tables are joined by it years later; if this has to change, the changelog says so."""
+    assert hashes(SWEEP, 0, 1) == ["7c56732e2179d5052fb0"]
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(2, 50), st.sampled_from(["linear", "log"]))
+def test_spaced_values_meet_their_ends(first, length, count, spacing):
+    first = abs(first) + 1e-3 if spacing == "log" else first
+    axis = Spaced("x", first, first + length, count, spacing)
+    values = axis.at(np.arange(count))
+    assert (values[0], values[-1]) == (first, first + length)
+    assert (np.diff(values) > 0.0).all()
+
+
+def test_log_draws_are_even_in_the_logarithm():
+    draws = Drawn("x", 1e-3, 1e3, 4000, "log", 1).at(np.arange(4000))
+    assert np.log10(draws).mean() == pytest.approx(0.0, abs=0.1)
+    assert np.quantile(np.log10(draws), [0.25, 0.75]) == pytest.approx([-1.5, 1.5], abs=0.15)
+    assert between(2.0, 32.0, "log", np.array([0.25]))[0] == pytest.approx(4.0, rel=1e-15)
+
+
+def test_starts_of_the_spread_are_drawn_one_by_one():
+    """Start 7 is start 7 in any company; each within its spread, as high above the floor as the scene's own, and a state as it stands."""
+    scene = load("drop-box-anyhow")
+    body, spread, own = scene.body, scene.ensemble, scene.initial_state
+    together = spread_starts(np.tile(own, (400, 1)), spread, np.arange(400), body.vertices, body.rounding, True)
+    for number in (0, 7, 399):
+        np.testing.assert_array_equal(together[number], spread_start(scene, number))
+    for start in together[:50]:
+        member = scene.starting_at(start)
+        np.testing.assert_array_equal(member.initial_state, start)
+        assert member.clearance == pytest.approx(scene.clearance, abs=1e-12)
+    assert (np.abs(together[:, 7:13] - own[7:13]) <= [*spread.velocity, *spread.angular_velocity]).all()
+
+
+def test_starts_turn_evenly_over_all_attitudes():
+    """The mean of a rotation matrix over all attitudes is 0, its entries' squares 1/3 (4000 starts: ± .03)."""
+    from scenarios.rotations import rotate
+
+    scene = load("drop-box-anyhow")
+    own = np.tile(scene.initial_state, (4000, 1))
+    drawn = spread_starts(own, scene.ensemble, np.arange(4000), scene.body.vertices, scene.body.rounding, True)
+    for axis in np.eye(3):
+        turned = rotate(drawn[:, 3:7], axis)
+        assert np.abs(turned.mean(axis=0)).max() < 0.03
+        np.testing.assert_allclose((turned**2).mean(axis=0), 1 / 3, atol=0.03)
+
+
+BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"scenes": ["drop-bal"]}, "spec: scenes: scene 'drop-bal' is not in the catalogue .* Did you mean 'drop-ball'"),
+        ({"scenes": ["drop-ball", "drop-ball"]}, "scenes: got .*; names one twice"),
+        ({"scenes": []}, "scenes: got .*at least 1 item"),
+        ({"engines": ["documnt"]}, "Did you mean 'document'"),
+        ({"engines": ["document", "document[law=note]"]}, "engines: one is named twice, written in two ways"),
+        ({"dts": []}, "the time step is missing"),
+        ({"dts": [0.0]}, r"dts\[0\]: got 0.0; must be greater than 0"),
+        ({"dts": [1.0]}, "dt: got 1.0 s; scene 'drop-ball' lasts 1.5 s"),
+        ({"grid": {"dt": [1e-3]}}, "the time step is given twice"),
+        ({"dts": [], "grid": {"dt": ["fast"]}}, "grid: dt: got 'fast'; a time step is a number above 0"),
+        ({"seeds": 3}, r"seeds: scene 'drop-ball' has no \[ensemble\]"),
+        ({"seeds": -1}, "seeds.*must be greater than"),
+        ({"metrics": ["bounce_height_eror"]}, "Did you mean 'bounce_height_error'"),
+        ({"metrics": ["penetration"]}, "'penetration' is measured in every sweep"),
+        ({"repeat": 3}, "repeat: unknown key. Allowed: scenes, engines"),
+        ({"grid": {"floor.restitution": [0.5, 1.5]}}, "grid: floor.restitution: .* got 1.5; must be less than or equal to 1"),
+        ({"grid": {"floor.restitution": {"from": 0, "to": 2, "count": 3}}}, "grid: floor.restitution: .* got 2.0; must be less"),
+        ({"grid": {"floor.restitution": {"from": 0, "to": 1}}}, "floor.restitution: count: missing"),
+        ({"grid": {"floor.restitution": {"from": 1, "to": 0, "count": 3}}}, "it must go up"),
+        ({"grid": {"floor.restitution": {"from": 0, "to": 1, "count": 3, "spacing": "log"}}}, "must start above 0"),
+        ({"grid": {"floor.restitution": {"from": 0, "to": 1, "count": 1}}}, "count: got 1; must be greater than or equal to 2"),
+        ({"grid": {"floor.restitution": 0.5}}, r"got 0.5; must be a list of values, or {from, to, count}"),
+        ({"grid": {"floor.restitution": [0.5, 0.5]}}, "names a value twice"),
+        ({"grid": {"floor.restitutoin": [0.5]}}, "Did you mean 'restitution'"),
+        ({"grid": {"damping.linear": [0.5]}}, r"grid: damping.linear: scene 'drop-ball' has no \[damping\]"),
+        ({"grid": {"flor.restitution": [0.5]}}, "grid: flor.restitution: no such field. Did you mean 'floor'"),
+        ({"grid": {"summary": ["x"]}}, "grid: summary: no such field"),
+        ({"grid": {"start.position[3]": [0.5]}}, "which has no entry 3"),
+        ({"grid": {"body.mass[0]": [0.5]}}, "which has no entry 0"),
+        ({"grid": {"body mass": [0.5]}}, "'body mass' is no field; write it as"),
+        ({"grid": {"start.position[1]": [0.0]}}, "there the body is 0.1 m below the floor"),
+        ({"grid": {"start.position": [[0, 2, 0]], "start.position[1]": [1.5]}}, "sets what start.position sets"),
+        ({"grid": {"engine.kappa": [0.1]}}, "document's option 'kappa' is unknown"),
+        ({"grid": {"engine.law": ["notes"]}}, "document's law 'notes' is unknown. Did you mean 'note'"),
+        ({"random": {"seed": 1, "body.mass": {"from": 1, "to": 2}}}, "random: count: missing"),
+        ({"random": {"count": 2, "seed": 1}}, "random: nothing to draw"),
+        ({"random": {"count": 2, "seed": 1, "body.mass": [1, 2]}}, "must be a range to draw from"),
+        ({"random": {"count": 2, "seed": 1, "body.mass": {"from": 1, "to": 2, "count": 3}}}, "body.mass: count: unknown key"),
+        (
+            {"grid": {"body.mass": [1.0]}, "random": {"count": 2, "seed": 1, "body.mass": {"from": 1, "to": 2}}},
+            r"body.mass: is in \[grid\] and in \[random\]",
+        ),
+        ({"random": {"count": 10**16, "seed": 1, "body.mass": {"from": 1, "to": 2}}}, "count: got 10000000000000000"),
+        ({"random": {"count": 10**15, "seed": 1, "body.mass": {"from": 1, "to": 2}}, "dts": [1e-3, 2e-3]}, r"these are 2e\+15 jobs"),
+    ],
+)
+def test_specs_that_are_none(change, message):
+    """One line: where, what was given, what is allowed."""
+    with pytest.raises(DropspinError) as error:
+        load_sweep(BALL | change)
+    assert re.search(message, str(error.value)), str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_values_are_judged_in_company():
+    """A tall box fits where it is also put higher: what only some combination refuses is told of its jobs, not of the spec."""
+    grid = {"body.half_extents[1]": [0.1, 2.0], "start.position[1]": [0.7, 2.5]}
+    assert load_sweep(BALL | {"scenes": ["drop-box-anyhow"], "grid": grid}).size == 4
+
+
+def test_the_spec_of_the_page_is_one(tmp_path):
+    """docs/sweeps.md, with a scene of one's own."""
+    page = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    (tmp_path / "spec.toml").write_text(page.split("```toml\n")[1].split("```")[0])
+    (tmp_path / "mine.toml").write_text((CATALOGUE / "drop-box-anyhow.toml").read_text(encoding="utf-8"))
+    assert load_sweep(tmp_path / "spec.toml").size == 2 * 2 * 2 * 100 * 11 * 3 * 2 * 1000
+
+
+def test_paths_of_scenes_are_seen_from_the_spec(tmp_path):
+    (tmp_path / "mine.toml").write_text('duration = 1.0\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
+    (tmp_path / "spec.toml").write_text('scenes = ["mine.toml"]\nengines = ["document"]\ndts = [0.01]\n[grid]\nbody.mass = [1.0, 2.0]\n')
+    assert load_sweep(tmp_path / "spec.toml").size == 2

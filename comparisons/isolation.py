@@ -13,9 +13,9 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as OutOfTime
 from concurrent.futures import wait
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
-from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar, TypeVarTuple
@@ -76,7 +76,7 @@ class Cells:
         self._start_method = start_method or ("fork" if "fork" in get_all_start_methods() else "spawn")
         self._limits = limits
         self._pools: dict[str, ProcessPool] = {}
-        self._processes: dict[str, Synchronized[int]] = {}
+        self._processes: dict[str, ctypes.c_long] = {}
         self._closed = False
 
     def attempt(self, contestant: Contestant, scene: Scenario, dt: float, phases: Sequence[Phase]) -> Attempt:
@@ -93,8 +93,10 @@ class Cells:
 
         Raises:
             Failed: It ended the process, ran out of time or memory, or raised.
-            Closed: Another thread has left the context meanwhile.
+            Closed: Another thread has abandoned it meanwhile.
         """
+        if self._closed:
+            raise Closed
         if contestant.label not in self._pools:
             self._pools[contestant.label] = self._pool(contestant)
         self._processes[contestant.label].value = 0
@@ -141,27 +143,36 @@ class Cells:
 
     def _pool(self, contestant: Contestant) -> ProcessPool:
         context = get_context(self._start_method)
-        self._processes[contestant.label] = process = context.Value("l", 0)
+        # Without a lock: a process that is killed while it holds one would have the parent wait for ever.
+        self._processes[contestant.label] = process = context.RawValue("l", 0)
         return ProcessPool(max_workers=1, initializer=_move_in, initargs=[contestant, self._limits.memory, process], context=context)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._closed = True
+        self.abandon()
         for pool in self._pools.values():
             pool.stop()  # type: ignore[no-untyped-call]
         for pool in self._pools.values():
             pool.join()
 
+    def abandon(self) -> None:
+        """End the engines' processes at once, and any call that waits for them in another thread."""
+        self._closed = True
+        for process in list(self._processes.values()):
+            if process.value:
+                with suppress(ProcessLookupError):
+                    os.kill(process.value, signal.SIGKILL)
 
-_at_work: list["Synchronized[int]"] = []
+
+_at_work: list["ctypes.c_long"] = []
 """Where this process says that it is at work."""
 _residents: list[Contestant] = []
 """The engine whose process this is; empty in the parent."""
 
 
-def _move_in(contestant: Contestant, memory: int, process: "Synchronized[int]") -> None:
+def _move_in(contestant: Contestant, memory: int, process: "ctypes.c_long") -> None:
     """Begin a process's life: keep quiet, leave interrupts to the parent, and take no more memory than allowed."""
     _residents.append(contestant)
     _at_work.append(process)

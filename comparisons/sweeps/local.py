@@ -27,10 +27,11 @@ def run_here(work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[
     def do(part: Part, cells: Cells) -> None:
         folder.write(*part, work.table(part, cells, lambda: _go_on_unless(stopping)))
 
-    # The engines end before the threads that wait for them.
-    with ThreadPoolExecutor(usable_cores()) as threads, ExitStack() as homes:
+    with ExitStack() as homes:
         idle = [homes.enter_context(Cells(work.limits)) for _ in range(usable_cores())]
-        homes.callback(stopping.set)  # first of all: what ends with the sweep is no engine's failure
+        threads = homes.enter_context(ThreadPoolExecutor(usable_cores()))
+        # First the engines end, then the threads that wait for them, then what is left.
+        homes.callback(_abandon, list(idle), stopping)
         flying: dict[Future[None], tuple[Part, Cells]] = {}
         while True:
             while idle and (part := next(parts, None)) is not None:
@@ -46,6 +47,13 @@ def run_here(work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[
                 idle.append(cells)
                 done += part.last - part.first
             told(done)
+
+
+def _abandon(cells_of_all: list[Cells], stopping: Event) -> None:
+    """End all that is at work; what ends with the sweep is no engine's failure."""
+    stopping.set()
+    for cells in cells_of_all:
+        cells.abandon()
 
 
 def _go_on_unless(stopping: Event) -> None:

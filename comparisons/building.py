@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine, Limit, Simulation
 from scenarios import Scenario
+from scenarios.rotations import length
 
 ULPS = 8
 UNIT = 1e-5  # how far a quaternion's length may be from 1; single precision drifts by 1e-7
@@ -56,7 +57,7 @@ def sound_record(states: Any, rows: int) -> NDArray[np.float64]:
         raise BuiltDifferently(f"the record has shape {record.shape}; {rows} states of 13 numbers were asked for, ({rows}, 13)")
     if not np.isfinite(record).all():
         return record  # one that broke down; of its last numbers nothing can be asked
-    lengths = np.linalg.norm(record[:, 3:7], axis=1)
+    lengths = length(record[:, 3:7])
     off = np.abs(lengths - 1.0) > UNIT
     if off.any():
         row = int(np.argmax(off))

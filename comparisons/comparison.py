@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scenarios import Scenario, Trajectory, Truth
 from scenarios.mechanics import angular_momentum, energy, kinetic_energy
 from scenarios.model import TOUCHING
-from scenarios.rotations import rotate
+from scenarios.rotations import length, rotate
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -188,9 +188,9 @@ class Comparison:
         damps by a law of its own).
         """
         v, g = self.motion.velocity, self.scene.acceleration
-        left_over = np.linalg.norm(np.diff(v, axis=0) - self.dt * g, axis=1)
+        left_over = length(np.diff(v, axis=0) - self.dt * g)
         damped = 0.0 if self.scene.damping is None else 2.0 * self.dt * self.scene.damping.linear
-        allowed = 1e-3 * self.dt * np.linalg.norm(g) + (1e-6 + damped) * np.linalg.norm(v[:-1], axis=1)
+        allowed = 1e-3 * self.dt * np.linalg.norm(g) + (1e-6 + damped) * length(v[:-1])
         return left_over > allowed
 
     def contact_point(self, row: int) -> Array:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from comparisons.comparison import Comparison, Unresolved
 from scenarios.mechanics import energy
-from scenarios.rotations import angle_between_orientations, angle_between_vectors
+from scenarios.rotations import angle_between_orientations, angle_between_vectors, length
 
 Array = NDArray[np.float64]
 
@@ -22,10 +22,10 @@ def energy_error(case: Comparison, synchronised: bool = True) -> Array:
 def angular_momentum_error(case: Comparison) -> Array:
     """Difference of angular momentum from the truth, over the truth's largest."""
     exact = case.exact_angular_momentum
-    scale = np.max(np.linalg.norm(exact, axis=1))
+    scale = np.max(length(exact))
     if scale == 0.0:
         raise Unresolved("the angular momentum is too small to be a number")
-    sizes: Array = np.linalg.norm(case.angular_momentum - exact, axis=1) / scale
+    sizes: Array = length(case.angular_momentum - exact) / scale
     return sizes
 
 
@@ -36,7 +36,7 @@ def angular_momentum_direction_error(case: Comparison) -> Array:
 
 def position_error(case: Comparison) -> Array:
     """Distance of the centre of mass from the truth's [m]."""
-    return np.linalg.norm(case.compared.position - case.exact.position, axis=1)
+    return length(case.compared.position - case.exact.position)
 
 
 def orientation_error(case: Comparison) -> Array:

@@ -14,6 +14,7 @@ from comparisons import errors
 from comparisons.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
 from scenarios import Scenario, Trajectory, Truth
 from scenarios.mechanics import angular_momentum, apex, kinetic_energy, lowest_height
+from scenarios.rotations import length
 
 Array = NDArray[np.float64]
 NEAR_FLOOR = 0.05  # of the body's size: engines may take what is so near for contact
@@ -301,7 +302,7 @@ def horizontal_momentum_error(case: Comparison) -> float:
     """Largest change of the horizontal velocity, over the speed that belongs to the scene's energy."""
     sideways = (case.motion.velocity - np.array(case.scene.start.velocity))[:, [0, 2]]
     speed = np.sqrt(2.0 * case.energy_scale / case.scene.body.mass)
-    return float(np.max(np.linalg.norm(sideways, axis=1)) / speed)
+    return float(np.max(length(sideways)) / speed)
 
 
 @_metric("m", "truth", "a truth", _has_truth)

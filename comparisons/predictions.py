@@ -11,6 +11,7 @@ Source: expansion of one step about the impact, to first order in the step h.
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,12 @@ def flight_error(scene: Scenario, truth: Truth | None, metric: str, dt: float, *
     """The error of semi-implicit Euler in free flight; None where the rotation is not that simple, or the scene no free flight."""
     if truth is None or scene.floor is not None or scene.damping is not None or (exact_rotation and not spins_steadily(scene)):
         return None
-    return _measured(metric, Comparison.with_truth(scene, discrete_flight(scene, dt, exact_rotation=exact_rotation), truth))
+    return _measured(metric, _flight(scene, truth, dt, exact_rotation))
+
+
+@lru_cache(maxsize=4)  # every metric of a scene asks for it
+def _flight(scene: Scenario, truth: Truth, dt: float, exact_rotation: bool) -> Comparison:
+    return Comparison.with_truth(scene, discrete_flight(scene, dt, exact_rotation=exact_rotation), truth)
 
 
 def bounce_error(

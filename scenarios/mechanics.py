@@ -4,22 +4,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.model import Scenario
-from scenarios.rotations import rotate, unrotate
+from scenarios.rotations import dot, rotate, unrotate
 from scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
 
 def angular_momentum(scene: Scenario, motion: Trajectory) -> Array:
-    """L = R I Rᵀ ω about the centre of mass, world frame [kg m²/s], shape (n, 3)."""
+    """L = R I Rᵀ ω about the centre of mass, world frame [kg m²/s], shape (n, 3); I ω where all axes are alike, whatever the attitude."""
+    inertia = scene.body.inertia_tensor
+    if np.array_equal(inertia, inertia[0, 0] * np.eye(3)):
+        return inertia[0, 0] * motion.angular_velocity
     spin = unrotate(motion.orientation, motion.angular_velocity)
-    return rotate(motion.orientation, spin @ scene.body.inertia_tensor)
+    return rotate(motion.orientation, spin @ inertia)
 
 
 def kinetic_energy(scene: Scenario, motion: Trajectory) -> Array:
     """M v²/2 + ω·L/2 [J], shape (n,)."""
-    linear = 0.5 * scene.body.mass * np.sum(motion.velocity**2, axis=1)
-    return linear + 0.5 * np.sum(motion.angular_velocity * angular_momentum(scene, motion), axis=1)
+    linear = 0.5 * scene.body.mass * dot(motion.velocity, motion.velocity)
+    return linear + 0.5 * dot(motion.angular_velocity, angular_momentum(scene, motion))
 
 
 def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Array:

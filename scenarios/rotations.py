@@ -8,7 +8,8 @@ Array = NDArray[np.float64]
 
 def cross(a: Array, b: Array) -> Array:
     """A × b over the last axis; numpy.cross takes four times as long on the few vectors that root finding asks for."""
-    a, b = np.broadcast_arrays(a, b)
+    if a.shape != b.shape:
+        a, b = np.broadcast_arrays(a, b)
     product = np.empty(a.shape)
     product[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     product[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
@@ -16,12 +17,22 @@ def cross(a: Array, b: Array) -> Array:
     return product
 
 
+def dot(a: Array, b: Array) -> Array:
+    """A · b over the last axis; a sum over so short an axis takes three times as long."""
+    return np.einsum("...i,...i->...", a, b)
+
+
+def length(a: Array) -> Array:
+    """|a| over the last axis."""
+    return np.sqrt(dot(a, a))
+
+
 def multiply(a: Array, b: Array) -> Array:
     """The rotation by b, then by a; shapes (..., 4)."""
     av, aw = a[..., :3], a[..., 3:]
     bv, bw = b[..., :3], b[..., 3:]
     vector = aw * bv + bw * av + cross(av, bv)
-    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
+    scalar = aw * bw - dot(av, bv)[..., None]
     return np.concatenate([vector, scalar], axis=-1)
 
 
@@ -54,9 +65,9 @@ def angle_between_orientations(a: Array, b: Array) -> Array:
     By the half-angle's sine and cosine together, so that it resolves 1e-16 rad and is sound at pi (W. Kahan).
     """
     difference = multiply(conjugate(a), b)
-    return 2.0 * np.arctan2(np.linalg.norm(difference[..., :3], axis=-1), np.abs(difference[..., 3]))
+    return 2.0 * np.arctan2(length(difference[..., :3]), np.abs(difference[..., 3]))
 
 
 def angle_between_vectors(a: Array, b: Array) -> Array:
     """The angle [rad] between vectors, (..., 3)."""
-    return np.arctan2(np.linalg.norm(cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+    return np.arctan2(length(cross(a, b)), dot(a, b))

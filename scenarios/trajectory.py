@@ -45,7 +45,8 @@ class Trajectory:
 
     def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Self:
         """The same motion at some of its times."""
-        return type(self).from_states(self.t[rows], self.states[rows], self.velocity_lag)
+        position, orientation = self.position[rows], self.orientation[rows]
+        return type(self)(self.t[rows], position, orientation, self.velocity[rows], self.angular_velocity[rows], self.velocity_lag)
 
     @property
     def first_bad_row(self) -> int | None:

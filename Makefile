@@ -19,6 +19,7 @@ faults: $(VENV)/.installed-dev        ## engines with one planted fault each aga
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py
+	$(BIN)/python benchmarks/run_cost.py
 
 examples: $(VENV)/.installed         ## the pictures of docs/examples.md, each by its own lines
 	$(BIN)/python docs/examples/draw.py

@@ -111,7 +111,10 @@ class Folder:
             whole = Path(path)
             whole.parent.mkdir(parents=True, exist_ok=True)
             unfinished = whole.with_name(f"{UNFINISHED}{os.getpid()}-{whole.name}")
-            unfinished.write_bytes(content)
+            with unfinished.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())  # after a power cut, too, a part that has its name is whole
             unfinished.replace(whole)
         except OSError as error:
             raise DropspinError(f"{self.where}: cannot be written: {error.strerror or error}; parts that are there are whole.") from None

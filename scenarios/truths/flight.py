@@ -36,6 +36,11 @@ def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Da
     x, q, v, w = state[0:3], state[3:7], state[7:10], state[10:13]
     rotor = free_rotor(inertia, q, w)
 
+    def undamped_states(t: Array) -> Array:
+        t_ = t[:, None]
+        orientation, angular_velocity = rotor(t)
+        return np.hstack([x + t_ * v + t_ * t_ * 0.5 * acceleration, orientation, v + t_ * acceleration, angular_velocity])
+
     def states(t: Array) -> Array:
         k, t_ = damping.linear, t[:, None]
         slowed = t_ * _phi1(k * t_)
@@ -44,7 +49,7 @@ def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Da
         velocity = np.exp(-k * t_) * v + slowed * acceleration
         return np.hstack([position, orientation, velocity, np.exp(-damping.angular * t_) * angular_velocity])
 
-    return states
+    return undamped_states if damping == UNDAMPED else states
 
 
 def flight(scene: Scenario) -> Truth | None:

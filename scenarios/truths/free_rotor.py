@@ -87,13 +87,14 @@ class AsymmetricTop:
         self.period = 4.0 * quarter_period(self._m1) / self._rate
 
         self._set_precession()
-        start, _ = self._body_frame(np.zeros(1))
+        start, _ = self._body_frame(self._elliptic(np.zeros(1)))
         self._to_space = Rotation.from_quat(orientation).as_matrix() @ self._axes @ start[0]
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Orientations (n, 4) and angular velocities (n, 3), world frame, at times [s], shape (n,)."""
-        triads, spins = self._body_frame(t)
-        angle = self._precession(t)
+        at = self._elliptic(t)
+        triads, spins = self._body_frame(at)
+        angle = self._precession(t, at)
         cos, sin, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
         turned = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]]).transpose(2, 0, 1)
         matrices = self._to_space @ turned @ triads.transpose(0, 2, 1)  # from a, b, c to space
@@ -108,6 +109,7 @@ class AsymmetricTop:
         return argument(sn / length, cn / length, self._m1)
 
     def _elliptic(self, t: Array) -> tuple[Array, Jacobi]:
+        """U, the functions' argument, at times [s], and the functions of it."""
         u = self._rate * t + self._u0
         return u, jacobi(u, self._m1)
 
@@ -121,17 +123,16 @@ class AsymmetricTop:
         self._steady = self._length / Io
         self._n = -m_p2 / m_o**2
         self._swing = self._length * m_b**2 * (Io - Ib) / (Io * Ib * m_o**2 * self._rate)
+        self._swung_at_start = integral_of_sn2(*self._elliptic(np.zeros(1)), self._n, self._m1)
 
-    def _precession(self, t: Array) -> Array:
+    def _precession(self, t: Array, at: tuple[Array, Jacobi]) -> Array:
         """φ(t) = L t/I_o + swing (G(u) - G(u₀)), G the integral of sn²/(1 - n sn²); I_o belongs to the third axis."""
-        u, at_u = self._elliptic(t)
-        u0, at_u0 = self._elliptic(np.zeros(1))
-        swung = integral_of_sn2(u, at_u, self._n, self._m1) - integral_of_sn2(u0, at_u0, self._n, self._m1)
+        swung = integral_of_sn2(*at, self._n, self._m1) - self._swung_at_start
         return self._steady * t + self._swing * swung
 
-    def _body_frame(self, t: Array) -> tuple[Array, Array]:
+    def _body_frame(self, at: tuple[Array, Jacobi]) -> tuple[Array, Array]:
         """The triads B as columns, (n, 3, 3), and the angular velocities, (n, 3), along a, b, c."""
-        _, (sn, cn, dn) = self._elliptic(t)
+        _, (sn, cn, dn) = at
         spins = np.column_stack([self._a * cn, self._b * sn, self._c * dn])
         along = spins * self._moments
         along /= np.linalg.norm(along, axis=1, keepdims=True)

@@ -23,7 +23,7 @@ def agreement_rows(written: Phase, dt: float, first: Attempt, second: Attempt, p
     if first.verdict or second.verdict or any(m.first_bad_row is not None for m in first.phases + second.phases):
         return []
     scene, truth = written
-    cases = [_side_by_side(phase, one, other) for phase, one, other in zip(phases, first.phases, second.phases, strict=True)]
+    cases = [_side_by_side(phase, one, other) for phase, one, other in zip(phases, first.cases, second.cases, strict=True)]
     shared: Row = {"scene": scene.name, "engine": first.label, "dt": dt, "kind": "agreement", "truth": second.label}
     shared["steps"] = scene.steps(dt)
     if first.discretisation is not None and first.discretisation == second.discretisation:
@@ -42,15 +42,13 @@ def agreement_rows(written: Phase, dt: float, first: Attempt, second: Attempt, p
     return rows
 
 
-def _side_by_side(phase: Phase, one: Trajectory, other: Trajectory) -> Comparison:
+def _side_by_side(phase: Phase, one: Comparison, other: Comparison) -> Comparison:
     """Two engines' motions as far as they can be compared: to the truth's horizon, else to the first contact of either."""
-    scene, truth = phase
-    if truth is not None:
-        until = int(np.sum(truth.covers(one.t)))
-        return Comparison(scene, one, other[:until], tuple(event.time for event in truth.events))
-    contacts = [Comparison(scene, motion).first_contact for motion in (one, other)]
-    until = min([len(one), *(contact[0] + 1 for contact in contacts if contact is not None)])
-    return Comparison(scene, one[: max(until, 2)], other[: max(until, 2)])
+    if phase.truth is not None:
+        return Comparison.between(one, other, int(np.sum(phase.truth.covers(one.motion.t))))
+    contacts = [case.first_contact for case in (one, other)]
+    until = max(2, min([len(one.motion), *(contact[0] + 1 for contact in contacts if contact is not None)]))
+    return Comparison(phase.scene, one.motion[:until], other.motion[:until])
 
 
 def _as_truth(motion: Trajectory) -> Truth:

@@ -57,6 +57,13 @@ class Comparison:
             return cls(scene, motion)
         return cls(scene, motion, exactly(truth, motion.t) if exact is None else exact, tuple(event.time for event in truth.events))
 
+    @classmethod
+    def between(cls, one: "Comparison", other: "Comparison", until: int) -> "Comparison":
+        """Hold one engine's motion against another's, for so many rows; what both have computed beside the truth is not computed again."""
+        case = cls(one.scene, one.motion, other.motion[:until], one.impacts)
+        vars(case).update(energy=one.energy, exact_energy=other.energy[:until])
+        return case
+
     @cached_property
     def exact(self) -> Trajectory:
         """The reference; metrics that need one are asked only where there is one.

@@ -140,6 +140,7 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
         return [shared | {"verdict": "diverged", "reason": reason}]
     beside = zip(phases, attempt.phases, exact, strict=True)
     cases = [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in beside]
+    attempt.cases = cases
     rows = [shared | {"verdict": "limited", "reason": limit.said} for limit in attempt.limits]
     for metric in metrics_for(scene, truth):
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.building import assert_built_as_meant, sound_limits, sound_record
+from comparisons.comparison import Comparison
 from comparisons.engines.base import Diverged, Engine, EngineMissing, Limit
 from comparisons.engines.registry import engine as engine_named
 from comparisons.ensembles import Outcome, outcome_of
@@ -77,13 +78,17 @@ class Contestant:
 
 @dataclass
 class Attempt:
-    """What came of one engine on one scene at one step; of what it claims, its discretisation, order and errors by metric."""
+    """What came of one engine on one scene at one step; of what it claims, its discretisation, order and errors by metric.
+
+    `cases` are its motions from each start beside the truth, which whoever judges them puts there.
+    """
 
     label: str
     verdict: str = ""
     reason: str = ""
     motion: Trajectory | None = None
     phases: list[Trajectory] = field(default_factory=list)
+    cases: list[Comparison] = field(default_factory=list)
     limits: Sequence[Limit] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     time_per_step: float = float("nan")

@@ -127,6 +127,10 @@ class Cells:
         except OSError:
             return True
 
+    def renew(self, contestant: Contestant) -> None:
+        """Give an engine a new process for its next piece of work."""
+        self._forget(contestant.label)
+
     def _forget(self, label: str) -> None:
         """Begin anew with the next piece of work."""
         pool = self._pools.pop(label)

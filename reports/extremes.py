@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.extremes import Explored, Extremes, Point, Surprise, surprises
+from scenarios import DropspinError
 
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "across", "across_value", "condition", "criterion", "figure", "said")
 AS_SURPRISING = 12
@@ -65,7 +66,7 @@ def _sentence(surprise: Surprise, dt: float) -> str:
 
 def _edge(inside: Point, outside: Point) -> str:
     """An edge between two values, with as many digits as they have in common, and one."""
-    for digits in range(2, 17):
+    for digits in range(3, 17):
         middle = f"{inside.value:.{digits}g}"
         if middle != f"{outside.value:.{digits}g}":
             return middle
@@ -80,7 +81,7 @@ def _turn(line: Explored, inside: float, outside: float, dt: float) -> str:
     """How far a body in flight turns in a step, where that is what an edge depends on."""
     factor = {"spin": dt, "step": float(np.linalg.norm(line.scene.start.angular_velocity))}.get(line.axis.name, 0.0)
     is_told = factor and line.scene.floor is None
-    return f" ({inside * factor:.3g} rad a step is well, {outside * factor:.3g} not)" if is_told else ""
+    return f" (between {inside * factor:.3g} and {outside * factor:.3g} rad a step)" if is_told else ""
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -134,27 +135,39 @@ def _range(line: Explored) -> dict[str, str]:
     return {"sound from": f"{low:.4g}", "to": f"{high:.4g}", "beyond": beyond or "as far as was looked"}
 
 
+def make_folder(folder: str) -> None:
+    """Make the folder for the tables and the maps.
+
+    Raises:
+        DropspinError: It cannot be made.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o.") from None
+
+
 def write(found: Sequence[Extremes], folder: Path) -> None:
     """`limits.csv`, `limits.json`, `limits.md` and the maps."""
     from reports.plots import extremes_figure, stability_figure
 
-    folder.mkdir(parents=True, exist_ok=True)
     everything = [row for one in found for row in rows(one)]
     with (folder / "limits.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         writer.writerows(everything)
     (folder / "limits.json").write_text(json.dumps(everything, indent=1), encoding="utf-8")
-    parts = [
-        "# Where engines break",
-        "## Surprises first",
-        "\n".join(f"{n}. {said}" for n, said in enumerate(sentences(found), 1)) or "None.",
-    ]
+    parts = ["# Where engines break"]
+    if any(one.explored for one in found):
+        told = "\n".join(f"{number}. {said}" for number, said in enumerate(sentences(found), 1))
+        parts += ["## Surprises first", told or "None."]
     if step_rows(found):
         parts += ["## The largest steps", _markdown(step_rows(found))]
     for one in found:
-        extremes_figure(one).savefig(folder / f"{one.scene.name}.svg")
-        parts += [f"## {one.scene.name}", f"![{one.scene.name}]({one.scene.name}.svg)", _markdown(range_rows([one]))]
+        parts.append(f"## {one.scene.name}")
+        if one.explored:
+            extremes_figure(one).savefig(folder / f"{one.scene.name}.svg")
+            parts += [f"![{one.scene.name}]({one.scene.name}.svg)", _markdown(range_rows([one]))]
         for along, across in dict.fromkeys((plane.axes[0].name, plane.axes[1].name) for plane in one.mapped):
             name = f"{one.scene.name}-{along}-{across}.svg"
             stability_figure(one, along, across).savefig(folder / name)

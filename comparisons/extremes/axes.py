@@ -153,11 +153,14 @@ def _with_height(setting: Setting, height: float) -> Setting:
 
 
 def _with_inertia_ratio(setting: Setting, ratio: float) -> Setting:
-    """The largest moment is kept, on its axis, and so is the order of the others; the shape too."""
+    """The largest moment is kept, on its axis, and where the middle one lies between the least and the largest it can be; the shape too."""
     scene = setting.scene
-    moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
-    least = 1.0 / ratio
-    new = np.array([least, 1.0 - 0.5 * least * (1.0 - least), 1.0]) * moments[2]
+    least, middle, largest = np.sort(np.diag(scene.body.inertia_tensor))
+    lowest = max(least, largest - least)  # a body's moments are the sides of a triangle
+    share = (middle - lowest) / (largest - lowest) if largest > lowest else 0.5
+    new_least = largest / ratio
+    new_lowest = max(new_least, largest - new_least)
+    new = np.array([new_least, min(new_lowest + share * (largest - new_lowest), largest), largest])
     order = np.argsort(np.argsort(np.diag(scene.body.inertia_tensor), kind="stable"), kind="stable")
     return Setting(_changed(scene, body={"inertia": tuple(float(moment) for moment in new[order])}), setting.dt)
 
@@ -229,6 +232,8 @@ def _body_times(scene: Scenario, length: float, mass: float) -> dict[str, Any]:
         keys[name] = _times(length, given[name])
     if "masses" in given:
         keys["masses"] = _times(mass, given["masses"])
+    if given["inertia"] == "note" and _is_diagonal(scene):  # unit masses, whatever the body's is
+        given["inertia"] = tuple(float(moment) for moment in np.diag(scene.body.inertia_tensor))
     if not isinstance(given["inertia"], str):
         keys["inertia"] = _times(mass * length**2, given["inertia"])
     return keys
@@ -298,7 +303,7 @@ AXES = {
             "restitution",
             "1",
             "the floor's restitution",
-            lambda scene: scene.floor is not None,
+            lambda scene: scene.floor is not None and scene.floor.restitution < 1.0,
             lambda setting: [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999],
             lambda setting: setting.scene.floor.restitution if setting.scene.floor is not None else math.nan,
             _with_restitution,

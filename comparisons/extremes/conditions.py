@@ -10,13 +10,13 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.comparison import Comparison, Unresolved
+from comparisons.comparison import Comparison, Unresolved, exactly
 from comparisons.metrics import metrics_for
 from scenarios import Scenario, Trajectory, Truth
 from scenarios.body import Sphere
 from scenarios.mechanics import energy, lowest_height
 from scenarios.model import TOUCHING
-from scenarios.rotations import rotate
+from scenarios.rotations import length, rotate
 
 Array = NDArray[np.float64]
 
@@ -27,10 +27,12 @@ CONDITIONS: tuple[Condition, ...] = get_args(Condition)
 ERRORS_OF_FEW_ROWS = ("orientation_error", "angular_momentum_error", "energy_error")
 ERRORS = (*ERRORS_OF_FEW_ROWS, "bounce_height_error", "landing_error")
 """What must be within the tolerance for a motion to be accurate: ratios, and angles in radians; an impact needs every step to be seen."""
-GAIN = 0.01  # of the scene's energy
+GAIN, GAIN_BY_LAW = 0.01, 10.0  # of the scene's energy; the latter where Newton's restitution may itself add some
+ASTRAY = 0.5  # of the truth's way, or of the body's size if it stays where it is
 BLOWN_UP = 1e6  # times the scene's energy
-DEEPER = 1e-3  # of the body's size
+DEEPER = 1e-3  # of the body's size; less is no way to speak of
 RESTLESS = 1.5  # times what gravity adds to a speed in a step; 1 is what a resting body may have between two solutions
+ULPS = 1e-15  # of a speed; what is the same to the last digit, of a norm
 HELD = 3  # rows in which a speed stays the same to the last digit
 SUDDEN = 1e-6  # of a speed; how much it still changes from row to row before that, while one that settles has come to rest by then
 
@@ -76,22 +78,21 @@ def judged(run: Run, within: float) -> Finding:
         bad = next(motion for motion in (run.own, run.whole) if motion.first_bad_row is not None)
         return Finding("diverged", "not finite", math.inf, f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s")
     with np.errstate(all="ignore"):  # numbers may be too large for their squares
-        case = Comparison(run.scene, run.whole, None)
-        found = [*_energy_that_rises(run, case), *_tunnels(run), *_sinks(run), *_errors(run, within), *_restless(run)]
+        found = [*_energy_that_rises(run), *_tunnels(run), *_sinks(run), *_errors(run, within), *_lost(run), *_restless(run)]
     return worst(found)
 
 
-def _energy_that_rises(run: Run, case: Comparison) -> Iterator[Finding]:
-    """Above the start's; on a floor that grips, Newton's restitution may add some, so there it is judged by the truth alone."""
+def _energy_that_rises(run: Run) -> Iterator[Finding]:
+    """Above the start's; on a floor that grips, Newton's restitution may add some, and more is allowed there."""
     try:
-        scale = case.energy_scale
+        scale = Comparison.with_truth(run.scene, run.whole, run.truth).energy_scale
     except Unresolved:
         return
     over_time = energy(run.scene, run.whole)
     gain = float(np.max(over_time) - over_time[0]) / scale
     if not gain <= BLOWN_UP:
         yield Finding("diverged", "blows up", gain, f"the energy rises by {gain:.1e} of the scene's")
-    elif gain > GAIN and not _may_gain(run.scene):
+    elif gain > (GAIN_BY_LAW if _may_gain(run.scene) else GAIN):
         yield Finding("gains_energy", "gains energy", gain, f"the energy rises by {gain:.2g} of the scene's")
 
 
@@ -119,7 +120,7 @@ def _sinks(run: Run) -> Iterator[Finding]:
     half_way, end = (float(-heights[(share >= since) & (share <= since + 0.1)].max(initial=-math.inf)) for since in (0.5, 0.9))
     deeper = DEEPER * run.scene.body.size
     if half_way > 0.0 and end > half_way + deeper:
-        yield Finding("sinks", "sinks", end, f"sinks: {end:.2g} m below the floor after {run.whole.t[-1]:.3g} s, {half_way:.2g} m half way")
+        yield Finding("sinks", "sinks", end, f"{end:.3g} m below the floor after {run.whole.t[-1]:.3g} s, {half_way:.3g} m half way")
 
 
 def _errors(run: Run, within: float) -> Iterator[Finding]:
@@ -141,6 +142,18 @@ def _errors(run: Run, within: float) -> Iterator[Finding]:
             yield Finding("inaccurate", metric.name, size if math.isfinite(size) else math.inf, said)
 
 
+def _lost(run: Run) -> Iterator[Finding]:
+    """Somewhere else than the truth, whatever the metrics can resolve."""
+    if run.truth is None:
+        return
+    exact = exactly(run.truth, run.own.t).position
+    way, size = float(length(exact - exact[0]).max()), run.scene.body.size
+    way = way if way > DEEPER * size else size
+    astray = float(length(run.own.position[: len(exact)] - exact).max()) / way
+    if not astray <= ASTRAY:
+        yield Finding("inaccurate", "astray", astray, f"its place is off by {astray:.2g} of the way it goes")
+
+
 def _restless(run: Run) -> Iterator[Finding]:
     """Moving on where the truth rests, in the last tenth of the run."""
     truth, times = run.truth, run.whole.t
@@ -155,24 +168,25 @@ def _restless(run: Run) -> Iterator[Finding]:
 
 
 def held_speeds(motion: Trajectory) -> dict[str, float]:
-    """Largest components of velocity [m/s] and angular velocity [rad/s] that look as if cut off there.
+    """Components of velocity [m/s] and angular velocity [rad/s], or norms, that look as if cut off there.
 
     They are less than the start's after one step already, or stay the same to the last digit, all of a sudden. That may have other reasons;
     that the same value comes of another start has not.
     """
-    found = {}
+    found: dict[str, float] = {}
     for name in ("velocity", "angular_velocity"):
-        sizes = np.abs(getattr(motion, name))
-        largest = float(sizes[1:].max())
-        if largest > 0.0 and any(_is_held(component, largest, sizes[0].max()) for component in sizes.T):
-            found[name] = largest
+        components = np.abs(getattr(motion, name))
+        for sizes in (*components.T, length(components)):
+            largest = float(sizes[1:].max())
+            if largest > 0.0 and _is_held(sizes, largest):
+                found[name] = max(largest, found.get(name, 0.0))
     return found
 
 
-def _is_held(sizes: Array, largest: float, at_start: float) -> bool:
-    """Whether a component that varied, or was larger at the start, stays at the largest value for some rows."""
-    held = sizes == largest
-    if at_start > largest * (1.0 + SUDDEN) and held[1]:
+def _is_held(sizes: Array, largest: float) -> bool:
+    """Whether a component, or the norm, that varied or was larger at the start, stays at the largest value for some rows."""
+    held = np.abs(sizes - largest) <= ULPS * largest
+    if sizes[0] > largest * (1.0 + SUDDEN) and held[1]:
         return True
     in_a_row = np.logical_and.reduce([held[shift : len(held) - HELD + 1 + shift] for shift in range(HELD)])
     first = int(np.argmax(in_a_row))

@@ -20,7 +20,9 @@ from scenarios.rotations import angle_between_orientations
 Array = NDArray[np.float64]
 
 LEAST_STEPS = 1000
-"""Of a run: to see whether it is stable."""
+"""Of a run that nothing pulls, to see whether it is stable; where something does, a longer run would be another."""
+BROKEN = frozenset({"declined", "diverged", "crashed", "timed_out"})
+"""Conditions of which there is no motion to compare."""
 MOST_ROWS = 20_000
 STARTS = 4
 """Of a scene with an impact, evenly apart within a step: what one start gets right may be luck."""
@@ -60,26 +62,28 @@ class Runner:
             except DropspinError as error:
                 return _without_figure("declined", str(error))
             found = self.finding(moved)
-            return found if own is None or found.condition != own.finding.condition else own.beside(moved, value)
+            if own is None or found.condition != own.finding.condition or found.condition in BROKEN:
+                return found
+            return own.beside(moved, value)
 
         return look
 
-    def finding(self, setting: Setting) -> Finding:
-        """The worst that becomes of a scene at a step, from several starts if it has an impact."""
+    def finding(self, setting: Setting, goes_on: bool = True) -> Finding:
+        """The worst that becomes of a scene at a step, from several starts if it has an impact; and after it."""
         scene, dt = setting
         phases = start_phases(scene, truth_for(scene), dt)
         starts = STARTS if scene.steps(dt) <= MOST_ROWS else 1
         some = phases[:: max(1, len(phases) // starts)]
-        recorded = self.record([phase.scene for phase in some], dt)
+        recorded = self.record([phase.scene for phase in some], dt, goes_on)
         if isinstance(recorded, Finding):
             return recorded
         runs = [self.run(Setting(phase.scene, dt), one) for phase, one in zip(some, recorded, strict=True)]
         return worst([judged(run, self._within) for run in runs] + self._clamps(setting, runs[0]))
 
-    def record(self, scenes: Sequence[Scenario], dt: float) -> "list[_Recorded] | Finding":
-        """What the engine does with each scene, or why it does not."""
+    def record(self, scenes: Sequence[Scenario], dt: float, goes_on: bool = True) -> "list[_Recorded] | Finding":
+        """What the engine does with each scene, and after it, or why it does not."""
         try:
-            return self._cells.call(self._contestant, _record, scenes, dt)
+            return self._cells.call(self._contestant, _record, scenes, dt, goes_on)
         except Failed as failure:
             return _without_figure("timed_out" if failure.verdict == "timed_out" else "crashed", failure.reason)
 
@@ -96,7 +100,8 @@ class Runner:
     def beginning(self, setting: Setting, recorded: _Recorded) -> Finding:
         """What becomes of a scene that is the beginning of a longer one."""
         rows = 1 + math.floor(setting.scene.duration / (setting.dt * recorded.every) + 1e-9)
-        return judged(self.run(setting, recorded._replace(own=recorded.own[:rows], more=recorded.more[:0])), self._within)
+        run = self.run(setting, recorded._replace(own=recorded.own[:rows], more=recorded.more[:0]))
+        return worst([judged(run, self._within), *self._clamps(setting, run)])
 
     def _clamps(self, setting: Setting, run: Run) -> list[Finding]:
         """Whether speeds that look cut off are: from another start they come out the same."""
@@ -127,28 +132,27 @@ class _Own:
         scene, dt = self._setting
         every, own = self._recorded[0].every, self._recorded[0].own
         found = restored(recorded[0].own, self._axis, self._axis.base(self._setting), value)
-        truth = truth_for(scene)
         rows = min(len(own), len(found))
-        if truth is not None:
-            rows = int(np.count_nonzero(truth.covers(dt * every * np.arange(rows, dtype=np.float64))))
-        apart = _apart(own[:rows], found[:rows], scene.body.size)
+        for truth, step in ((truth_for(scene), dt), (truth_for(moved.scene), moved.dt)):
+            if truth is not None:
+                rows = min(rows, int(np.count_nonzero(truth.covers(step * every * np.arange(rows, dtype=np.float64)))))
+        apart = _apart(own[:rows], found[:rows], scene.body.size, float(np.linalg.norm(scene.acceleration)))
         if apart <= ALIKE:
             return SOUND
         said = f"another motion than at the scene's own {self._axis.name}, by {apart:.1e} of its sizes and speeds; it should be the same"
         return Finding("inaccurate", f"depends on {self._axis.name}", apart, said)
 
 
-def _apart(first: Array, second: Array, size: float) -> float:
+def _apart(first: Array, second: Array, size: float, g: float) -> float:
     """The largest difference of two motions, over sizes and speeds; infinite if one has numbers that are none."""
     if not (np.isfinite(first).all() and np.isfinite(second).all()):
         return math.inf
     turned = float(angle_between_orientations(first[:, 3:7], second[:, 3:7]).max())
-    ratios = [float(np.abs(first[:, 0:3] - second[:, 0:3]).max()) / size, turned]
-    for part in (slice(7, 10), slice(10, 13)):
-        scale = float(np.abs(first[:, part]).max())
-        difference = float(np.abs(first[:, part] - second[:, part]).max())
-        ratios.append(difference / scale if scale > 0.0 else difference)
-    return max(ratios)
+    # Of what moves the body at all: a speed that is rounding is no scale.
+    speed = max(float(np.abs(first[:, 7:10]).max()), size * float(np.abs(first[:, 10:13]).max()), math.sqrt(g * size))
+    scales = ((slice(0, 3), size), (slice(7, 10), speed), (slice(10, 13), speed / size))
+    ratios = [float(np.abs(first[:, part] - second[:, part]).max()) / scale for part, scale in scales if scale > 0.0]
+    return max(turned, *ratios)
 
 
 class _AlongTime:
@@ -156,14 +160,14 @@ class _AlongTime:
 
     def __init__(self, runner: Runner, setting: Setting, axis: Axis) -> None:
         self._runner, self._setting, self._axis = runner, setting, axis
-        self._beginning = runner.finding(setting)
+        self._beginning = runner.finding(setting, goes_on=False)
         self._runs: dict[float, _Recorded | Finding] = {}
 
     def __call__(self, duration: float) -> Finding:
         moved = self._axis.at(self._setting, duration)
         longer = [length for length in self._runs if length >= duration]
         if not longer:
-            recorded = self._runner.record([moved.scene], moved.dt)
+            recorded = self._runner.record([moved.scene], moved.dt, goes_on=False)
             self._runs[duration] = recorded if isinstance(recorded, Finding) else recorded[0]
         found = self._runs[min(longer, default=duration)]
         return found if isinstance(found, Finding) else worst([self._beginning, self._runner.beginning(moved, found)])
@@ -173,7 +177,7 @@ def _without_figure(condition: Condition, reason: str) -> Finding:
     return Finding(condition, condition, math.nan, reason)
 
 
-def _record(contestant: Contestant, scenes: Sequence[Scenario], dt: float) -> list[_Recorded] | Finding:
+def _record(contestant: Contestant, scenes: Sequence[Scenario], dt: float, goes_on: bool) -> list[_Recorded] | Finding:
     engine = contestant.engine
     assert engine is not None
     refusal = engine.declines(scenes[0])
@@ -183,7 +187,7 @@ def _record(contestant: Contestant, scenes: Sequence[Scenario], dt: float) -> li
     for scene in scenes:
         steps = scene.steps(dt)
         every = max(1, -(-steps // MOST_ROWS))
-        more = max(0, LEAST_STEPS - steps)
+        more = max(0, LEAST_STEPS - steps) if goes_on and scene.gravity is None else 0
         with engine.prepare(scene, dt) as simulation:
             assert_built_as_meant(engine, scene, simulation)
             try:

@@ -1,5 +1,6 @@
 """Where engines break: every axis of a scene, one at a time and in pairs."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product, takewhile
@@ -112,9 +113,14 @@ def limits(
         DropspinError: There is no such engine or axis, or the scene has it not.
     """
     assert_step_fits(scene, dt)
-    chosen = _axes(scene, axes) if axes or pairs is None else []
+    if not 0.0 < within < math.inf:
+        raise DropspinError(f"within: got {within!r}; it is a number above 0, a ratio or an angle in radians.")
+    if any(along == across for along, across in pairs or ()):
+        raise DropspinError("a pair is of two different axes.")
+    chosen = _axes(scene, tuple(dict.fromkeys(axes))) if axes or pairs is None else []
     planes = [tuple(_axes(scene, pair)) for pair in (default_pairs(scene) if pairs is None and not axes else pairs or [])]
-    contestants = [contestant_named(name) for name in engines or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    named = [contestant_named(name) for name in engines or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    contestants = list({one.label: one for one in named}.values())
     left_out: dict[str, str] = {one.label: one.missing for one in contestants if one.engine is None}
     taking_part = [one for one in contestants if one.engine is not None]
     setting = Setting(scene, dt)

@@ -9,6 +9,7 @@ from comparisons.extremes.exploring import Explored, Point
 
 SAME_PLACE = 0.05
 """Along an axis: edges that are nearer to each other are the same."""
+WELL = ("sound", "declined")
 SUDDEN = 20.0
 """The power of the value by which an error grows at an edge; that of a method is its order, 4 at most, and of rounding less."""
 
@@ -43,27 +44,29 @@ def surprises(explored: Sequence[Explored]) -> list[Surprise]:
     for one in explored:
         beside = [other for other in explored if other.scene is one.scene and other.axis is one.axis and other is not one]
         for inside, outside in _worsenings(one):
-            twin = next((known for known in found if _are_alike(known, one, inside, outside)), None)
-            if twin is not None:
-                if one.engine not in twin.engines:
-                    sudden = twin.sudden or _is_sudden(one, inside, outside)
-                    found[found.index(twin)] = replace(twin, engines=(*twin.engines, one.engine), sudden=sudden)
-                continue
-            sound = tuple(other.engine for other in beside if other.at(outside.value).condition == "sound")
-            found.append(Surprise(one, (one.engine,), inside, outside, sound, _is_sudden(one, inside, outside)))
-    return sorted(found, key=_rank)
+            sudden = _is_sudden(one, inside, outside)
+            twin = next((known for known in found if known.sudden == sudden and _are_alike(known, one, inside, outside)), None)
+            if twin is None:
+                sound = tuple(other.engine for other in beside if other.at(outside.value).condition == "sound")
+                found.append(Surprise(one, (one.engine,), inside, outside, sound, sudden))
+            elif one.engine not in twin.engines:
+                found[found.index(twin)] = replace(twin, engines=(*twin.engines, one.engine))
+    ranked = sorted(found, key=_rank)
+    kinds = [(surprise.outside.finding.criterion, surprise.sudden, surprise.engines[0]) for surprise in ranked]
+    # The first of each kind first: the same fault shows along several axes of several scenes.
+    return [ranked[number] for number in sorted(range(len(ranked)), key=lambda number: kinds.index(kinds[number]) < number)]
 
 
 def _worsenings(one: Explored) -> Iterator[tuple[Point | None, Point]]:
     """The scene's own point if it is not sound; then outwards, both ways, each point that is worse than all before it."""
     own = one.at(one.base)
     number = one.points.index(own)
-    if own.condition not in ("sound", "declined"):
+    if own.condition not in WELL:
         yield None, own
     for way in (one.points[number + 1 :], one.points[number - 1 :: -1] if number else ()):
         worst, before = own, own
         for point in way:
-            if CONDITIONS.index(point.condition) > CONDITIONS.index(worst.condition):
+            if point.condition not in WELL and CONDITIONS.index(point.condition) > CONDITIONS.index(worst.condition):
                 yield before, point
                 worst = point
             before = point

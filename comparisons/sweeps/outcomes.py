@@ -52,6 +52,10 @@ class Outcomes:
         state, figures, of_truth = (np.full((size, width), np.nan) for width in (len(STATE), len(FIGURES), metrics))
         return cls(verdict, reason, state, figures, of_truth, np.zeros(size, dtype=np.int64), np.full(size, np.nan))
 
+    def __getitem__(self, places: slice) -> "Outcomes":
+        """Of some of them."""
+        return Outcomes(*(column[places] for column in vars(self).values()))
+
     def tell(self, place: int, verdict: str, reason: str) -> None:
         """What became of a job that has no motion."""
         self.verdict[place], self.reason[place] = verdict, " ".join(reason.split())

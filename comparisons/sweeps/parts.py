@@ -7,18 +7,28 @@ import io
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import fsspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
+from pydantic import BaseModel, Field, ValidationError
 
 from scenarios import DropspinError
 
 ABOUT = "sweep.json"
 UNFINISHED = ".unfinished-"
 TOGETHER = 1000  # parts to a folder: file systems are slow with many files in one, and so is looking at them
+
+
+class About(BaseModel):
+    """What `sweep.json` must say."""
+
+    identity: str
+    jobs: Annotated[int, Field(ge=0)]
+    part_size: Annotated[int, Field(ge=1)]
+    provenance: dict[str, Any]
 
 
 class Folder:
@@ -46,7 +56,7 @@ class Folder:
         try:
             text = self._files.cat_file(f"{self._root}/{ABOUT}")
         except FileNotFoundError:
-            if self._files.exists(self._root) and (not self._files.isdir(self._root) or self._files.ls(self._root)):
+            if self._files.exists(self._root) and (not self._files.isdir(self._root) or self._holds_something()):
                 raise DropspinError(
                     f"{self.where}: holds something that is no sweep of dropspin; choose an empty or new folder with -o."
                 ) from None
@@ -54,11 +64,13 @@ class Folder:
         except NotADirectoryError:
             raise DropspinError(f"{self.where}: is a file, or in one; choose a folder with -o.") from None
         try:
-            content: dict[str, Any] = json.loads(text)
-            assert {"identity", "jobs", "part_size", "provenance"} <= content.keys()
-        except (ValueError, AttributeError, AssertionError):
+            return About.model_validate_json(text).model_dump()
+        except ValidationError:
             raise DropspinError(f"{self.where}: its {ABOUT} is none of a sweep's; choose an empty or new folder with -o.") from None
-        return content
+
+    def _holds_something(self) -> bool:
+        """Anything but what a sweep leaves that was killed as it began."""
+        return any(not os.path.basename(path).startswith(UNFINISHED) for path in self._files.ls(self._root, detail=False))
 
     def begin(self, about: dict[str, Any]) -> None:
         """Say what the folder is going to hold, and clean away what a killed sweep left half written."""
@@ -93,7 +105,11 @@ class Folder:
 
     def read(self, path: str, columns: list[str] | None = None) -> pa.Table:
         """A part."""
-        return pq.read_table(io.BytesIO(self._files.cat_file(path)), columns=columns)
+        try:
+            # Without threads of pyarrow's: processes are forked beside them, and one part is read at a time.
+            return pq.read_table(io.BytesIO(self._files.cat_file(path)), columns=columns, use_threads=False, pre_buffer=False)
+        except pa.ArrowInvalid:
+            raise DropspinError(f"{path}: is no whole part of a sweep; delete it, and --resume does its jobs again.") from None
 
     def _name(self, number: int, first: int, last: int) -> str:
         return f"{self._group(number // TOGETHER)}/{first:016d}-{last:016d}-{self._identity}.parquet"

@@ -126,9 +126,20 @@ class Work:
         first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
         go_on()
         try:
-            return cells.call(contestant, _measured_here, self.sweep, first, last)
+            found = cells.call(contestant, _measured_here, self.sweep, first, last)
         except Failed:
             return joined([self._outcome(contestant, number, cells, go_on) for number in range(first, last)])
+        if not (found.verdict == "crashed").any():
+            return found
+        # What a job raises may be the fault of those before it, such as a leak: it counts if the job does it in a new process.
+        lots = []
+        for place, number in enumerate(range(first, last)):
+            if found.verdict[place] == "crashed":
+                cells.renew(contestant)
+                lots.append(self._outcome(contestant, number, cells, go_on))
+            else:
+                lots.append(found[place : place + 1])
+        return joined(lots)
 
     def _outcome(self, contestant: Contestant, number: int, cells: Cells, go_on: Callable[[], None]) -> Outcomes:
         """A job alone; if it breaks its engine, that."""

@@ -85,7 +85,8 @@ def _label(axis: Axis, values: Sequence[float], axes: "Axes") -> None:
         powers = range(int(np.ceil(np.log10(low))), int(np.floor(np.log10(high))) + 1)
         ticks = [10.0**power for power in powers if len(powers) <= 6 or power % 3 == 0]
     axes.set_xticks([axis.coordinate(tick) for tick in ticks], [f"{tick:g}".replace("e-0", "e-").replace("e+0", "e") for tick in ticks])
-    axes.set_xlim(axis.coordinate(low), axis.coordinate(high))
+    if high > low:
+        axes.set_xlim(axis.coordinate(low), axis.coordinate(high))
     axes.set_xlabel(_named(axis))
     axes.grid(visible=False)
 

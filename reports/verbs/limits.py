@@ -48,7 +48,7 @@ def limits(
     from pathlib import Path
 
     from comparisons import Limits
-    from comparisons.extremes import SCENES
+    from comparisons.extremes import AXES, SCENES
     from comparisons.extremes import limits as extremes
     from reports import extremes as told
     from reports.terminal import print_rows, share_bar
@@ -56,8 +56,13 @@ def limits(
 
     planes = [_pair(pair) for pair in pairs]
     loaded = [load(name) for name in scenes or SCENES]
+    if len({scene.name for scene in loaded}) < len(loaded):
+        raise click.UsageError("two scenes have the same name; a scene's name is its file's, rename one.")
+    named = {*axes, *(axis for plane in planes for axis in plane)} & AXES.keys()
+    having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in named)]
+    told.make_folder(output)  # before the work, not after it
     found = []
-    for scene in loaded:
+    for scene in having or loaded[:1]:  # which says what it has not got
         with share_bar(scene.name) as progress:
 
             def advance(what: str, share: float) -> None:

@@ -37,10 +37,9 @@ def test_sentences(study):
     """Where, what, in whom, how it shows, who is spared; an edge with as many digits as tell its two values apart."""
     told = extremes.sentences([study])
     assert (
-        told[0]
-        == "spin-principal, spin above 1 rad/s (0.005 rad a step is well, 0.05 not): clamped in b; it is off by 0.2. Sound there: a."
+        told[0] == "spin-principal, spin above 1 rad/s (between 0.005 and 0.05 rad a step): clamped in b; it is off by 0.2. Sound there: a."
     )
-    assert "step above 1 s (5 rad a step is well, 50 not): inaccurate in a" in "".join(told)
+    assert "step above 1 s (between 5 and 50 rad a step): inaccurate in a" in "".join(told)
 
 
 def test_tables(study):
@@ -87,7 +86,7 @@ def test_from_the_command_line(tmp_path, monkeypatch):
     result = CliRunner().invoke(dropspin, asked)
     assert result.exit_code == 0, result.output
     first, *_ = result.stdout.splitlines()
-    assert first.startswith("1. spin-principal, step above 0.158 s (0.79")
+    assert first.startswith("1. spin-principal, step above 0.158 s (between 0.79")
     assert "inaccurate, all of a sudden, in pybullet; orientation error is" in first
     assert (tmp_path / "out/limits/spin-principal-spin-mass.svg").exists()
     told = CliRunner().invoke(dropspin, [*asked[:6], "--axis", "mass", "--json"])
@@ -102,6 +101,9 @@ def test_from_the_command_line(tmp_path, monkeypatch):
         (["--pair", "spin"], "name two axes, such as spin,inertia-ratio"),
         (["-e", "mujocoo"], "engine 'mujocoo' is unknown."),
         (["--dt", "7"], "dt: got 7.0 s"),
+        (["--within", "nan"], "within: got nan"),
+        (["--pair", "spin,spin"], "a pair is of two different axes"),
+        (["--time-limit", "nan"], "is no time in seconds"),
     ],
 )
 def test_bad_input(asked, said, capfd, monkeypatch):

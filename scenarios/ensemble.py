@@ -13,6 +13,7 @@ from scenarios.rotations import about, multiply, rotate
 Array = NDArray[np.float64]
 
 GRID = 4001
+SMALL_TURN = 0.1  # rad
 
 
 def members(scene: Scenario) -> list[Scenario]:
@@ -109,8 +110,13 @@ def _angles(shares: Array, largest: float) -> Array:
 def _shares(largest: float) -> tuple[Array, Array]:
     """The cube roots of shares, and the angles they belong to; even in the cube root, because the share rises as θ³ from 0."""
     grid = largest * np.linspace(0.0, 1.0, GRID)
-    below = np.array([angle - math.sin(angle) for angle in grid])
+    below = np.array([_angle_minus_sine(angle, largest) if largest < SMALL_TURN else angle - math.sin(angle) for angle in grid])
     return np.cbrt(below / below[-1]), grid
+
+
+def _angle_minus_sine(angle: float, unit: float) -> float:
+    """In units of unit³/6, by the series: the difference would lose all digits."""
+    return (angle / unit) ** 3 * (1.0 - angle**2 / 20.0 * (1.0 - angle**2 / 42.0 * (1.0 - angle**2 / 72.0)))
 
 
 def _as_high(member: Scenario, scene: Scenario) -> Array:

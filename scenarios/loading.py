@@ -51,6 +51,8 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
 
 def _find(scene: str | Path) -> Path:
     text = str(scene)
+    if "\0" in text:
+        raise SceneError(f"scene {text!r}: no file has such a name.")
     if isinstance(scene, str) and re.fullmatch(r"[a-z0-9-]{1,100}", text) and (CATALOGUE / f"{text}.toml").is_file():
         return CATALOGUE / f"{text}.toml"
     path = Path(scene)

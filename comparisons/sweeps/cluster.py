@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from comparisons.engines.base import EngineMissing
-from comparisons.isolation import Cells
+from comparisons.isolation import Cells, Limits
 from comparisons.sweeps.parts import Folder
 from comparisons.sweeps.work import Part, Work, versions_here
 from scenarios import DropspinError
@@ -97,8 +97,9 @@ def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Folde
         told(done)
 
 
-_idle: list[Cells] = []
-"""The engines' processes of this worker, as many sets as its threads have been at work at a time."""
+Stamp = tuple[str, Limits]
+_idle: dict[Stamp, list[Cells]] = {}
+"""The engines' processes of this worker by the sweep they are for, as many sets as its threads have been at work at a time."""
 
 
 def _do(work: Work, part: Part, where: str) -> None:
@@ -114,11 +115,16 @@ def _do(work: Work, part: Part, where: str) -> None:
     for package, version in versions_here().items():
         if version != work.versions[package]:
             raise DropspinError(f"a worker has {package} {version}, here it is {work.versions[package]}; install the same on both.")
-    cells = _idle.pop() if _idle else Cells(work.limits, start_method="spawn")
+    stamp = (work.identity, work.limits)
+    _leave(but=stamp)  # a client that was killed has left its own
+    at_rest = _idle.setdefault(stamp, [])
+    cells = at_rest.pop() if at_rest else Cells(work.limits, start_method="spawn")
     try:
         folder.write(*part, work.table(part, cells, _go_on_unless_closing))
     finally:
-        _idle.append(cells)
+        at_rest.append(cells)  # which nobody takes up if the sweep has been left meanwhile
+        if _idle.get(stamp) is not at_rest:
+            _end(at_rest)
 
 
 def _go_on_unless_closing() -> None:
@@ -129,8 +135,13 @@ def _go_on_unless_closing() -> None:
         raise Reschedule  # elsewhere
 
 
-def _leave() -> None:
-    """On a worker: end the engines' processes that have nothing to do."""
-    while _idle:
-        with _idle.pop():
+def _leave(but: Stamp | None = None) -> None:
+    """On a worker: end the engines' processes that are at rest, of all sweeps but one; those at work end with their parts."""
+    for stamp in [stamp for stamp in _idle if stamp != but]:
+        _end(_idle.pop(stamp))
+
+
+def _end(at_rest: list[Cells]) -> None:
+    while at_rest:
+        with at_rest.pop():
             pass

@@ -19,9 +19,9 @@ class NoSuchField(DropspinError):
 
 def path_of(name: str) -> Path:
     """The keys and indices of a dotted name."""
-    if not re.fullmatch(r"[a-z_]+((\.[a-z_]+)|(\[\d{1,6}\]))*", name):
+    if not re.fullmatch(r"[a-z_]+((\.[a-z_]+)|(\[(0|[1-9][0-9]{0,5})\]))*", name):
         raise NoSuchField(f"{name!r} is no field; write it as floor.restitution or start.position[1].")
-    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[a-z_]+|\d+", name))
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[a-z_]+|[0-9]+", name))
 
 
 def content_of(scene: Scenario) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pydantic_core import to_json
 from comparisons.engines.base import Engine
 from comparisons.sweeps.axes import Axis, Drawn
 from comparisons.sweeps.fields import content_of, path_of, put
-from scenarios import Scenario
+from scenarios import DropspinError, Scenario
 
 OPTION = "engine."
 KEY_DIGITS = 20  # of a billion jobs two share one with a chance of one in a million
@@ -69,6 +69,7 @@ class Jobs:
     def hashes(self) -> list[str]:
         """A short hash of what moves each body and how it is run, whatever other jobs there are."""
         content = content_of(self.scene)
+        content.pop("ensemble" if self.seeds is None else "", None)  # which moves nothing then
         for place, name in enumerate(self.fields):
             put(content, path_of(name), f"<{place}>")
         template = to_json(content)
@@ -117,11 +118,6 @@ class Sweep:
         """How many jobs there are."""
         return math.prod(self.shape)
 
-    @property
-    def columns(self) -> list[str]:
-        """The names of what is set for each job, beside scene, engine, step and start."""
-        return [axis.name for axis in self.axes if axis.name != "dt"]
-
     def jobs(self, first: int, last: int) -> list[Jobs]:
         """The jobs from number `first` up to, not including, `last`; those of one scene and engine together, in order."""
         numbers = np.arange(first, last)
@@ -150,7 +146,11 @@ def configured(engine: Engine, options: Iterable[tuple[str, Any]]) -> Engine:
     Raises:
         DropspinError: There is no such option, or no such value of it.
     """
-    chosen = {name.removeprefix(OPTION): value if isinstance(value, str) else repr(float(value)) for name, value in options}
+    chosen = {}
+    for name, value in options:
+        if not isinstance(value, str | float):
+            raise DropspinError(f"got {value!r}; an option is a word or a number.")
+        chosen[name.removeprefix(OPTION)] = value if isinstance(value, str) else repr(float(value))
     return type(engine)({**engine.options, **chosen}) if chosen else engine
 
 

@@ -6,6 +6,7 @@ On a disk a part gets its name when it is complete; an object store takes it who
 import io
 import json
 import os
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -89,14 +90,23 @@ class Folder:
         """Whether a part is there."""
         return bool(self._files.exists(f"{self._root}/{self._name(number, first, last)}"))
 
+    def groups(self) -> list[int]:
+        """The groups of which there is any part, in order."""
+        try:
+            found = self._files.ls(f"{self._root}/parts", detail=False, refresh=True)
+        except FileNotFoundError:
+            return []
+        return sorted(int(name) for name in map(os.path.basename, found) if name.isdecimal())
+
     def listed(self, group: int) -> dict[int, str]:
         """The parts of a group that are there, by their first jobs, in order; group k holds the parts from 1000 k on."""
         try:
             found = self._files.ls(f"{self._root}/{self._group(group)}", detail=False, refresh=True)
         except FileNotFoundError:
             return {}
-        named = sorted((os.path.basename(path), path) for path in found if path.endswith(f"-{self._identity}.parquet"))
-        return {int(name.split("-")[0]): path for name, path in named if not name.startswith(".")}
+        ours = re.compile(rf"(\d{{16}})-\d{{16}}-{self._identity}\.parquet")
+        firsts = {int(match[1]): path for path in found if (match := ours.fullmatch(os.path.basename(path)))}
+        return dict(sorted(firsts.items()))
 
     @property
     def address(self) -> str:

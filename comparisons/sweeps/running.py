@@ -10,7 +10,7 @@ from comparisons.isolation import Limits
 from comparisons.sweeps.cluster import connected, run_on_cluster
 from comparisons.sweeps.jobs import Sweep
 from comparisons.sweeps.local import run_here
-from comparisons.sweeps.parts import TOGETHER, Folder
+from comparisons.sweeps.parts import Folder
 from comparisons.sweeps.work import Work
 from scenarios import DropspinError
 
@@ -42,7 +42,7 @@ def run_sweep(
     earlier = folder.about()
     if earlier is not None:
         _assert_the_same(where, earlier, work)
-        kept = work.kept(folder)
+        kept = count(where)
         if not resume:
             raise DropspinError(
                 f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; --resume goes on, or choose another folder with -o."
@@ -87,7 +87,7 @@ def _parts(where: str) -> Iterator[tuple[int, str]]:
     if about is None:
         raise DropspinError(f"{where}: no sweep is there; give the folder that dropspin sweep -o wrote.")
     folder, size = Folder(where, about["identity"]), about["part_size"]
-    for group in range(-(-about["jobs"] // (size * TOGETHER))):
+    for group in folder.groups():
         for first, path in folder.listed(group).items():
             yield min(size, about["jobs"] - first), path
 

@@ -1,5 +1,6 @@
 """The spec of a sweep: a TOML file, checked before anything runs."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
@@ -18,7 +19,8 @@ from scenarios.body import Number, Positive
 from scenarios.errors import UnknownName
 from scenarios.loading import read_toml
 
-MOST_JOBS = 10**10
+MOST_JOBS = 10**15
+WHOLE_NUMBERS = frozenset({"ensemble.size", "ensemble.seed"})
 
 
 def _different(values: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -49,6 +51,8 @@ class Range(_Table):
             raise ValueError(f"goes from {self.first:g} to {self.last:g}; it must go up")
         if self.spacing == "log" and self.first <= 0.0:
             raise ValueError(f"goes from {self.first:g}; with spacing 'log' it must start above 0")
+        if not math.isfinite(self.last / self.first if self.spacing == "log" else self.last - self.first):
+            raise ValueError(f"goes from {self.first:g} to {self.last:g}; that is farther than what numbers can hold")
         return self
 
 
@@ -147,10 +151,11 @@ def _flat(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     """Axes by their whole names: TOML reads floor.restitution without quotes as a table in a table."""
     found = {}
     for key, value in table.items():
-        if isinstance(value, Mapping) and not {"from", "to", "count"} & value.keys():
-            found.update(_flat(value, f"{before}{key}."))
-        else:
-            found[f"{before}{key}"] = value
+        is_table = isinstance(value, Mapping) and not {"from", "to", "count"} & value.keys()
+        for name, given in (_flat(value, f"{before}{key}.") if is_table else {f"{before}{key}": value}).items():
+            if name in found:
+                raise DropspinError(f"{name}: is given twice; give it once.")
+            found[name] = given
     return found
 
 
@@ -162,12 +167,29 @@ def _grid(where: str, table: Mapping[str, Any]) -> list[Axis]:
             span = _validated(CountedRange, here, given)
             axes.append(Spaced(name, span.first, span.last, span.count, span.spacing))
         elif isinstance(given, list) and given:
-            axes.append(Listed(name, tuple(given)))
-            if len({repr(value) for value in given}) < len(given):
+            values = tuple(_canonical(here, name, value) for value in given)
+            axes.append(Listed(name, values))
+            if len({repr(value) for value in values}) < len(values):
                 raise DropspinError(f"{here}: names a value twice; name each once.")
         else:
             raise DropspinError(f"{here}: got {given!r}; must be a list of values, or {{from, to, count}}.")
     return axes
+
+
+def _canonical(here: str, name: str, value: Any) -> Any:
+    """One way to write each value, so that equal jobs have equal keys: numbers as floats, no friction as a word."""
+    if isinstance(value, list):
+        return [_canonical(here, name, part) for part in value]
+    if type(value) is int and name not in WHOLE_NUMBERS:
+        try:
+            value = float(value)
+        except OverflowError:
+            raise DropspinError(f"{here}: got a whole number of {len(str(value))} digits; that is beyond what numbers can hold.") from None
+    if not isinstance(value, int | float | str):
+        raise DropspinError(f"{here}: got {value!r}; a value is a number, a word, or a list of them.")
+    if value == 0.0 and type(value) is float:
+        return "none" if name == "floor.friction" else 0.0
+    return value
 
 
 def _random(where: str, table: Mapping[str, Any]) -> list[Axis]:
@@ -225,12 +247,16 @@ def _assert_sound(where: str, sweep: Sweep) -> None:
 
 def _assert_allowed(sweep: Sweep, axis: Axis, value: Any) -> None:
     if axis.name == "dt":
-        if type(value) not in (int, float) or not value > 0.0:
+        if type(value) is not float or not 0.0 < value < math.inf:
             raise DropspinError(f"got {value!r}; a time step is a number above 0, in s.")
     elif axis.name.startswith(OPTION):
         for chosen in sweep.engines:
+            if axis.name.removeprefix(OPTION) in chosen.options:
+                raise DropspinError(f"{chosen.label} has this option set already; leave it out there, or here.")
             configured(chosen, [(axis.name, value)])
     else:
+        if axis.name.startswith("ensemble") and sweep.seeds is None:
+            raise DropspinError("an ensemble's spread counts with seeds only, which say how many of its starts are run.")
         for scene in sweep.scenes:
             assert_has(scene, axis.name)
             _assert_some_scene(sweep, scene, axis, value)

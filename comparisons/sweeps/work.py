@@ -105,10 +105,6 @@ class Work:
             if part.first not in present:
                 yield part
 
-    def kept(self, folder: Folder) -> int:
-        """How many jobs a folder has already."""
-        return self.sweep.size - sum(part.last - part.first for part in self.missing(folder))
-
     def table(self, part: Part, cells: Cells, go_on: Callable[[], None] = lambda: None) -> pa.Table:
         """Do a part.
 

@@ -44,10 +44,9 @@ def sweep(spec: str, output: str, resume: bool, scheduler: str | None, time_limi
 
             run_sweep(asked, output, resume=resume, scheduler=scheduler, limits=Limits(processor_time=time_limit), told=told)
         stop_if_interrupted()
+        found = tallies(output)
     except KeyboardInterrupt:
-        kept = count(output)
-        raise KeyboardInterrupt(f"{kept:,} of {asked.size:,} jobs are kept, --resume goes on" if kept else "nothing was written") from None
-    found = tallies(output)
+        raise KeyboardInterrupt(f"{count(output):,} of {asked.size:,} jobs are kept, --resume goes on") from None
     if json_output:
         click.echo(json.dumps(summary_rows(found), indent=1, ensure_ascii=False))
     else:

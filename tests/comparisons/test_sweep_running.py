@@ -9,6 +9,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import fsspec
 import numpy as np
@@ -88,6 +89,36 @@ def test_an_engine_that_breaks_costs_its_own_rows(tmp_path):
     run_sweep(sweep, str(tmp_path / "document"))
     document = found[found["engine"] == "document"].reset_index(drop=True)
     pd.testing.assert_frame_equal(document, table(tmp_path / "document"), check_exact=True)
+
+
+class Leaking(made.Exact):
+    """Keeps 50 MB of each job."""
+
+    name = "leaking"
+    kept: ClassVar = []
+
+    def prepare(self, scene, dt):
+        self.kept.append(np.ones(6_250_000))
+        return super().prepare(scene, dt)
+
+
+def test_a_leak_costs_no_job(tmp_path):
+    """None of them breaks in a process of its own, so none is said to."""
+    asked = replace(load_sweep(SPEC | {"grid": {"floor.restitution": {"from": 0.1, "to": 0.9, "count": 60}}}), engines=(Leaking(),))
+    run_sweep(asked, str(tmp_path / "s"), limits=Limits(processor_time=20.0, memory=2**30))
+    assert set(read(str(tmp_path / "s"))["verdict"]) == {"measured"}
+
+
+def test_what_is_left_of_a_kill_is_no_obstacle(tmp_path):
+    """A sweep that was killed before it could say what it is; a part that is torn says so."""
+    asked, where = load_sweep(SPEC), tmp_path / "s"
+    where.mkdir()
+    (where / ".unfinished-123-sweep.json").touch()
+    run_sweep(asked, str(where), resume=True)
+    [part] = where.rglob("*.parquet")
+    part.write_bytes(part.read_bytes()[:500])
+    with pytest.raises(DropspinError, match="is no whole part of a sweep; delete it"):
+        read(str(where))
 
 
 def test_the_table_is_one_row_a_job(tmp_path):

@@ -57,6 +57,13 @@ def test_rates_and_heights():
     assert not np.isclose(states[:, 3:7], [member.initial_state[3:7] for member in other]).all(axis=1).any()
 
 
+@pytest.mark.parametrize("largest", [1e-9, 1e-7, 1e-3, 0.099, 0.101])
+def test_small_turns_are_drawn_evenly_too(largest):
+    """Where 1 - cos θ is θ²/2 the angle is the largest times the cube root of an even draw: so its cubes are even."""
+    shares = (np.linalg.norm(turned(scene_with(size=2000, turn=largest)), axis=1) / largest) ** 3
+    assert stats.kstest(shares, "uniform").pvalue > 0.01
+
+
 def test_no_turn():
     """A largest angle of 0 leaves the attitude as it was."""
     scene = scene_with(size=10, turn=0.0)

@@ -13,7 +13,7 @@ from comparisons.extremes import Explored, Extremes, Point, Surprise, surprises
 from scenarios import DropspinError
 
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "across", "across_value", "condition", "criterion", "figure", "said")
-AS_SURPRISING = 12
+AS_SURPRISING = 16
 """Sentences on a terminal; all are in the file."""
 
 

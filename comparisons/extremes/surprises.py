@@ -52,8 +52,8 @@ def surprises(explored: Sequence[Explored]) -> list[Surprise]:
             elif one.engine not in twin.engines:
                 found[found.index(twin)] = replace(twin, engines=(*twin.engines, one.engine))
     ranked = sorted(found, key=_rank)
-    kinds = [(surprise.outside.finding.criterion, surprise.sudden, surprise.engines[0]) for surprise in ranked]
-    # The first of each kind first: the same fault shows along several axes of several scenes.
+    # The first of each kind first: the same fault shows along several axes of a scene.
+    kinds = [(one.outside.finding.criterion, one.sudden, one.engines[0], one.explored.scene.name) for one in ranked]
     return [ranked[number] for number in sorted(range(len(ranked)), key=lambda number: kinds.index(kinds[number]) < number)]
 
 

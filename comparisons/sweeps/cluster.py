@@ -19,7 +19,7 @@ from scenarios import DropspinError
 
 AHEAD = 2  # parts for each thread of a worker: the next is there when one is done
 TRIES = 20  # with so many workers lost over one part it is the part
-PATIENCE = 30.0  # s, for a scheduler to answer
+PATIENCE, PATIENCE_FOR_WORKERS = 30.0, 120.0  # s, for a scheduler to answer, and for the first of its workers
 TICK = 0.5  # s
 
 
@@ -44,6 +44,11 @@ def connected(scheduler: str) -> Iterator[Any]:
     except (OSError, ValueError) as error:
         raise DropspinError(f"--scheduler {scheduler}: no scheduler answers ({error}); start one with: dask scheduler.") from None
     with client, client.as_current():
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE_FOR_WORKERS)
+        except TimeoutError:
+            said = f"has had no worker for {PATIENCE_FOR_WORKERS:g} s; start one with: dask worker {scheduler}"
+            raise DropspinError(f"--scheduler {scheduler}: {said}.") from None
         try:
             yield client
         finally:

@@ -104,3 +104,31 @@ def test_a_worker_of_other_versions_declines(tmp_path):
     other = replace(work, versions=work.versions | {"mujoco": "3.1"})
     with pytest.raises(DropspinError, match=r"a worker has mujoco \d.*, here it is 3.1; install the same on both"):
         cluster._do(other, next(other.parts), str(tmp_path))
+
+
+@pytest.mark.parametrize("workers", [(0, "free")], indirect=True)
+def test_a_scheduler_without_workers(workers, tmp_path, monkeypatch):
+    """Says so, after a while, and makes nothing."""
+    monkeypatch.setattr(cluster, "PATIENCE_FOR_WORKERS", 0.5)
+    with pytest.raises(DropspinError, match=r"has had no worker for 0.5 s; start one with: dask worker tcp://"):
+        run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler=workers[0])
+    assert not (tmp_path / "out").exists()
+
+
+def test_engines_of_one_sweep_are_none_of_the_next(tmp_path, monkeypatch):
+    """A worker that has served another sweep, or other limits, ends that one's engines first."""
+    from comparisons.isolation import Limits
+    from comparisons.sweeps.work import Work
+
+    monkeypatch.setattr(cluster, "_go_on_unless_closing", lambda: None)
+    used = []
+    for seconds in (5.0, 6.0):
+        work = Work.of(load_sweep(SPEC | {"engines": ["document"]}), Limits(processor_time=seconds))
+        cluster._do(work, next(work.parts), str(tmp_path / str(seconds)))
+        [(stamp, [cells])] = cluster._idle.items()
+        used.append(cells)
+        assert stamp == (work.identity, work.limits)
+    assert used[0] is not used[1]
+    assert used[0]._closed
+    cluster._leave()
+    assert used[1]._closed

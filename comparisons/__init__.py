@@ -6,6 +6,9 @@ from comparisons.ensembles import ENSEMBLE_METRICS
 from comparisons.extremes import limits
 from comparisons.isolation import Limits
 from comparisons.metrics import METRICS
+from comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
+from comparisons.regressions.checking import check
+from comparisons.regressions.comparing import compare
 from comparisons.results import Results
 from comparisons.run import DEFAULT_DTS, measure, run
 from comparisons.simulating import simulate
@@ -16,6 +19,7 @@ __all__ = [
     "ENSEMBLE_METRICS",
     "METRICS",
     "AsBuilt",
+    "Baseline",
     "Diverged",
     "Engine",
     "EngineMissing",
@@ -23,11 +27,16 @@ __all__ = [
     "Limits",
     "Results",
     "Simulation",
+    "accept",
+    "check",
+    "compare",
     "engine",
     "engine_names",
     "limits",
+    "load_baseline",
     "measure",
     "run",
     "simulate",
     "tradeoff",
+    "write_baseline",
 ]

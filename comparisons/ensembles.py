@@ -16,6 +16,7 @@ from comparisons.building import assert_starts_as_meant, sound_record
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Diverged, Engine
 from comparisons.metrics import last_time_in_motion
+from comparisons.tolerances import OF_TWO_DRAWS
 from scenarios import Scenario, Trajectory, members
 from scenarios.mechanics import angular_momentum, energy
 
@@ -116,10 +117,12 @@ def _energy_scale(case: Comparison) -> float:
 def ensemble_rows(scene: Scenario, label: str, dt: float, outcome: Outcome) -> list[Row]:
     """Each mean over an engine's ensemble, between the ends of its confidence interval."""
     shared: Row = {"scene": scene.name, "engine": label, "dt": dt, "steps": scene.steps(dt), "kind": "ensemble"}
-    return [
-        shared | {"metric": name, "unit": metric.unit, "verdict": "measured", "cause": "chaotic"} | _mean(metric.of_each(outcome))
-        for name, metric in ENSEMBLE_METRICS.items()
-    ]
+    rows = []
+    for name, metric in ENSEMBLE_METRICS.items():
+        mean = _mean(metric.of_each(outcome))
+        draws = {"tolerance": OF_TWO_DRAWS * (mean["upper"] - mean["value"])}
+        rows.append(shared | {"metric": name, "unit": metric.unit, "verdict": "measured", "cause": "chaotic"} | mean | draws)
+    return rows
 
 
 def difference_rows(scene: Scenario, dt: float, labels: tuple[str, str], outcomes: tuple[Outcome, Outcome]) -> list[Row]:

@@ -67,17 +67,23 @@ class Metric:
         resolutions[later:] = phases[:, later:].std(axis=0)
         if len(cases) == 1 and cases[0].has_impact_to_come:
             resolutions = np.abs(phases[0])  # one start may be luck altogether
-        return Average(phases.mean(axis=0), resolutions)
+        return Average(phases.mean(axis=0), resolutions, np.ptp(phases, axis=0) / len(phases))
 
 
 class Average(NamedTuple):
-    """A metric's means over start phases and how finely these phases resolve them.
+    """A metric's means over start phases, how finely these phases resolve them, and what one phase may make of them.
 
     One for each flight, shape (flights,), or for each flight the largest and the least, shape (flights, 2).
     """
 
     parts: Array
     resolutions: Array
+    jumps: Array
+
+    @property
+    def jump(self) -> float:
+        """How far the value moves at most, if one of the starts falls into the neighbouring step; 0 of one start, which tells nothing."""
+        return float(np.max(np.abs(self.parts) + self.jumps)) - abs(self.value)
 
     @property
     def value(self) -> float:

@@ -1,6 +1,7 @@
 """Where figures come from: versions, machine, commit, time."""
 
 import hashlib
+import inspect
 import json
 import os
 import platform
@@ -11,7 +12,10 @@ from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from typing import Any
 
-STAMPED = ("dropspin", "numpy", "numba", "scipy", "mujoco", "pybullet", "rapier3d", "dartpy", "drake")
+MEASURING = ("dropspin", "numpy", "numba", "scipy")
+STAMPED = (*MEASURING, "mujoco", "pybullet", "rapier3d", "dartpy", "drake")
+PACKAGES = tuple(Path(__file__).parents[1] / package for package in ("scenarios", "reference_impl", "comparisons"))
+"""What makes figures; the reports only show them."""
 
 
 def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -26,12 +30,26 @@ def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:
         "cpu": processor(),
         "cores": os.cpu_count(),
         "commit": _commit(),
+        "code": code(*PACKAGES),
     }
 
 
 def versions() -> dict[str, str | None]:
     """Installed versions of what the figures depend on; None where a package is missing."""
     return {package: _version(package) for package in STAMPED}
+
+
+def versions_behind(stamp: Mapping[str, Any]) -> dict[str, str]:
+    """What a run's figures depend on, from its provenance: versions of what measured them, and of its engines, as these tell."""
+    engines = {label.split("[")[0]: settings.get("version") for label, settings in first_settings(stamp).items()}
+    engines.pop("document", None)  # dropspin's own
+    packages = {package: stamp["versions"][package] for package in MEASURING}
+    return {name: str(found) for name, found in (packages | engines | {"python": stamp["python"]}).items() if found}
+
+
+def first_settings(stamp: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Each engine's settings in the first scene that it ran."""
+    return {label: next(iter(stamped.values())) for label, stamped in stamp["settings"].items() if stamped}
 
 
 def processor() -> str:
@@ -59,6 +77,23 @@ def _wheel(package: str) -> str | None:
         return None
     tags = [line.removeprefix("Tag: ") for line in told.splitlines() if line.startswith("Tag: ")]
     return ", ".join(tags) or None
+
+
+def code(*places: Path) -> str:
+    """A short hash of the Python files at some places, so that a change is noticed that no version tells."""
+    files = sorted(file for place in places for file in (place.rglob("*.py") if place.is_dir() else [place]))
+    found = hashlib.sha256()
+    for file in files:
+        found.update(file.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def adapter_code(engine: object) -> str | None:
+    """The hash of the file that an engine's adapter is in; None of one that is in no file."""
+    try:
+        return code(Path(inspect.getfile(type(engine))))
+    except (OSError, TypeError):
+        return None
 
 
 def digest(settings: Mapping[str, Any]) -> str:

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from comparisons.ensembles import Outcome
 from comparisons.provenance import digest
@@ -45,6 +47,8 @@ class Results:
         trajectories: By (scene, engine, dt): the scene as written, every step.
         ensembles: By (scene, engine, dt): what became of each start, where the scene has an ensemble.
         provenance: What was asked, versions, machine, settings per engine and scene.
+        tolerances: For each row of the frame, how far its value may move before that says something (`comparisons.tolerances`), in the
+            row's unit, shape (rows,); NaN where it is no figure to hold another against.
     """
 
     frame: pd.DataFrame
@@ -53,6 +57,7 @@ class Results:
     trajectories: Mapping[TrajectoryKey, Trajectory]
     ensembles: Mapping[TrajectoryKey, Outcome] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    tolerances: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     @property
     def measurements(self) -> pd.DataFrame:
@@ -86,6 +91,7 @@ def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
         dict(item for part in parts for item in part.trajectories.items()),
         dict(item for part in parts for item in part.ensembles.items()),
         {**provenance, "settings": settings, "settings_digests": digests},
+        np.concatenate([part.tolerances for part in parts]),
     )
 
 

@@ -15,10 +15,11 @@ from comparisons.isolation import Cells, Limits
 from comparisons.metrics import Average, Metric, metrics_for
 from comparisons.phases import Phase, start_phases
 from comparisons.predictions import prediction_rows
-from comparisons.provenance import provenance
+from comparisons.provenance import adapter_code, provenance
 from comparisons.results import Results, TrajectoryKey, as_frame, joined
 from comparisons.simulating import Attempt, Contestant, assert_step_fits, contestant_named
 from comparisons.studies import Claim, blame_settings, study_rows
+from comparisons.tolerances import ONE_DRAW, tolerance
 from comparisons.verdicts import assert_expectations_can_be_judged, excused, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
@@ -58,6 +59,7 @@ def run(
     if len(set(labels)) < len(labels):
         raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
     stamp = provenance({"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)})
+    stamp["adapters"] = {contestant.label: adapter_code(contestant.engine) for contestant in contestants if contestant.engine is not None}
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if _is_the_same(part.provenance, stamp)}
     parts = []
     with Cells(limits) as cells:
@@ -73,9 +75,9 @@ def run(
 
 
 def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
-    """Whether two runs had the same engines, steps, versions and machine."""
+    """Whether two runs had the same engines, steps, versions, code and machine."""
     asked = all(earlier["asked"][what] == stamp["asked"][what] for what in ("engines", "dts"))
-    return asked and all(earlier[what] == stamp[what] for what in ("versions", "python", "cpu"))
+    return asked and all(earlier.get(what) == stamp[what] for what in ("versions", "python", "cpu", "code", "adapters"))
 
 
 def _run_scene(
@@ -102,7 +104,7 @@ def _run_scene(
                 trajectories[scene.name, contestant.label, dt] = attempt.motion
                 settings.setdefault(contestant.label, {})[f"{scene.name} dt={dt:g}"] = attempt.settings
                 earlier = claims[contestant.label].limits if contestant.label in claims else ()
-                claims[contestant.label] = Claim(contestant.label, attempt.order, contestant.engine.precision, (*earlier, *attempt.limits))
+                claims[contestant.label] = Claim(contestant.label, attempt.order, attempt.precision, (*earlier, *attempt.limits))
             if attempt.outcome is not None:
                 ensembles[scene.name, contestant.label, dt] = attempt.outcome
                 rows += ensemble_rows(scene, contestant.label, dt, attempt.outcome)
@@ -117,7 +119,8 @@ def _run_scene(
         if twin in studies:
             blame_settings(own, studies[twin])
         rows += own
-    return Results(as_frame(rows), {scene.name: scene}, labels, trajectories, ensembles, {**stamp, "settings": settings})
+    moves = np.array([row.get("tolerance", np.nan) for row in rows], dtype=float)
+    return Results(as_frame(rows), {scene.name: scene}, labels, trajectories, ensembles, {**stamp, "settings": settings}, moves)
 
 
 def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:
@@ -141,12 +144,17 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
     beside = zip(phases, attempt.phases, exact, strict=True)
     cases = [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in beside]
     attempt.cases = cases
+    nudged = None if attempt.nudged is None else Comparison.with_truth(scene, attempt.nudged, truth, exact[0])
     rows = [shared | {"verdict": "limited", "reason": limit.said} for limit in attempt.limits]
     for metric in metrics_for(scene, truth):
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}
         if metric.kind == "truth" and truth is not None:
             row["truth"] = truth.name
-        rows.append(row | excused({"metric": metric.name} | _measured(scene, dt, attempt.label, metric, cases), attempt.limits))
+        measured = _measured(scene, dt, attempt.label, metric, cases)
+        average = measured["average"]
+        luck = average.jump if nudged is None else ONE_DRAW * abs(_value_or_nan(metric, nudged) - average.value)
+        measured["tolerance"] = tolerance(scene, metric.unit, attempt.precision, steps, luck)
+        rows.append(row | excused({"metric": metric.name} | measured, attempt.limits))
     if truth is None:
         rows.append(shared | {"verdict": "no_truth", "reason": "no closed form is known for this scene"})
     return rows
@@ -159,7 +167,7 @@ def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: lis
             average = metric.average(cases)
         unresolved = ""
     except Unresolved as error:
-        average, unresolved = Average(np.array([np.nan]), np.array([np.nan])), str(error)
+        average, unresolved = Average(*[np.array([np.nan])] * 3), str(error)
     value = average.value
     judgement = judge(scene, label, dt, metric, value)
     reason = "; ".join(filter(None, [unresolved, judgement.reason]))

@@ -14,6 +14,7 @@ from comparisons.engines.base import Diverged, Engine, EngineMissing, Limit
 from comparisons.engines.registry import engine as engine_named
 from comparisons.ensembles import Outcome, outcome_of
 from comparisons.predictions import predicted_errors
+from comparisons.tolerances import nudged
 from scenarios import DropspinError, Scenario, Trajectory
 
 TIMED_REPEATS = 3
@@ -78,8 +79,9 @@ class Contestant:
 
 @dataclass
 class Attempt:
-    """What came of one engine on one scene at one step; of what it claims, its discretisation, order and errors by metric.
+    """What came of one engine on one scene at one step; of what it claims, its discretisation, order, precision and errors by metric.
 
+    `nudged` is its motion from a start that a few ulp tell from the scene's, where there is one start only: what rounding may come to.
     `cases` are its motions from each start beside the truth, which whoever judges them puts there.
     """
 
@@ -88,6 +90,7 @@ class Attempt:
     reason: str = ""
     motion: Trajectory | None = None
     phases: list[Trajectory] = field(default_factory=list)
+    nudged: Trajectory | None = None
     cases: list[Comparison] = field(default_factory=list)
     limits: Sequence[Limit] = ()
     settings: dict[str, Any] = field(default_factory=dict)
@@ -95,6 +98,7 @@ class Attempt:
     outcome: Outcome | None = None
     discretisation: str | None = None
     order: float | None = None
+    precision: type = np.float64
     predicted: dict[str, float] = field(default_factory=dict)
 
 
@@ -125,9 +129,12 @@ def attempt_by(contestant: Contestant, scene: Scenario, dt: float, starts: Seque
         if refusal is not None:
             attempt.verdict, attempt.reason = "declined", refusal
             return attempt
-        attempt.discretisation, attempt.order = engine.discretisation(scene), engine.order_in(scene)
+        attempt.discretisation, attempt.order, attempt.precision = engine.discretisation(scene), engine.order_in(scene), engine.precision
         attempt.motion, attempt.limits = _motion(scene, engine, dt)
-        attempt.phases = [attempt.motion] if len(starts) == 1 else [_motion(start, engine, dt)[0] for start in starts]
+        if len(starts) == 1:
+            attempt.phases, attempt.nudged = [attempt.motion], _motion(nudged(scene), engine, dt)[0]
+        else:
+            attempt.phases = [_motion(start, engine, dt)[0] for start in starts]
         attempt.outcome = None if scene.ensemble is None else outcome_of(engine, scene, dt)
         # What is predicted of a bounce is a mean over start phases.
         attempt.predicted = predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}

@@ -1,4 +1,4 @@
-"""A run as a folder: `run.json`, `results.parquet`, `trajectories/*.npz`, `ensembles/*.npz`."""
+"""A run as a folder: `run.json`, `results.parquet`, `tolerances.parquet` (row by row), `trajectories/*.npz`, `ensembles/*.npz`."""
 
 import json
 import re
@@ -29,15 +29,21 @@ def save(results: Results, folder: Path) -> None:
         "engines": results.engines,
         "scenes": scenes,
         "digests": digests,
+        "origins": {name: scene.origin for name, scene in results.scenes.items()},
         "trajectories": trajectories,
         "ensembles": ensembles,
     }
     (folder / "run.json").write_text(json.dumps(content, indent=1, default=str), encoding="utf-8")
     results.frame.to_parquet(folder / "results.parquet", index=False)
+    pd.DataFrame({"tolerance": results.tolerances}).to_parquet(folder / "tolerances.parquet", index=False)
 
 
-def restore(folder: Path) -> Results:
+def restore(folder: Path, *, arrays: bool = True) -> Results:
     """Read a run's data back.
+
+    Args:
+        folder: Of the run.
+        arrays: Whether trajectories and ensembles are wanted too; figures alone are read much faster.
 
     Raises:
         DropspinError: The folder holds no run.
@@ -45,15 +51,20 @@ def restore(folder: Path) -> Results:
     try:
         content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         frame = pd.read_parquet(folder / "results.parquet").astype(COLUMNS)
+        tolerances = pd.read_parquet(folder / "tolerances.parquet")["tolerance"].to_numpy()
     except (OSError, json.JSONDecodeError) as error:
         raise DropspinError(f"{folder}: not the folder of a run ({error}); give the folder that dropspin run -o wrote.") from None
+    files = {kind: content[kind] if arrays else {} for kind in ("trajectories", "ensembles")}
     trajectories = {
-        key: Trajectory(**arrays | {"velocity_lag": float(arrays["velocity_lag"])})
-        for key, arrays in _restored_arrays(folder, content["trajectories"], ARRAYS)
+        key: Trajectory(**found | {"velocity_lag": float(found["velocity_lag"])})
+        for key, found in _restored_arrays(folder, files["trajectories"], ARRAYS)
     }
-    ensembles = {key: Outcome(**arrays) for key, arrays in _restored_arrays(folder, content["ensembles"], OUTCOME)}
-    scenes = {name: load({"name": name, **scene}) for name, scene in content["scenes"].items()}
-    return Results(frame, scenes, tuple(content["engines"]), trajectories, ensembles, content["provenance"])
+    ensembles = {key: Outcome(**found) for key, found in _restored_arrays(folder, files["ensembles"], OUTCOME)}
+    scenes = {
+        name: load({"name": name, **scene}).model_copy(update={"origin": content["origins"][name]})
+        for name, scene in content["scenes"].items()
+    }
+    return Results(frame, scenes, tuple(content["engines"]), trajectories, ensembles, content["provenance"], tolerances)
 
 
 def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], names: Sequence[str]) -> dict[str, dict[str, Any]]:

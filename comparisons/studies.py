@@ -5,7 +5,8 @@ below the one it claims. A fault that is known, and expected of this engine by n
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from comparisons.convergence import Convergence, says_something, take_apart
 from comparisons.engines.base import Limit
 from comparisons.metrics import METRICS, Average
+from comparisons.tolerances import rounding
 from comparisons.verdicts import Verdict, excused, known_fault
 from scenarios import Scenario
 
@@ -24,9 +26,6 @@ ARTEFACTS = frozenset({"energy_error_raw"})
 """Metrics that show how a state is sampled rather than how wrong it is."""
 JUMPING = frozenset({"out_of_step"})
 """Metrics that go from flight to flight."""
-NEGLIGIBLE = 3e-8
-"""Errors as small as this, of the metric's own scale, are put down to rounding and to the residues of iterative solvers."""
-ULPS_A_STEP = 16.0
 SHORT_OF_ORDER = 0.25
 """How far three steps may find an order below the one claimed."""
 LOST = 0.9 * math.pi
@@ -54,12 +53,17 @@ def study_rows(scene: Scenario, claim: Claim, rows: Sequence[Row]) -> list[Row]:
         return studies
     for metric in _metrics(rows):
         measured = [row for row in rows if row.get("metric") == metric]
-        dts, errors, resolutions, rounding = _series(scene, claim, metric, measured)
-        found = take_apart(dts, errors, resolutions, rounding, claim.order, signed=METRICS[metric].signed, jumps=metric in JUMPING)
+        dts, errors, resolutions, rounded = _series(scene, claim, metric, measured)
+        apart = partial(take_apart, claimed=claim.order, signed=METRICS[metric].signed, jumps=metric in JUMPING)
+        found = apart(dts, errors, resolutions, rounded)
         for row in measured:
             row["cause"] = row["cause"] or found.cause
         shared: Row = {name: measured[0][name] for name in ("scene", "engine", "metric", "unit", "truth") if name in measured[0]}
+        tolerances = np.array([row["tolerance"] for row in measured])
+        moves = _moves(found, lambda moved: apart(dts, moved, resolutions, rounded), errors, tolerances)  # noqa: B023 - called here
         judged = _order_row(scene, claim, shared, found) + _limit_row(scene, claim, shared, found, [row["dt"] for row in measured])
+        for row in judged:
+            row["tolerance"] = moves[row["kind"]]
         studies += [excused(row, claim.limits) if row["kind"] == "model_error" else row for row in judged]
     return studies
 
@@ -94,23 +98,25 @@ def _series(scene: Scenario, claim: Claim, metric: str, measured: Sequence[Row])
     finest = averages[int(np.argmin(dts))].parts[: shape[0]]
     worst = np.unravel_index(np.argmax(np.abs(finest)), finest.shape)
     errors, resolutions = (
-        np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both]) for both in zip(*averages, strict=True)
+        np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both])
+        for both in zip(*(average[:2] for average in averages), strict=True)
     )
-    scale = _scale(scene, METRICS[metric].unit)
-    rounding = scale * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(claim.precision).eps) * steps)
+    rounded = np.asarray(rounding(scene, METRICS[metric].unit, claim.precision, steps))
     if METRICS[metric].unit == "rad":
         errors[np.abs(errors) > LOST] = math.nan
     if metric == "position_error" and scene.starts_above_floor:
         errors[np.abs(errors) > OUT_OF_STEP * scene.clearance] = math.nan
-    return dts, errors, resolutions, rounding
+    return dts, errors, resolutions, rounded
 
 
-def _scale(scene: Scenario, unit: str) -> float:
-    """What rounding is relative to: the scene's own lengths, speeds and duration; 1 for ratios and angles."""
-    length = scene.body.size + float(np.linalg.norm(scene.start.position))
-    if unit == "m/s":
-        return math.sqrt(float(np.linalg.norm(scene.acceleration)) * length) + float(np.linalg.norm(scene.start.velocity))
-    return {"m": length, "1/s": 1.0 / scene.duration}.get(unit, 1.0)
+def _moves(found: Convergence, again: Callable[[Array], Convergence], errors: Array, tolerances: Array) -> dict[str, float]:
+    """How far order and limit move when each error does by its tolerance; NaN if they cannot be told then."""
+    orders, limits = [], []
+    for nth in np.flatnonzero(np.isfinite(errors)):
+        moved = [again(np.where(np.arange(len(errors)) == nth, errors + sign * tolerances, errors)) for sign in (-1.0, 1.0)]
+        orders.append(np.max(np.abs([one.order - found.order for one in moved])))
+        limits.append(np.max(np.abs([one.limit - found.limit for one in moved])))
+    return {"order": float(np.sum(orders)), "model_error": float(np.maximum(np.sum(limits), found.uncertainty))}
 
 
 def _order_row(scene: Scenario, claim: Claim, shared: Row, found: Convergence) -> list[Row]:

@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 import os
 import sys
 import traceback
@@ -12,12 +11,14 @@ from typing import Literal
 import click
 
 from reports.interrupts import heed_interrupts, stop_if_interrupted
+from reports.verbs.check import accept, check
+from reports.verbs.compare import compare
 from reports.verbs.limits import limits
 from reports.verbs.options import as_json, time_limit_option
+from reports.verbs.run import run
 from reports.verbs.sweep import sweep
 from reports.verbs.tradeoff import tradeoff
 
-CORE_ENGINES = ("document", "mujoco", "pybullet")
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 OWN_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor the user's mistake
 
@@ -66,95 +67,6 @@ def _run() -> int:
 @click.version_option(version("dropspin"), prog_name="dropspin")
 def dropspin() -> None:
     """Drop and spin scenes through rigid-body engines, held against the exact answer."""
-
-
-@dropspin.command()
-@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@click.option(
-    "-e",
-    "--engine",
-    "engines",
-    multiple=True,
-    metavar="ENGINE",
-    help="An engine, such as mujoco[integrator=rk4]; repeat for more.",
-)
-@click.option(
-    "--dt",
-    "dts",
-    multiple=True,
-    type=float,
-    metavar="SECONDS",
-    help="A time step; repeat for more. [default: 0.004, 0.002, 0.001]",
-)
-@click.option(
-    "-o",
-    "--output",
-    default="out/run",
-    show_default=True,
-    metavar="DIR",
-    help="Folder for the report and the data; an earlier run there is replaced.",
-)
-@time_limit_option(300.0, "an engine may take for one scene at one step")
-@click.option("--resume", is_flag=True, help="Go on with a run that was interrupted: measured scenes are not run again.")
-@as_json
-def run(
-    scenes: tuple[str, ...],
-    engines: tuple[str, ...],
-    dts: tuple[float, ...],
-    output: str,
-    time_limit: float,
-    resume: bool,
-    json_output: bool,
-) -> int:
-    """Run scenes through engines, side by side, and write the report.
-
-    SCENE is a name of the catalogue or the path of a TOML file. Without arguments: the core catalogue, three engines, three
-    steps.
-
-    Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
-    """
-    import comparisons
-    import reports
-    import scenarios
-    from reports.folder import Measured, fill, run_folder
-    from reports.terminal import progress_bar, status
-
-    everything = map(scenarios.load, scenarios.names())
-    loaded = [scenarios.load(name) for name in scenes] if scenes else [scene for scene in everything if "core" in scene.tags]
-    chosen = engines or CORE_ENGINES
-    steps = dts or comparisons.DEFAULT_DTS
-    measured = Measured(output)
-    try:
-        with run_folder(output) as folder:
-            if not resume:
-                measured.clear()
-            with progress_bar(len(loaded) * len(chosen) * len(steps)) as progress:
-
-                def told(scene: str, engine: str, dt: float) -> None:
-                    stop_if_interrupted()
-                    progress(scene, engine, dt)
-
-                limits = comparisons.Limits(processor_time=time_limit)
-                results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
-            stop_if_interrupted()
-            if not json_output:
-                reports.print_table(results)
-            with status("writing the report"):
-                fill(results, folder)
-    except KeyboardInterrupt:
-        kept = len(measured)
-        raise KeyboardInterrupt(f"{kept} of {len(loaded)} scenes are kept, --resume goes on" if kept else "nothing was written") from None
-    measured.clear()
-    if json_output:
-        rows = [
-            {key: None if isinstance(value, float) and math.isnan(value) else value for key, value in row.items()}
-            for row in results.frame.to_dict("records")
-        ]
-        click.echo(json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False))
-    else:
-        click.echo(f"Report: {os.path.join(output, 'report.html')}")
-    named = frozenset(name.strip() for name in engines)
-    return results.exit_code(named)
 
 
 @dropspin.command("list")
@@ -265,5 +177,5 @@ def calibrate(
         click.echo(f"To paste, as {name}:\n\n{text}")
 
 
-for verb in (limits, sweep, tradeoff):
+for verb in (accept, check, compare, limits, run, sweep, tradeoff):
     dropspin.add_command(verb)

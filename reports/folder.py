@@ -11,9 +11,13 @@ from pathlib import Path
 from comparisons import Results
 from comparisons.store import restore, save
 from reports.html import FIGURES, html_report, markdown_report, svg_plots
+from reports.junit import junit_xml
 from scenarios import DropspinError
 
-OURS = frozenset({"run.json", "results.parquet", "results.csv", "report.html", "report.md", "plots", "trajectories", "ensembles"})
+OURS = frozenset(
+    {"run.json", "results.parquet", "tolerances.parquet", "results.csv", "report.html", "report.md", "junit.xml", "plots"}
+    | {"trajectories", "ensembles"}
+)
 
 
 def write(results: Results, folder: str | Path) -> Path:
@@ -44,6 +48,7 @@ def fill(results: Results, folder: Path) -> None:
         (folder / "plots" / f"{name}.svg").write_text(text, encoding="utf-8")
     (folder / "report.html").write_text(html_report(results, plots), encoding="utf-8")
     (folder / "report.md").write_text(markdown_report(results), encoding="utf-8")
+    (folder / "junit.xml").write_bytes(junit_xml(results))
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from comparisons import ENSEMBLE_METRICS, METRICS, Results
+from comparisons.provenance import first_settings
 from reports import numbers
 from reports.colours import engine_colours
 from reports.findings import (
@@ -68,7 +69,12 @@ def html_report(results: Results, plots: dict[str, str]) -> str:
 
 def markdown_report(results: Results) -> str:
     """The same in short, for a pull request."""
-    return _environment().get_template("report.md").render(_context(results, {}))
+    return markdown("report.md", **_context(results, {}))
+
+
+def markdown(template: str, **content: Any) -> str:
+    """A Markdown page of ours."""
+    return _environment().get_template(template).render(content)
 
 
 def svg_plots(results: Results) -> Iterator[tuple[str, str]]:
@@ -102,7 +108,7 @@ def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,
         "provenance": results.provenance,
-        "settings": _settings(results),
+        "settings": first_settings(results.provenance),
     }
 
 
@@ -186,9 +192,3 @@ def _ensemble(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
 
 def _row(row: Any) -> dict[str, Any]:
     return {str(key): value for key, value in row._asdict().items()}
-
-
-def _settings(results: Results) -> dict[str, dict[str, Any]]:
-    """Each engine's settings in its first scene, one line each."""
-    stamped = results.provenance.get("settings", {})
-    return {engine: next(iter(scenes.values())) for engine, scenes in stamped.items() if scenes}

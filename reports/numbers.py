@@ -2,6 +2,9 @@
 
 import math
 
+from comparisons.regressions.checking import ACCEPTED
+
+ACCEPTED_KINDS = {said: kind for kind, said in ACCEPTED.items()}
 MARKS = {
     "passed": "✓",
     "failed": "✗",
@@ -45,10 +48,11 @@ def step(dt: float) -> str:
     return "→ 0" if math.isnan(dt) else f"{dt:g}"
 
 
-def subject(metric: str, kind: str) -> str:
-    """What a row is about."""
+def subject(metric: str, kind: str, truth: str = "") -> str:
+    """What a row is about; what one of kind `baseline` is about, stands in its column `truth`."""
     words = metric.replace("_", " ")
-    return {"order": f"order of {words}", "model_error": f"limit of {words}"}.get(kind, words)
+    told = {"order": f"order of {words}", "model_error": f"limit of {words}", "ensemble": f"mean {words}"}
+    return told.get(ACCEPTED_KINDS.get(truth, kind), words)
 
 
 def trend(order: float, limit: float, cause: str) -> str:

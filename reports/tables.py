@@ -1,7 +1,6 @@
 """The run on a terminal: scene by scene, engines side by side."""
 
 import math
-import shlex
 from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
@@ -11,8 +10,9 @@ from rich.text import Text
 
 from comparisons import METRICS, Results
 from comparisons.agreement import NO_EVIDENCE
-from reports.findings import STUDIES, failures, finding_sentences, orders, verdict_sentence
-from reports.numbers import MARKS, bound, step, subject, trend, word, written
+from reports.failing import Failing, failing
+from reports.findings import finding_sentences, orders, verdict_sentence
+from reports.numbers import MARKS, trend, word, written
 
 NUMBER_WIDTH = 9  # as in -1.23e-04: a narrow terminal may fold the names and break the table, never a number
 NAME_WIDTH, GAP = 20, 3
@@ -31,7 +31,8 @@ def print_table(results: Results, console: Console | None = None) -> None:
         _print_ensemble(results, name, out)
         _print_remarks(results, name, out)
         out.print()
-    _print_failures(results, out)
+    found = [one for one in failing(results) if not one.broke_down]
+    print_failing(found, len(found), out)
     for sentence in finding_sentences(results):
         out.print(Text(sentence))
     out.print(Text(verdict_sentence(results), style="bold"))
@@ -103,14 +104,10 @@ def _print_remarks(results: Results, name: str, out: Console) -> None:
         out.print(Text(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))
 
 
-def _print_failures(results: Results, out: Console) -> None:
-    for row in failures(results).to_dict("records"):
-        if row["metric"]:
-            what = subject(row["metric"], row["kind"])
-            told = f"{what} is {written(row['value'])}, expected {bound(row['lower'], row['upper'])}: {row['reason']}"
-            scene = results.scenes[row["scene"]]
-            steps = [row["dt"]] if row["kind"] not in STUDIES else sorted(results.measurements["dt"].unique(), reverse=True)
-            named = [word for dt in steps for word in ("--dt", repr(float(dt)))]
-            again = shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", row["engine"], *named])
-            at = step(row["dt"]) if row["kind"] in STUDIES else f"{step(row['dt'])} s"
-            out.print(Text(f"✗ {row['scene']} · {row['engine']} · {at}: {told}. Again: {again}", style="red"))
+def print_failing(found: Sequence[Failing], at_most: int, console: Console | None = None) -> None:
+    """Print what failed, a line each, with the command that does it again."""
+    out = console or Console()
+    for one in found[:at_most]:
+        out.print(Text(f"✗ {one.sentence}. Again: {one.again}", style="red"))
+    if len(found) > at_most:
+        out.print(Text(f"✗ and {len(found) - at_most} more like these", style="red"))

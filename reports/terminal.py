@@ -1,9 +1,11 @@
 """Tables of words, progress and status on a terminal; plain lines elsewhere."""
 
 import json
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import click
 from rich.box import SIMPLE_HEAD
@@ -11,6 +13,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def print_rows(rows: list[dict[str, str]], json_output: bool) -> None:
@@ -24,6 +29,15 @@ def print_rows(rows: list[dict[str, str]], json_output: bool) -> None:
     for row in rows:
         table.add_row(*(Text(value) for value in row.values()))
     Console().print(table)
+
+
+def json_rows(frame: "pd.DataFrame") -> str:
+    """A table as JSON, to the last digit; what is no finite number is null."""
+    rows = [
+        {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row.items()}
+        for row in frame.to_dict("records")
+    ]
+    return json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False)
 
 
 @contextmanager

@@ -64,22 +64,23 @@ def _find(scene: str | Path) -> Path:
     )
 
 
-def read_toml(path: Path, given: str, what: str = "scene") -> dict[str, Any]:
+def read_toml(path: Path, given: str, what: str = "scene", largest: int = LARGEST_FILE) -> dict[str, Any]:
     """The content of a TOML file.
 
     Args:
         path: The file.
         given: As it was asked for.
         what: The word for what such a file is.
+        largest: How long it may be [bytes].
 
     Raises:
         SceneError: It is no TOML file, or cannot be read.
     """
     try:
         with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-        if len(content) > LARGEST_FILE:
-            raise SceneError(f"{given}: more than {LARGEST_FILE:,} bytes; no {what} is that long.")
+            content = file.read(largest + 1)
+        if len(content) > largest:
+            raise SceneError(f"{given}: more than {largest:,} bytes; no {what} is that long.")
         return tomllib.loads(content.decode("utf-8"))
     except IsADirectoryError:
         raise SceneError(f"{given}: is a directory; a {what} is one TOML file.") from None

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from comparisons.engines.registry import engine
 from comparisons.metrics import METRICS
@@ -13,6 +13,7 @@ from comparisons.simulating import assert_step_fits
 from comparisons.sweeps.axes import Axis, Drawn, Listed, Spaced, Spacing
 from comparisons.sweeps.fields import NoSuchField, assert_has, with_fields
 from comparisons.sweeps.jobs import OPTION, Sweep, configured
+from comparisons.validating import validated
 from reference_impl.summary import FIGURES
 from scenarios import DropspinError, Scenario, SceneError, load
 from scenarios.body import Number, Positive
@@ -69,9 +70,6 @@ class Draws(_Table):
     seed: Seed
 
 
-Kind = TypeVar("Kind", bound=_Table)
-
-
 class Spec(_Table):
     """A spec as it is written."""
 
@@ -94,7 +92,7 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
         where, content, folder = "spec", spec, Path()
     else:
         where, content, folder = str(spec), read_toml(Path(spec), str(spec), "spec"), Path(spec).parent
-    written = _validated(Spec, where, content)
+    written = validated(Spec, where, content)
     axes = _grid(where, written.grid)
     drawn = _random(where, written.random)
     names = [axis.name for axis in (*axes, *drawn)]
@@ -123,23 +121,6 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
     return sweep
 
 
-def _validated(kind: type[Kind], where: str, content: Any) -> Kind:
-    try:
-        return kind.model_validate(content)
-    except ValidationError as error:
-        problem = error.errors(include_url=False)[0]
-        location = [part for part in problem["loc"] if isinstance(part, int) or part.isidentifier()]
-        key = "".join(f"[{part}]" if isinstance(part, int) else f": {part}" for part in location)
-        if problem["type"] == "extra_forbidden":
-            allowed = [field.alias or name for name, field in kind.model_fields.items()]
-            raise DropspinError(f"{where}{key}: unknown key. Allowed: {', '.join(allowed)}.") from None
-        if problem["type"] == "missing":
-            raise DropspinError(f"{where}{key}: missing; it has no default.") from None
-        said = str(problem["ctx"]["error"]) if problem["type"] == "value_error" else problem["msg"].replace("Input should", "must")
-        given = " ".join(repr(problem["input"]).split())
-        raise DropspinError(f"{where}{key}: got {given if len(given) <= 60 else given[:57] + '...'}; {said}.") from None
-
-
 def _scene(where: str, name: str, folder: Path) -> Scenario:
     try:
         return load(folder / name if name.endswith(".toml") else name)
@@ -164,7 +145,7 @@ def _grid(where: str, table: Mapping[str, Any]) -> list[Axis]:
     for name, given in _flat(table).items():
         here = f"{where}: grid: {name}"
         if isinstance(given, Mapping):
-            span = _validated(CountedRange, here, given)
+            span = validated(CountedRange, here, given)
             axes.append(Spaced(name, span.first, span.last, span.count, span.spacing))
         elif isinstance(given, list) and given:
             values = tuple(_canonical(here, name, value) for value in given)
@@ -195,14 +176,14 @@ def _canonical(here: str, name: str, value: Any) -> Any:
 def _random(where: str, table: Mapping[str, Any]) -> list[Axis]:
     if not table:
         return []
-    size = _validated(Draws, f"{where}: random", {key: table[key] for key in ("count", "seed") if key in table})
+    size = validated(Draws, f"{where}: random", {key: table[key] for key in ("count", "seed") if key in table})
     spans = _flat({key: value for key, value in table.items() if key not in ("count", "seed")})
     axes: list[Axis] = []
     for name, given in spans.items():
         here = f"{where}: random: {name}"
         if not isinstance(given, Mapping):
             raise DropspinError(f"{here}: got {given!r}; must be a range to draw from, {{from, to}}.")
-        span = _validated(Range, here, given)
+        span = validated(Range, here, given)
         axes.append(Drawn(name, span.first, span.last, size.count, span.spacing, size.seed))
     if not axes:
         raise DropspinError(f"{where}: random: nothing to draw; name a field and its range, such as body.mass = {{from = 1.0, to = 2.0}}.")

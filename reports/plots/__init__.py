@@ -8,8 +8,17 @@ from reports.plots.bounces import plot_bounce_ladder
 from reports.plots.conditions import extremes_figure, plot_conditions, plot_stability_map, stability_figure
 from reports.plots.convergence import plot_error_over_dt
 from reports.plots.ensembles import plot_angular_momentum_of_ensemble, plot_energy_of_ensemble, plot_rest_of_ensemble
-from reports.plots.figures import bounce_figure, convergence_figure, ensemble_figure, flight_figure, time_figure, tradeoff_figure
+from reports.plots.figures import (
+    bounce_figure,
+    convergence_figure,
+    ensemble_figure,
+    flight_figure,
+    history_figure,
+    time_figure,
+    tradeoff_figure,
+)
 from reports.plots.growth import plot_error_growth
+from reports.plots.history import plot_history
 from reports.plots.over_time import Quantity, angular_momentum_length, height, plot_over_time, quantities, tilt
 from reports.plots.spins import plot_polhode
 from reports.plots.style import FAINT, INK
@@ -26,12 +35,14 @@ __all__ = [
     "extremes_figure",
     "flight_figure",
     "height",
+    "history_figure",
     "plot_angular_momentum_of_ensemble",
     "plot_bounce_ladder",
     "plot_conditions",
     "plot_energy_of_ensemble",
     "plot_error_growth",
     "plot_error_over_dt",
+    "plot_history",
     "plot_over_time",
     "plot_polhode",
     "plot_rest_of_ensemble",

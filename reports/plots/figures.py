@@ -14,6 +14,7 @@ from reports.plots.ensembles import (
     plot_rest_of_ensemble,
 )
 from reports.plots.growth import plot_error_growth
+from reports.plots.history import plot_history
 from reports.plots.over_time import plot_over_time, quantities
 from reports.plots.spins import plot_polhode, wobbles_freely
 from reports.plots.style import REPORT
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from comparisons.regressions.history import History
     from comparisons.tradeoff import TradeOff
 
 CONVERGENCE = (
@@ -119,6 +121,17 @@ def bounce_figure(results: Results, scene_name: str) -> "Figure | None":
     return figure
 
 
+def history_figure(history: "History", scene_name: str) -> "Figure":
+    """Each metric of a scene over runs."""
+    figures = history.figures[~history.figures["kind"].isin(["order", "model_error"])]
+    metrics = list(dict.fromkeys(figures.loc[figures["scene"] == scene_name, "metric"]))
+    with _figure([""] * len(metrics), MOST_PANELS) as (figure, panels):
+        for axes, metric in zip(panels, metrics, strict=True):
+            plot_history(history, scene_name, metric, axes)
+        _add_legend(figure, panels)
+    return figure
+
+
 def _errors(results: Results, scene_name: str, metrics: Sequence[str], worth: float) -> list[str]:
     """Those of some metrics by which some engine is wrong by so much."""
     mine = results.measurements[results.measurements["scene"] == scene_name]
@@ -126,15 +139,17 @@ def _errors(results: Results, scene_name: str, metrics: Sequence[str], worth: fl
 
 
 @contextmanager
-def _figure(projections: Sequence[str]) -> "Iterator[tuple[Figure, list[Axes]]]":
-    """A figure with a panel for each projection, `3d` or none, in the report's style."""
+def _figure(projections: Sequence[str], in_a_row: int | None = None) -> "Iterator[tuple[Figure, list[Axes]]]":
+    """A figure with a panel for each projection, `3d` or none, in the report's style; all in a row, or so many."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     with rc_context(REPORT):
-        figure = Figure(figsize=(3.7 * len(projections), 2.9), layout=ConstrainedLayoutEngine(w_pad=0.12))
-        yield figure, [figure.add_subplot(1, len(projections), place, projection=one or None) for place, one in enumerate(projections, 1)]
+        columns = min(in_a_row or len(projections), len(projections))
+        rows = -(-len(projections) // columns)
+        figure = Figure(figsize=(3.7 * columns, 2.9 * rows), layout=ConstrainedLayoutEngine(w_pad=0.12))
+        yield figure, [figure.add_subplot(rows, columns, place, projection=one or None) for place, one in enumerate(projections, 1)]
 
 
 def _add_legend(figure: "Figure", panels: "list[Axes]") -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -9,6 +10,18 @@ import click
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
+baseline_option = click.option(
+    "--baseline", metavar="FILE", help="Accepted figures, as dropspin accept wrote them, to hold the run against."
+)
+summary_option = click.option("--summary", metavar="FILE", help="Add a summary in Markdown to this file, such as $GITHUB_STEP_SUMMARY.")
+
+
+def write_text(path: str, text: str, *, append: bool = False) -> None:
+    """Write a text, or add it to what a file holds already."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with target.open("a" if append else "w", encoding="utf-8") as file:
+        file.write(text)
 
 
 def _finite(context: click.Context, parameter: click.Parameter, value: float) -> float:

@@ -1,0 +1,1 @@
+"""Runs held against earlier ones: accepted figures, what changed between two runs and why, and when figures moved."""

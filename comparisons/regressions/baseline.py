@@ -1,0 +1,222 @@
+"""Accepted figures: a text file, one line a figure, that says since when, why, and of which versions each was accepted.
+
+A figure that has not moved beyond its tolerance stays as it was accepted, so that the difference between two baselines shows what was
+moved on purpose, and nothing else.
+"""
+
+import datetime
+import math
+import os
+import tempfile
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import pandas as pd
+import tomlkit
+from pydantic import BaseModel, ConfigDict, Field
+from tomlkit.items import InlineTable
+
+from comparisons.ensembles import ENSEMBLE_METRICS
+from comparisons.metrics import METRICS
+from comparisons.provenance import versions_behind
+from comparisons.regressions.figures import KEY, changes, figures, steps_asked
+from comparisons.results import Results
+from comparisons.validating import validated
+from scenarios import DropspinError
+from scenarios.errors import did_you_mean
+from scenarios.loading import read_toml
+
+FORMAT = 1
+LARGEST_FILE = 50_000_000  # bytes
+DIGITS_BELOW = 3
+"""A value is written to a thousandth of its tolerance."""
+HEADER = (
+    "Figures of rigid-body engines, measured by dropspin, accepted by somebody; one line each.",
+    "value ± tolerance, in the unit of the metric; by: which acceptance it is from.",
+    "`dropspin check RUN --baseline FILE` holds a run against them, `dropspin accept RUN` moves them.",
+)
+STUDIES = {"_order": "order", "_limit": "model_error"}
+"""How the names of figures end that several steps together give, and of which kind they are."""
+
+
+class Acceptance(BaseModel):
+    """When, why, and of which versions figures were accepted."""
+
+    model_config = ConfigDict(extra="forbid")
+    date: datetime.date
+    reason: Annotated[str, Field(min_length=1)]
+    versions: dict[str, str]
+
+
+class _Line(BaseModel):
+    """A figure in the file."""
+
+    model_config = ConfigDict(extra="forbid")
+    value: Annotated[float, Field(allow_inf_nan=False)]
+    tolerance: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    by: Annotated[int, Field(ge=1)]
+    known_failure: bool = False
+
+
+class _File(BaseModel):
+    """The whole file, but for the figures' lines."""
+
+    model_config = ConfigDict(extra="forbid")
+    format: Literal[1]
+    accepted: dict[Annotated[int, Field(ge=1)], Acceptance]
+    scenes: dict[str, str]
+    figures: dict[str, dict[str, dict[str, dict[str, Any]]]]
+
+
+COLUMNS = {**dict.fromkeys(KEY, "str"), "value": "float64", "tolerance": "float64", "unit": "str", "by": "int64", "known_failure": "bool"}
+
+
+def _table(lines: list[dict[str, Any]]) -> pd.DataFrame:
+    return pd.DataFrame(lines, columns=list(COLUMNS)).astype(COLUMNS)
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """Accepted figures.
+
+    Attributes:
+        acceptances: By number.
+        scenes: Of each scene the digest of what is simulated.
+        figures: As `regressions.figures` has them, with `by`, the number of the acceptance, and `known_failure`: whether a check that
+            the figure fails is not to fail the run, as long as the figure is not worse.
+    """
+
+    acceptances: Mapping[int, Acceptance] = field(default_factory=dict)
+    scenes: Mapping[str, str] = field(default_factory=dict)
+    figures: pd.DataFrame = field(default_factory=lambda: _table([]))
+
+    def covering(self, results: Results) -> pd.DataFrame:
+        """The figures of those scenes, engines and steps that a run was asked for."""
+        mine = self.figures
+        return mine[
+            mine["scene"].isin(list(results.scenes)) & mine["engine"].isin(results.engines) & mine["steps"].isin(steps_asked(results))
+        ]
+
+
+def load_baseline(path: str | Path) -> Baseline:
+    """Read a baseline.
+
+    Raises:
+        DropspinError: It is none; the text says where, what was given, what is allowed.
+    """
+    where = str(path)
+    written = validated(_File, where, read_toml(Path(path), where, "baseline", LARGEST_FILE))
+    lines = []
+    for scene, engines in written.figures.items():
+        if scene not in written.scenes:
+            raise DropspinError(f"{where}: scenes: {scene!r} has figures, but no digest; accept them again.")
+        for engine, steps in engines.items():
+            for step, named in steps.items():
+                for name, content in named.items():
+                    here = f"{where}: figures of {scene}, {engine}, {step}: {name}"
+                    metric, kind = _metric_and_kind(here, name)
+                    line = validated(_Line, here, content)
+                    if line.by not in written.accepted:
+                        raise DropspinError(f"{here}: by: got {line.by}; accepted are {', '.join(map(str, written.accepted)) or 'none'}.")
+                    key = {"scene": scene, "engine": engine, "steps": step, "metric": metric, "kind": kind}
+                    unit = "1" if kind == "order" else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
+                    lines.append(key | line.model_dump() | {"unit": unit})
+    return Baseline(written.accepted, written.scenes, _table(lines))
+
+
+def accept(
+    results: Results, earlier: Baseline, reason: str, date: datetime.date, *, known_failures: bool = False
+) -> tuple[Baseline, pd.DataFrame]:
+    """The baseline that a run's figures make of an earlier one, and how they differ from what was accepted, as `changes` has it.
+
+    Figures of scenes, engines and steps that the run is not of stay; so do figures that have not moved beyond their tolerance.
+
+    Args:
+        results: The run.
+        earlier: What was accepted before; `Baseline()` if nothing was.
+        reason: Why this is what figures should be from now on.
+        date: Of the acceptance.
+        known_failures: Whether checks that the run's figures fail are known to fail, and accepted as such.
+    """
+    mine = figures(results)
+    mine["known_failure"] = (mine["verdict"] == "failed") & known_failures
+    old = earlier.covering(results)
+    scenes = {name: scene.digest for name, scene in results.scenes.items()}
+    same_scene = old["scene"].map(lambda name: earlier.scenes[name] == scenes[name]).astype(bool)
+    found = changes(old[same_scene], mine)
+    kept = old[same_scene].merge(found.loc[found["change"] == "same", KEY], on=KEY)
+    if known_failures:
+        kept = kept.drop(columns="known_failure").merge(mine[[*KEY, "known_failure"]], on=KEY)
+    number = max(earlier.acceptances, default=0) + 1
+    moved = mine.merge(kept[KEY], on=KEY, how="left", indicator=True)
+    moved = moved[moved["_merge"] == "left_only"].assign(by=number)
+    everything = pd.concat([earlier.figures.drop(old.index), kept, moved], ignore_index=True)[list(COLUMNS)]
+    acceptances = {**earlier.acceptances, number: Acceptance(date=date, reason=reason, versions=versions_behind(results.provenance))}
+    used = set(everything["by"])
+    return Baseline({n: one for n, one in acceptances.items() if n in used}, {**earlier.scenes, **scenes}, everything), found
+
+
+def write_baseline(baseline: Baseline, path: str | Path) -> None:
+    """Write a baseline, whole or not at all.
+
+    Raises:
+        DropspinError: The file cannot be written.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, prefix=f".{target.name}-", delete=False) as file:
+            file.write(_text(baseline))
+        unfinished = Path(file.name)
+        unfinished.chmod(target.stat().st_mode if target.exists() else 0o644)
+        unfinished.replace(target)
+    except OSError as error:
+        raise DropspinError(f"{path}: cannot be written: {error.strerror}; choose another file with --baseline.") from None
+
+
+def _text(baseline: Baseline) -> str:
+    """The file's content; scenes, engines and figures in an order that does not depend on how they came about."""
+    document = tomlkit.document()
+    for line in HEADER:
+        document.add(tomlkit.comment(line))
+    document["format"] = FORMAT
+    document["accepted"] = {
+        str(number): {"date": one.date, "reason": one.reason, "versions": _inline(one.versions)}
+        for number, one in sorted(baseline.acceptances.items())
+    }
+    held = baseline.figures
+    document["scenes"] = {name: digest for name, digest in sorted(baseline.scenes.items()) if name in set(held["scene"])}
+    tables: dict[str, dict[str, dict[str, dict[str, Any]]]] = {}
+    for row in held.sort_values(KEY).to_dict("records"):
+        ending = next((ending for ending, kind in STUDIES.items() if kind == row["kind"]), "")
+        lines = tables.setdefault(row["scene"], {}).setdefault(row["engine"], {}).setdefault(row["steps"], {})
+        lines[row["metric"] + ending] = _inline(_line(row))
+    document["figures"] = tables
+    return tomlkit.dumps(document)
+
+
+def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
+    value, tolerance = float(row["value"]), float(f"{row['tolerance']:.2g}")
+    digits = DIGITS_BELOW if value == 0.0 else max(DIGITS_BELOW, DIGITS_BELOW + math.ceil(math.log10(abs(value) / tolerance)))
+    line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": int(row["by"])}
+    return line | ({"known_failure": True} if row["known_failure"] else {})
+
+
+def _inline(content: Mapping[str, Any]) -> InlineTable:
+    table = tomlkit.inline_table()
+    table.update(content)
+    return table
+
+
+def _metric_and_kind(where: str, name: str) -> tuple[str, str]:
+    """What a figure is of, by its name in the file."""
+    if name in METRICS:
+        return name, METRICS[name].kind
+    if name in ENSEMBLE_METRICS:
+        return name, "ensemble"
+    for ending, kind in STUDIES.items():
+        if name.removesuffix(ending) in METRICS and name.endswith(ending):
+            return name.removesuffix(ending), kind
+    raise DropspinError(f"{where}: no such figure.{did_you_mean(name, [*METRICS, *ENSEMBLE_METRICS])}")

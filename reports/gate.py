@@ -1,0 +1,144 @@
+"""What a check against accepted figures came to: sentences, a Markdown summary, annotations, and rows for programs."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pandas as pd
+
+from comparisons import Results
+from comparisons.provenance import versions_behind
+from comparisons.regressions.baseline import Baseline
+from comparisons.regressions.checking import Checked
+from reports.failing import Failing
+from reports.findings import counts as counts_of
+from reports.findings import verdict_sentence
+from reports.html import markdown
+
+AT_MOST = 12
+"""How many of what failed are told one by one where people read; JUnit and JSON have them all."""
+IN_SUMMARY = 100
+ANNOTATIONS = 10
+"""As many as GitHub shows of one step."""
+
+
+def sentences(checked: Checked, baseline: Baseline | None, path: str | None) -> list[str]:
+    """What came of a check, the verdict last."""
+    told = verdict_sentence(_without_baseline(checked.results))
+    if baseline is None:
+        return [told]
+    found = checked.changes
+    regressed = checked.results.frame[(checked.results.frame["kind"] == "baseline") & (checked.results.frame["verdict"] == "failed")]
+    listed = [_of_engine(str(engine), rows, found) for engine, rows in regressed.groupby("engine", sort=False)]
+    if len(regressed):
+        listed += _since_then(checked, baseline)
+    better, new = (found[found["change"] == change] for change in ("better", "new"))
+    if len(better):
+        listed.append(f"{_count(better, 'figure')} better than accepted; to hold engines to that from now on: {_accept(path)}")
+    if len(new):
+        listed.append(f"{_count(new, 'figure')} new, and not accepted yet: {_accept(path)}")
+    if len(checked.not_run):
+        where = checked.not_run.drop_duplicates(["scene", "engine"])
+        listed.append(f"{len(checked.not_run):,} accepted figures were not run, of {len(where)} pairs of a scene and an engine.")
+    known = checked.results.frame["reason"].str.startswith("accepted as a known failure").sum()
+    if known:
+        listed.append(f"{known:,} checks fail as they were known to when they were accepted.")
+    held = int(found["change"].isin(["same", "better"]).sum())
+    judged = held + len(regressed)
+    verdict = f"{len(regressed):,} of {judged:,} accepted figures fail." if len(regressed) else f"All {judged:,} accepted figures hold."
+    return [*listed, f"{told} {verdict}"]
+
+
+def summary(checked: Checked, baseline: Baseline | None, path: str | None, found: Sequence[Failing]) -> str:
+    """The same as Markdown that fits a comment on a pull request."""
+    results = checked.results
+    return markdown(
+        "check.md",
+        sentences=sentences(checked, baseline, path),
+        failing=found[:IN_SUMMARY],
+        more=max(0, len(found) - IN_SUMMARY),
+        shown=AT_MOST,
+        engines=results.engines,
+        tallies={engine: _tally(results.frame[results.frame["engine"] == engine]) for engine in results.engines},
+        versions=versions_behind(results.provenance),
+        cpu=results.provenance["cpu"],
+    )
+
+
+def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bool) -> list[str]:
+    """What was accepted of a run, and what was not."""
+    counts = found["change"].value_counts()
+    told = ", ".join(f"{counts[change]:,} {change}" for change in ("new", "worse", "moved", "better", "gone", "same") if change in counts)
+    named = ", ".join(results.engines)
+    listed = [f"Accepted of {len(results.scenes)} {'scene' if len(results.scenes) == 1 else 'scenes'} with {named}: {told or 'nothing'}."]
+    tally = counts_of(results)
+    if tally.failed and not known_failures:
+        listed.append(
+            f"{tally.failed:,} checks of this run fail, and will fail dropspin check, whatever is accepted; "
+            "--known-failures accepts them as known."
+        )
+    if tally.broken:
+        listed.append(f"{tally.broken:,} runs of an engine broke down; there are no figures of them.")
+    return listed
+
+
+def annotations(found: Sequence[Failing]) -> list[str]:
+    """Commands by which GitHub shows failures beside a run, where the check runs there."""
+    if os.environ.get("GITHUB_ACTIONS") != "true":
+        return []
+    return [
+        f"::error title={_escaped(f'{one.scene} {one.engine}', ':,')}::{_escaped(f'{one.sentence}. Again: {one.again}')}"
+        for one in found[:ANNOTATIONS]
+    ]
+
+
+def _without_baseline(results: Results) -> Results:
+    held = (results.frame["kind"] != "baseline").to_numpy()
+    return replace(results, frame=results.frame[held], tolerances=results.tolerances[held])
+
+
+def _of_engine(engine: str, rows: pd.DataFrame, found: pd.DataFrame) -> str:
+    """How many figures of an engine fail, where, and what has moved most."""
+    scenes = rows["scene"].nunique()
+    total = found.loc[found["engine"] == engine, "scene"].nunique() or scenes
+    measured = rows[rows["value"].notna()]
+    most = ""
+    if len(measured):
+        metric = measured["metric"].iloc[0]
+        where = measured.loc[measured["metric"] == metric, "scene"].unique()
+        most = f"; most of all {metric.replace('_', ' ')} in {', '.join(where[:3])}{' …' if len(where) > 3 else ''}"
+    return f"{engine}: {_count(rows, 'accepted figure', 'fails', 'fail')}, in {scenes} of {total} scenes{most}."
+
+
+def _since_then(checked: Checked, baseline: Baseline) -> list[str]:
+    """Which versions are others than when the figures that fail were accepted."""
+    now = versions_behind(checked.results.provenance)
+    moved = checked.changes[checked.changes["change"].isin(["worse", "moved", "gone"])]
+    differ = [
+        f"{name} {then} → {now[name]}"
+        for by in sorted(set(moved["by"].dropna().astype(int)))
+        for name, then in baseline.acceptances[by].versions.items()
+        if name in now and now[name] != then
+    ]
+    listed = ", ".join(dict.fromkeys(differ))
+    return [f"Since they were accepted: {listed}."] if differ else []
+
+
+def _tally(rows: pd.DataFrame) -> dict[str, int]:
+    """How many checks of an engine passed, failed, and so on."""
+    return {str(verdict): int(count) for verdict, count in rows["verdict"].value_counts().items()}
+
+
+def _count(rows: pd.DataFrame, what: str, one: str = "is", many: str = "are") -> str:
+    return f"{len(rows):,} {what}{'' if len(rows) == 1 else 's'} {one if len(rows) == 1 else many}"
+
+
+def _accept(path: str | None) -> str:
+    return f"dropspin accept RUN --baseline {path} --reason …"
+
+
+def _escaped(text: str, more: str = "") -> str:
+    """As GitHub's commands want it; % first."""
+    for sign in f"%\r\n{more}":
+        text = text.replace(sign, f"%{ord(sign):02X}")
+    return text

@@ -1,0 +1,64 @@
+"""JUnit XML of a run's checks, as CI servers read it: a suite for each engine, a case for each row that was judged."""
+
+import math
+from collections.abc import Hashable, Mapping
+from datetime import datetime
+from typing import Any
+
+from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+
+from comparisons import Results
+from comparisons.provenance import versions_behind
+from comparisons.verdicts import BREAKDOWNS, FAILURES
+from reports.failing import again, what_fails
+from reports.numbers import step, subject, word
+
+JUDGED = FAILURES | BREAKDOWNS | {"passed", "limited", "declined", "missing"}
+
+
+def junit_xml(results: Results, baseline: str | None = None) -> bytes:
+    """The document.
+
+    Args:
+        results: The run, with the rows of a check if there was one.
+        baseline: The file of the figures it was held against, for the commands that do it again.
+    """
+    document = JUnitXml("dropspin")
+    for engine in results.engines:
+        suite = TestSuite(engine)
+        suite.timestamp = datetime.fromisoformat(results.provenance["started"]).strftime("%Y-%m-%dT%H:%M:%S")
+        for name, found in versions_behind(results.provenance).items():
+            suite.add_property(name, found)
+        rows = results.frame[(results.frame["engine"] == engine) & results.frame["verdict"].isin(JUDGED)]
+        suite.add_testcases([_case(results, row, baseline) for row in rows.to_dict("records")])
+        document.add_testsuite(suite)
+    document.update_statistics()  # type: ignore[no-untyped-call]
+    return bytes(document.tostring())  # type: ignore[no-untyped-call]
+
+
+def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -> TestCase:
+    accepted = "accepted: " if row["kind"] == "baseline" else ""
+    what = subject(row["metric"], row["kind"], row["truth"]) or "runs"
+    at = "" if math.isnan(row["dt"]) else f" at {step(row['dt'])} s"
+    took = row["time_per_step"] * row["steps"]
+    case = TestCase(f"{accepted}{what}{at}", classname=f"{row['engine']}.{row['scene']}", time=0.0 if math.isnan(took) else round(took, 6))
+    said = _printable(what_fails(row))
+    does_it_again = _printable(f"{said}\nAgain: {again(results, row, baseline)}")
+    verdict = row["verdict"]
+    if verdict in FAILURES:
+        case.result = [_with_text(Failure(said, verdict), does_it_again)]
+    elif verdict in BREAKDOWNS or (verdict == "missing" and row["engine"] in results.provenance.get("named", [])):
+        case.result = [_with_text(Error(said, verdict), does_it_again)]
+    elif verdict != "passed":
+        case.result = [Skipped(f"{word(verdict)}: {_printable(row['reason'])}")]
+    return case
+
+
+def _with_text(result: Failure | Error, text: str) -> Failure | Error:
+    result.text = text
+    return result
+
+
+def _printable(text: str) -> str:
+    """Without the characters that XML has no way to write; an engine's last words may hold any."""
+    return "".join(sign if sign in "\n\t" or sign.isprintable() else "�" for sign in text)

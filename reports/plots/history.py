@@ -1,0 +1,64 @@
+"""Figures over runs."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from comparisons.regressions.history import History
+from reports.colours import engine_colours
+from reports.plots.style import metric_label, thinner
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+LONGEST_LABEL = 22
+
+
+def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -> None:
+    """Draw a metric at the finest step over runs, of every engine; a ring marks each run in which it moved.
+
+    Args:
+        history: The runs.
+        scene_name: One of their scenes.
+        metric: One of its metrics.
+        axes: What to draw into.
+    """
+    figures = history.figures
+    shown = figures[(figures["scene"] == scene_name) & (figures["metric"] == metric) & ~figures["kind"].isin(["order", "model_error"])]
+    steps = min(shown["steps"], key=float)
+    shown = shown[shown["steps"] == steps]
+    engines = list(dict.fromkeys(figures["engine"]))
+    colours = engine_colours(engines)
+    for number, engine in enumerate(engines):
+        line = shown[shown["engine"] == engine].sort_values("run")
+        if line.empty:
+            continue
+        width = thinner(3.8, 1.2, number, len(engines))
+        axes.plot(line["run"], line["value"], color=colours[engine], linewidth=width, marker="o", markersize=width + 1.5, label=engine)
+        moved = [move.run for move in history.moves if move.engine == engine and _has(move.figures, scene_name, metric, steps)]
+        at = line[line["run"].isin(moved)]
+        axes.plot(at["run"], at["value"], "o", markersize=13.0, markerfacecolor="none", markeredgecolor=colours[engine])
+    sizes = shown["value"].abs()
+    if sizes.max() > 0.0:  # figures of several engines, orders of magnitude apart, each visible
+        axes.set_yscale("symlog", linthresh=max(float(sizes[sizes > 0.0].min()), 1e-3 * float(sizes.max())))
+    axes.set_xticks(np.arange(len(history.names)), run_labels(history), rotation=30, ha="right")
+    axes.set_ylabel(f"{metric_label(metric)}\nat {1e3 * float(steps):g} ms")
+
+
+def run_labels(history: History) -> list[str]:
+    """What tells the runs apart in few words: versions that differ between them, else commits, else their names."""
+    stamps = history.stamps.drop(columns=["run", "started"])
+    differing = [column for column in stamps if stamps[column].nunique(dropna=False) > 1]
+    versions = [column for column in differing if column != "commit"]
+    telling = versions or differing
+    if not telling:
+        return [name[:LONGEST_LABEL] for name in history.names]
+    # Of columns that change together one is enough.
+    if len(telling) == 1:
+        return [str(value) if column == "commit" else f"{column} {value}" for column in telling for value in stamps[column]]
+    return [", ".join(f"{column} {row[column]}" for column in telling)[:LONGEST_LABEL] for row in stamps.to_dict("records")]
+
+
+def _has(figures: "pd.DataFrame", scene_name: str, metric: str, steps: str) -> bool:
+    return bool(((figures["scene"] == scene_name) & (figures["metric"] == metric) & (figures["steps"] == steps)).any())

@@ -1,0 +1,107 @@
+"""`dropspin run`."""
+
+import os
+from dataclasses import replace
+
+import click
+
+from reports.interrupts import stop_if_interrupted
+from reports.verbs.options import as_json, baseline_option, time_limit_option
+
+CORE_ENGINES = ("document", "mujoco", "pybullet")
+
+
+@click.command()
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option(
+    "-e",
+    "--engine",
+    "engines",
+    multiple=True,
+    metavar="ENGINE",
+    help="An engine, such as mujoco[integrator=rk4]; repeat for more.",
+)
+@click.option(
+    "--dt",
+    "dts",
+    multiple=True,
+    type=float,
+    metavar="SECONDS",
+    help="A time step; repeat for more. [default: 0.004, 0.002, 0.001]",
+)
+@click.option(
+    "-o",
+    "--output",
+    default="out/run",
+    show_default=True,
+    metavar="DIR",
+    help="Folder for the report and the data; an earlier run there is replaced.",
+)
+@time_limit_option(300.0, "an engine may take for one scene at one step")
+@baseline_option
+@click.option("--resume", is_flag=True, help="Go on with a run that was interrupted: measured scenes are not run again.")
+@as_json
+def run(
+    scenes: tuple[str, ...],
+    engines: tuple[str, ...],
+    dts: tuple[float, ...],
+    output: str,
+    time_limit: float,
+    baseline: str | None,
+    resume: bool,
+    json_output: bool,
+) -> int:
+    """Run scenes through engines, side by side, and write the report.
+
+    SCENE is a name of the catalogue or the path of a TOML file. Without arguments: the core catalogue, three engines, three
+    steps.
+
+    Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
+    """
+    import comparisons
+    import reports
+    import scenarios
+    from comparisons.regressions.baseline import load_baseline
+    from comparisons.regressions.checking import check
+    from reports.failing import failing
+    from reports.folder import Measured, fill, run_folder
+    from reports.terminal import json_rows, progress_bar, status
+    from reports.verbs.check import tell
+
+    everything = map(scenarios.load, scenarios.names())
+    loaded = [scenarios.load(name) for name in scenes] if scenes else [scene for scene in everything if "core" in scene.tags]
+    chosen = engines or CORE_ENGINES
+    steps = dts or comparisons.DEFAULT_DTS
+    named = frozenset(name.strip() for name in engines)
+    accepted = None if baseline is None else load_baseline(baseline)
+    measured = Measured(output)
+    try:
+        with run_folder(output) as folder:
+            if not resume:
+                measured.clear()
+            with progress_bar(len(loaded) * len(chosen) * len(steps)) as progress:
+
+                def told(scene: str, engine: str, dt: float) -> None:
+                    stop_if_interrupted()
+                    progress(scene, engine, dt)
+
+                limits = comparisons.Limits(processor_time=time_limit)
+                results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
+            stop_if_interrupted()
+            results = replace(results, provenance={**results.provenance, "named": sorted(named)})
+            checked = check(results, accepted)
+            if not json_output:
+                reports.print_table(results)
+            with status("writing the report"):
+                fill(results, folder)
+    except KeyboardInterrupt:
+        kept = len(measured)
+        raise KeyboardInterrupt(f"{kept} of {len(loaded)} scenes are kept, --resume goes on" if kept else "nothing was written") from None
+    measured.clear()
+    if json_output:
+        click.echo(json_rows(checked.results.frame))
+    else:
+        if accepted is not None:
+            tell(checked, accepted, baseline, [one for one in failing(checked.results, baseline) if one.accepted])
+        click.echo(f"Report: {os.path.join(output, 'report.html')}")
+    return checked.results.exit_code(named)

@@ -1,7 +1,5 @@
 """What a study of extremes says: surprises first, largest steps, what scales and what does not; tables and files."""
 
-import csv
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.extremes import Explored, Extremes, Point, Surprise, surprises
-from scenarios import DropspinError
+from reports.written import write_table
 
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "across", "across_value", "condition", "criterion", "figure", "said")
 AS_SURPRISING = 16
@@ -135,28 +133,11 @@ def _range(line: Explored) -> dict[str, str]:
     return {"sound from": f"{low:.4g}", "to": f"{high:.4g}", "beyond": beyond or "as far as was looked"}
 
 
-def make_folder(folder: str) -> None:
-    """Make the folder for the tables and the maps.
-
-    Raises:
-        DropspinError: It cannot be made.
-    """
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o.") from None
-
-
 def write(found: Sequence[Extremes], folder: Path) -> None:
     """`limits.csv`, `limits.json`, `limits.md` and the maps."""
     from reports.plots import extremes_figure, stability_figure
 
-    everything = [row for one in found for row in rows(one)]
-    with (folder / "limits.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(everything)
-    (folder / "limits.json").write_text(json.dumps(everything, indent=1), encoding="utf-8")
+    write_table(folder, "limits", COLUMNS, [row for one in found for row in rows(one)])
     parts = ["# Where engines break"]
     if any(one.explored for one in found):
         told = "\n".join(f"{number}. {said}" for number, said in enumerate(sentences(found), 1))

@@ -1,7 +1,5 @@
 """What a trade-off between error and cost says: rows, sentences, files."""
 
-import csv
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +9,7 @@ import numpy as np
 
 from comparisons.metrics import METRICS
 from comparisons.tradeoff import SIDE_BY_SIDE, Point, TradeOff
+from reports.written import write_table
 
 COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "side_by_side", "on_front")
 
@@ -84,13 +83,7 @@ def write(found: Sequence[TradeOff], within: Sequence[float], folder: Path) -> N
     """`tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot for each scene."""
     from reports.plots import tradeoff_figure
 
-    folder.mkdir(parents=True, exist_ok=True)
-    everything = [row for one in found for row in rows(one)]
-    with (folder / "tradeoff.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(everything)
-    (folder / "tradeoff.json").write_text(json.dumps(everything, indent=1), encoding="utf-8")
+    write_table(folder, "tradeoff", COLUMNS, [row for one in found for row in rows(one)])
     parts = []
     for one in found:
         listed = "\n".join(f"- {sentence}" for sentence in sentences(one, within))

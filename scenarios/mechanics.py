@@ -1,4 +1,4 @@
-"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory."""
+"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory; the principal axes of its inertia."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,3 +47,16 @@ def lowest_height(scene: Scenario, motion: Trajectory) -> Array:
     """Height of the body's lowest point above the floor [m], shape (n,)."""
     corners = rotate(motion.orientation[:, None, :], scene.body.vertices[None, :, :])
     return motion.position[:, 1] + corners[:, :, 1].min(axis=1) - scene.body.rounding
+
+
+def is_diagonal(tensor: Array) -> bool:
+    """Whether a body's own axes are principal ones, to the last digit."""
+    return np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
+
+
+def principal_axes(inertia: Array) -> tuple[Array, Array]:
+    """Moments and axes (columns, right-handed): the body's own where the tensor is diagonal, else the least moment first."""
+    if is_diagonal(inertia):
+        return np.diag(inertia).copy(), np.eye(3)
+    moments, axes = np.linalg.eigh(inertia)
+    return moments, axes * np.linalg.det(axes)

@@ -31,6 +31,7 @@ from comparisons.predictions import bounce_error, flight_error
 from reference_impl.simulate import usable_cores
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
+from scenarios.mechanics import is_diagonal, principal_axes
 from scenarios.rotations import conjugate, cross, rotate
 
 DEFAULT_INFINITE_FRICTION = 10.0  # with the pyramidal cones of the default, 1e6 would be no friction and no contact at all
@@ -125,7 +126,7 @@ class MuJoCo(Engine):
         body, floor = scene.body, scene.floor
         if min(body.mass, *np.linalg.eigvalsh(body.inertia_tensor)) < mujoco.mjMINVAL:
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
-        if scene.damping is not None and not _is_diagonal(body.inertia_tensor):
+        if scene.damping is not None and not is_diagonal(body.inertia_tensor):
             return "MuJoCo damps along the body's own axes; these are not principal axes"
         if floor is None:
             return None
@@ -359,18 +360,14 @@ def _specification(scene: Scenario, dt: float, integrator: str, pair: Mapping[st
 
 def _principal(inertia: Array) -> tuple[Array, Array]:
     """Principal moments and the quaternion [w, x, y, z] of their axes; the identity where the tensor is diagonal."""
-    if _is_diagonal(inertia):
+    if is_diagonal(inertia):
         return np.diag(inertia), np.array([1.0, 0.0, 0.0, 0.0])
     from scipy.spatial.transform import Rotation
 
-    moments, axes = np.linalg.eigh(inertia)
+    moments, axes = principal_axes(inertia)
     # A flat body's largest moment is the sum of the others, which MuJoCo does not let rounding exceed.
     moments[2] = min(moments[2], np.nextafter(moments[0] + moments[1], 0.0))
-    return moments, Rotation.from_matrix(axes * np.linalg.det(axes)).as_quat(scalar_first=True)
-
-
-def _is_diagonal(inertia: Array) -> bool:
-    return np.count_nonzero(inertia - np.diag(np.diag(inertia))) == 0
+    return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)
 
 
 def _add_shape(body: Any, scene: Scenario, **properties: Any) -> None:

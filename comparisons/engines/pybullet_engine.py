@@ -32,6 +32,7 @@ from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
+from scenarios.mechanics import is_diagonal
 
 STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact there
 ALMOST = 0.999
@@ -116,7 +117,7 @@ class PyBullet(Engine):
     def declines(self, scene: Scenario) -> str | None:
         """What calibration cannot map."""
         inertia = scene.body.inertia_tensor
-        if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
+        if not is_diagonal(inertia):
             return "PyBullet takes inertia along the body's own axes only; these are not principal axes"
         floor = scene.floor
         if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(inertia)) < SMALLEST_INERTIA:

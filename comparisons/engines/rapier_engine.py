@@ -16,6 +16,7 @@ from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulatio
 from comparisons.predictions import spins_steadily
 from scenarios import Scenario, truth_for
 from scenarios.body import Box, Sphere
+from scenarios.mechanics import principal_axes
 from scenarios.rotations import rotate
 
 FRICTION = {"none": 0.0, "infinite": 1e6}
@@ -76,7 +77,7 @@ class RapierSimulation(Simulation):
     staggered = True
 
     def __init__(self, scene: Scenario, dt: float) -> None:
-        start, body, floor, inertia = scene.initial_state, scene.body, scene.floor, scene.body.inertia_tensor
+        start, body, floor = scene.initial_state, scene.body, scene.floor
         self._world = rapier3d.PhysicsWorld(gravity=scene.acceleration)
         if FIRST_PROCESS() != os.getpid():  # forked, it has none of those threads, and would wait for them for ever
             self._world.set_num_threads(1)
@@ -88,9 +89,8 @@ class RapierSimulation(Simulation):
         dynamics: dict[str, Any] = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic}
         for motion, rate in scene.damping.model_dump().items() if scene.damping else ():
             dynamics[f"{motion}_damping"] = float(np.expm1(rate * dt)) / dt
-        skew = np.count_nonzero(inertia - np.diag(np.diag(inertia)))
-        moments, axes = np.linalg.eigh(inertia) if skew else (np.diag(inertia).copy(), np.eye(3))
-        frame = Rotation.from_matrix(axes * np.linalg.det(axes)).as_quat()
+        moments, axes = principal_axes(body.inertia_tensor)
+        frame = Rotation.from_matrix(axes).as_quat()
         moving = rapier3d.RigidBody.dynamic(**dynamics).position((start[0:3], start[3:7])).linvel(start[7:10]).angvel(start[10:13])
         moving = moving.additional_mass_properties(rapier3d.MassProperties(np.zeros(3), body.mass, moments, frame))
         handle, surface = self._world.add_body(moving), {}

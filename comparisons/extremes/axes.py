@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from comparisons.engines.base import may_tumble
 from scenarios import Scenario, load
 from scenarios.body import Sphere
+from scenarios.mechanics import is_diagonal
 
 Array = NDArray[np.float64]
 
@@ -232,7 +233,7 @@ def _body_times(scene: Scenario, length: float, mass: float) -> dict[str, Any]:
         keys[name] = _times(length, given[name])
     if "masses" in given:
         keys["masses"] = _times(mass, given["masses"])
-    if given["inertia"] == "note" and _is_diagonal(scene):  # unit masses, whatever the body's is
+    if given["inertia"] == "note" and is_diagonal(scene.body.inertia_tensor):  # unit masses, whatever the body's is
         given["inertia"] = tuple(float(moment) for moment in np.diag(scene.body.inertia_tensor))
     if not isinstance(given["inertia"], str):
         keys["inertia"] = _times(mass * length**2, given["inertia"])
@@ -282,7 +283,7 @@ AXES = {
             "inertia-ratio",
             "1",
             "the largest moment of inertia over the least; the largest kept, and the shape",
-            lambda scene: may_tumble(scene) and not isinstance(scene.body, Sphere) and _is_diagonal(scene),
+            lambda scene: may_tumble(scene) and not isinstance(scene.body, Sphere) and is_diagonal(scene.body.inertia_tensor),
             lambda setting: _logarithmic(1.0, 1e6, 7),
             _inertia_ratio,
             _with_inertia_ratio,
@@ -343,8 +344,3 @@ AXES = {
         ),
     )
 }
-
-
-def _is_diagonal(scene: Scenario) -> bool:
-    tensor = scene.body.inertia_tensor
-    return np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0

@@ -6,8 +6,7 @@ import numpy as np
 
 from comparisons import Results
 from comparisons.comparison import SHORTEST_FLIGHT, Comparison
-from reports.colours import engine_colours, engine_markers
-from reports.plots.style import Array, ink, label_powers, thinner
+from reports.plots.style import Array, as_truth, at_one_step, label_powers, step_of
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import apex
 
@@ -33,20 +32,14 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
     truth = truth_for(scene)
     if truth is None or not truth.events or not scene.starts_above_floor:
         raise DropspinError(f"{scene_name} has no bounces that are known; choose a scene that has, such as drop-ball.")
-    colours, markers = engine_colours(results.engines), engine_markers(results.engines)
-    finest = min((dt for name, _, dt in results.trajectories if name == scene_name), default=0.0)
-    exact, lasting = _exact_apexes(scene, truth, SHORTEST_FLIGHT * finest)
+    exact, lasting = _exact_apexes(scene, truth, SHORTEST_FLIGHT * step_of(results.trajectories, scene_name, min))
     shown = [lasting]
-    for number, engine in enumerate(results.engines):
-        motion = results.trajectories.get((scene_name, engine, finest))
-        if motion is not None:
-            heights = apexes(scene, motion) / exact[0]
-            size = thinner(9.0, 4.0, number, len(results.engines))
-            style = {"color": colours[engine], "marker": markers[engine], "markersize": size, "linestyle": "none"}
-            axes.semilogy(range(len(heights)), heights, markerfacecolor="none", label=engine, **style)
-            shown.append(len(heights))
+    for motion, look in at_one_step(results, results.trajectories, scene_name, min, least_marker=4.0):
+        heights = apexes(scene, motion) / exact[0]
+        axes.semilogy(range(len(heights)), heights, linestyle="none", **look)
+        shown.append(len(heights))
     stairs = exact[: max(shown)] / exact[0]
-    axes.step(range(len(stairs)), stairs, where="mid", color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
+    axes.step(range(len(stairs)), stairs, where="mid", **as_truth())
     axes.set_xticks(np.arange(0, max(shown), 1 + max(shown) // 8))
     label_powers(axes, "y")
     axes.set_xlabel("bounce")

@@ -1,14 +1,11 @@
 """What becomes of many starts, at the finest step: energy and angular momentum left, and who is at rest."""
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from comparisons import Results
-from comparisons.ensembles import Outcome
-from reports.colours import engine_colours
-from reports.plots.style import Array, thinner
+from reports.plots.style import Array, at_one_step
 from scenarios import DropspinError
 
 if TYPE_CHECKING:
@@ -17,8 +14,8 @@ if TYPE_CHECKING:
 
 def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
     """Draw the energy left over time: each engine's median, and between which values eight of ten lie."""
-    for outcome, style in _outcomes(results, scene_name):
-        _draw_spread(outcome.t, outcome.energy, style, axes)
+    for outcome, look in at_one_step(results, results.ensembles, scene_name, min):
+        _draw_spread(outcome.t, outcome.energy, look, axes)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("energy, over the scene's")
 
@@ -34,17 +31,17 @@ def plot_angular_momentum_of_ensemble(results: Results, scene_name: str, axes: "
     """
     if not keeps_angular_momentum(results, scene_name):
         raise DropspinError(f"{scene_name}: this run was made before angular momenta of ensembles were kept; run it again.")
-    for outcome, style in _outcomes(results, scene_name):
+    for outcome, look in at_one_step(results, results.ensembles, scene_name, min):
         if outcome.angular_momentum is not None:
-            _draw_spread(outcome.t, outcome.angular_momentum, style, axes)
+            _draw_spread(outcome.t, outcome.angular_momentum, look, axes)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("|L|, over r √(2 E M)")
 
 
 def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
     """Draw which share is at rest by when."""
-    for outcome, style in _outcomes(results, scene_name):
-        axes.ecdf(outcome.rest_time, **style)
+    for outcome, look in at_one_step(results, results.ensembles, scene_name, min):
+        axes.ecdf(outcome.rest_time, **look)
     axes.set_xlim(0.0, results.scenes[scene_name].duration)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("share at rest")
@@ -52,21 +49,10 @@ def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> No
 
 def keeps_angular_momentum(results: Results, scene_name: str) -> bool:
     """Whether a run has kept |L| of a scene's ensemble."""
-    return any(outcome.angular_momentum is not None for outcome, _ in _outcomes(results, scene_name))
+    return any(outcome.angular_momentum is not None for outcome, _ in at_one_step(results, results.ensembles, scene_name, min))
 
 
-def _outcomes(results: Results, scene_name: str) -> Iterator[tuple[Outcome, dict[str, Any]]]:
-    """What became of each engine's ensemble at the finest step, and how its line looks."""
-    colours = engine_colours(results.engines)
-    finest = min((dt for name, _, dt in results.ensembles if name == scene_name), default=0.0)
-    for number, engine in enumerate(results.engines):
-        outcome = results.ensembles.get((scene_name, engine, finest))
-        if outcome is not None:
-            width = thinner(3.8, 1.2, number, len(results.engines))
-            yield outcome, {"color": colours[engine], "linewidth": width, "label": engine}
-
-
-def _draw_spread(t: Array, values: Array, style: dict[str, Any], axes: "Axes") -> None:
+def _draw_spread(t: Array, values: Array, look: dict[str, Any], axes: "Axes") -> None:
     low, middle, high = np.quantile(values, [0.1, 0.5, 0.9], axis=0)
-    axes.fill_between(t, low, high, color=style["color"], alpha=0.15, linewidth=0.0)
-    axes.plot(t, middle, **style)
+    axes.fill_between(t, low, high, color=look["color"], alpha=0.15, linewidth=0.0)
+    axes.plot(t, middle, **look)

@@ -7,8 +7,7 @@ import numpy as np
 from comparisons import Results
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.errors import ERRORS
-from reports.colours import engine_colours
-from reports.plots.style import ROUNDING, Array, label_powers, metric_label, stride, thinner
+from reports.plots.style import ROUNDING, Array, at_one_step, label_powers, metric_label, stride
 from scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
 
 if TYPE_CHECKING:
@@ -37,13 +36,8 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
         raise DropspinError(f"{scene_name} has no truth to hold errors against; choose a scene that has, see dropspin list.")
     if metric not in ERRORS:
         raise UnknownName("metric over time", metric, list(ERRORS))
-    colours = engine_colours(results.engines)
-    finest = min((dt for name, _, dt in results.trajectories if name == scene_name), default=0.0)
-    for number, engine in enumerate(results.engines):
-        motion = results.trajectories.get((scene_name, engine, finest))
-        if motion is not None:
-            width = thinner(3.8, 1.2, number, len(results.engines))
-            axes.semilogy(*_sizes(scene, motion, truth, metric), color=colours[engine], linewidth=width, label=engine)
+    for motion, look in at_one_step(results, results.trajectories, scene_name, min):
+        axes.semilogy(*_sizes(scene, motion, truth, metric), **look)
     label_powers(axes, "y")
     axes.set_xlabel("time [s]")
     axes.set_ylabel(metric_label(metric))

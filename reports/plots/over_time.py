@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from comparisons import Results
-from reports.colours import engine_colours
-from reports.plots.style import MOST_POINTS, Array, ink, thinned, thinner
+from reports.plots.style import Array, as_truth, at_one_step, exactly, thinned
 from scenarios import Scenario, Trajectory, truth_for
 from scenarios.mechanics import angular_momentum, energy
 from scenarios.rotations import rotate
@@ -54,17 +53,12 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
     """Draw one quantity over time: every engine at the coarsest step, where they differ most, and the truth."""
     scene = results.scenes[scene_name]
     truth = truth_for(scene)
-    colours = engine_colours(results.engines)
-    dts = [dt for name, _, dt in results.trajectories if name == scene_name]
-    for number, engine in enumerate(results.engines):
-        motion = results.trajectories.get((scene_name, engine, max(dts, default=0.0)))
-        if motion is not None:
-            shown = thinned(motion)
-            width = thinner(3.8, 1.2, number, len(results.engines))
-            axes.plot(shown.t, quantity(scene, shown), color=colours[engine], linewidth=width, label=engine)
+    for motion, look in at_one_step(results, results.trajectories, scene_name, max):
+        shown = thinned(motion)
+        axes.plot(shown.t, quantity(scene, shown), **look)
     if truth is not None:
-        times = np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS)
-        axes.plot(times, quantity(scene, truth(times)), color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
+        exact = exactly(scene, truth)
+        axes.plot(exact.t, quantity(scene, exact), **as_truth())
     axes.set_xlabel("time [s]")
     axes.set_ylabel(LABELS.get(quantity, ""))
     axes.ticklabel_format(axis="y", useOffset=False)

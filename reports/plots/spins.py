@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from comparisons import Results
-from reports.colours import engine_colours, engine_markers
-from reports.plots.style import MOST_POINTS, Array, ink, thinned, thinner
+from reports.plots.style import Array, as_truth, at_one_step, exactly, ink, thinned
 from scenarios import DropspinError, Scenario, Trajectory, truth_for
 from scenarios.rotations import cross, unrotate
 
@@ -51,18 +50,13 @@ def plot_polhode(results: Results, scene_name: str, axes: Any) -> None:
         raise DropspinError(f"{scene_name} starts without spin: its polhode is a point; choose a scene with start.angular_velocity.")
     _draw_ellipsoid(half_axes, axes)
     paths = []
-    dts = [dt for name, _, dt in results.trajectories if name == scene_name]
-    colours, markers, count = engine_colours(results.engines), engine_markers(results.engines), len(results.engines)
-    for number, engine in enumerate(results.engines):
-        motion = results.trajectories.get((scene_name, engine, max(dts, default=0.0)))
-        if motion is not None:
-            paths.append(_in_sight(principal_spin(scene, thinned(motion)), half_axes))
-            (line,) = axes.plot(*paths[-1].T, color=colours[engine], linewidth=thinner(3.8, 1.2, number, count), label=engine)
-            line.set(marker=markers[engine], markevery=[-1], markerfacecolor="none", markersize=thinner(9.0, 5.0, number, count))
+    for motion, look in at_one_step(results, results.trajectories, scene_name, max, least_marker=5.0):
+        paths.append(_in_sight(principal_spin(scene, thinned(motion)), half_axes))
+        axes.plot(*paths[-1].T, markevery=[-1], **look)
     truth = truth_for(scene)
     if truth is not None:
-        paths.append(principal_spin(scene, truth(np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS))))
-        axes.plot(*paths[-1].T, color=ink(), linewidth=1.0, linestyle=(0, (3, 3)), label="truth")
+        paths.append(principal_spin(scene, exactly(scene, truth)))
+        axes.plot(*paths[-1].T, **as_truth())
     _frame(half_axes, paths, axes)
 
 

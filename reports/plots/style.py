@@ -1,19 +1,24 @@
 """How plots look: the colours of the page they stand in, sizes that keep lines apart which coincide, axis labels with units."""
 
+from collections.abc import Callable, Iterator, Mapping
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons import METRICS
-from scenarios import Trajectory
+from comparisons import METRICS, Results
+from reports.colours import engine_colours, engine_markers
+from scenarios import Scenario, Trajectory, Truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
 Array = NDArray[np.float64]
+Kept = TypeVar("Kept")
+ByStep = Mapping[tuple[str, str, float], Kept]
+"""What a run keeps of each scene, engine and step."""
 
 INK, FAINT = "#010203", "#040506"
 """Stand-ins for the page's text colour: the report replaces them, so that one plot serves light and dark."""
@@ -64,6 +69,37 @@ def stride(length: int) -> int:
 def thinner(first: float, last: float, number: int, count: int) -> float:
     """Sizes from first to last: engines often coincide, and what is drawn later must leave the earlier visible."""
     return float(np.linspace(first, last, max(count, 2))[number])
+
+
+def step_of(kept: ByStep[Kept], scene_name: str, which: Callable[..., float]) -> float:
+    """The finest or coarsest step, by `min` or `max`, at which something of a scene is kept [s]; 0 if nothing is."""
+    return which((dt for name, _, dt in kept if name == scene_name), default=0.0)
+
+
+def at_one_step(
+    results: Results, kept: ByStep[Kept], scene_name: str, which: Callable[..., float], least_marker: float | None = None
+) -> Iterator[tuple[Kept, dict[str, Any]]]:
+    """What is kept of each engine at the step of `step_of`, and how its line looks; with markers down to a size, if one is given."""
+    dt, count = step_of(kept, scene_name, which), len(results.engines)
+    colours, markers = engine_colours(results.engines), engine_markers(results.engines)
+    for number, engine in enumerate(results.engines):
+        found = kept.get((scene_name, engine, dt))
+        if found is not None:
+            look = {"color": colours[engine], "linewidth": thinner(3.8, 1.2, number, count), "label": engine}
+            if least_marker is not None:
+                size = thinner(9.0, least_marker, number, count)
+                look |= {"marker": markers[engine], "markerfacecolor": "none", "markersize": size}
+            yield found, look
+
+
+def as_truth() -> dict[str, Any]:
+    """How the truth's line looks: thin, dashed, in the text's colour."""
+    return {"color": ink(), "linewidth": 1.0, "linestyle": (0, (3, 3)), "label": "truth"}
+
+
+def exactly(scene: Scenario, truth: Truth) -> Trajectory:
+    """The truth for as long as a scene lasts and it is known, at as many times as a plot can show."""
+    return truth(np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS))
 
 
 def metric_label(metric: str) -> str:

@@ -45,13 +45,12 @@ def limits(
 
     Without arguments: a spin about an axis, a tumble, a ball, a box and a block, the methods that they let differ; some minutes.
     """
-    from pathlib import Path
-
     from comparisons import Limits
     from comparisons.extremes import AXES, SCENES
     from comparisons.extremes import limits as extremes
     from reports import extremes as told
     from reports.terminal import print_rows, share_bar
+    from reports.written import folder_made
     from scenarios import load
 
     planes = [_pair(pair) for pair in pairs]
@@ -60,18 +59,18 @@ def limits(
         raise click.UsageError("two scenes have the same name; a scene's name is its file's, rename one.")
     named = {*axes, *(axis for plane in planes for axis in plane)} & AXES.keys()
     having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in named)]
-    told.make_folder(output)  # before the work, not after it
     found = []
-    for scene in having or loaded[:1]:  # which says what it has not got
-        with share_bar(scene.name) as progress:
+    with folder_made(output) as folder:
+        for scene in having or loaded[:1]:  # which says what it has not got
+            with share_bar(scene.name) as progress:
 
-            def advance(what: str, share: float) -> None:
-                stop_if_interrupted()
-                progress(what, share)
+                def advance(what: str, share: float) -> None:
+                    stop_if_interrupted()
+                    progress(what, share)
 
-            chosen = planes if pairs else None
-            found.append(extremes(scene, engines, axes, chosen, dt, within, advance, Limits(processor_time=time_limit)))
-    told.write(found, Path(output))
+                chosen = planes if pairs else None
+                found.append(extremes(scene, engines, axes, chosen, dt, within, advance, Limits(processor_time=time_limit)))
+        told.write(found, folder)
     if json_output:
         click.echo(json.dumps([row for one in found for row in told.rows(one)], indent=1))
         return

@@ -31,27 +31,27 @@ def tradeoff(
 
     Without arguments: a spin, the methods that it lets differ.
     """
-    from pathlib import Path
-
     from comparisons.tradeoff import tradeoff as traded
     from reports import trade
     from reports.terminal import print_rows, share_bar
+    from reports.written import folder_made
     from scenarios import load
 
     found = []
-    for name in scenes or ("spin-asymmetric",):
-        with share_bar(name) as progress:
+    with folder_made(output) as folder:
+        for name in scenes or ("spin-asymmetric",):
+            with share_bar(name) as progress:
 
-            def told(what: str, share: float) -> None:
-                stop_if_interrupted()
-                progress(what, share)
+                def told(what: str, share: float) -> None:
+                    stop_if_interrupted()
+                    progress(what, share)
 
-            found.append(traded(load(name), engines, metric, told))
-        if not json_output:
-            print_rows(trade.front_rows(found[-1]), json_output=False)
-            for sentence in trade.sentences(found[-1], within):
-                click.echo(sentence)
-    trade.write(found, within, Path(output))
+                found.append(traded(load(name), engines, metric, told))
+            if not json_output:
+                print_rows(trade.front_rows(found[-1]), json_output=False)
+                for sentence in trade.sentences(found[-1], within):
+                    click.echo(sentence)
+        trade.write(found, within, folder)
     if json_output:
         click.echo(json.dumps([row for one in found for row in trade.rows(one)], indent=1))
     else:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scenarios.mechanics import principal_axes
 from scenarios.rotations import about, cross, multiply, unrotate
 from scenarios.truths.elliptic import Jacobi, argument, integral_of_sn2, jacobi, quarter_period
 
@@ -66,7 +67,7 @@ class AsymmetricTop:
     """The general free rotor; its period [s] is that of the angular velocity in the body."""
 
     def __init__(self, inertia: Array, orientation: Array, angular_velocity: Array) -> None:
-        moments, axes = _principal_axes(inertia)
+        moments, axes = principal_axes(inertia)
         spin = axes.T @ unrotate(orientation, angular_velocity)
         order = _circled_axis_last(moments, spin)
         self._axes = axes @ order.T  # columns: a, b, c in the body frame
@@ -139,14 +140,6 @@ class AsymmetricTop:
         first = cross(along, np.eye(3)[self._pole])
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         return np.stack([first, cross(along, first), along], axis=2), spins
-
-
-def _principal_axes(inertia: Array) -> tuple[Array, Array]:
-    """Moments and axes (columns, right-handed); the body's own axes where the tensor is diagonal."""
-    if np.count_nonzero(inertia - np.diag(np.diag(inertia))) == 0:
-        return np.diag(inertia).copy(), np.eye(3)
-    moments, axes = np.linalg.eigh(inertia)
-    return moments, axes * np.linalg.det(axes)
 
 
 def _circled_axis_last(moments: Array, spin: Array) -> Array:

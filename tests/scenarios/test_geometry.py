@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from scenarios import Trajectory, load, rotations
-from scenarios.mechanics import angular_momentum, energy, kinetic_energy, lowest_height
+from scenarios.mechanics import angular_momentum, energy, is_diagonal, kinetic_energy, lowest_height, principal_axes
 
 long_enough = arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1)
 quaternions = long_enough.map(lambda q: q / np.linalg.norm(q))
@@ -52,6 +52,21 @@ def test_inertia_in_words():
     np.testing.assert_allclose(np.diag(body(**box, inertia="note").inertia_tensor), [104, 80, 40], rtol=1e-15)
     np.testing.assert_allclose(np.diag(body(**box, inertia=[3, 4, 5]).inertia_tensor), [3, 4, 5], rtol=1e-15)
     np.testing.assert_allclose(body(shape="sphere", radius=0.5, mass=2.0).inertia_tensor, 0.2 * np.eye(3), rtol=1e-15)
+
+
+@given(quaternions)
+def test_principal_axes(q):
+    """The body's own in their order where they are; else those that the tensor was turned to, right-handed."""
+    moments = np.diag([3.0, 1.0, 2.0])
+    own, axes = principal_axes(moments)
+    assert (own.tolist(), axes.tolist()) == ([3.0, 1.0, 2.0], np.eye(3).tolist())
+    R = Rotation.from_quat(q).as_matrix()
+    turned = R @ moments @ R.T
+    found, axes = principal_axes(0.5 * (turned + turned.T))
+    np.testing.assert_allclose(axes @ np.diag(found) @ axes.T, turned, atol=1e-14)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert is_diagonal(moments)
+    assert not is_diagonal(moments + 1e-300 * (np.ones((3, 3)) - np.eye(3)))
 
 
 def test_vertices_are_centred_on_their_masses():

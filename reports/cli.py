@@ -13,6 +13,7 @@ import click
 from reports.interrupts import heed_interrupts, stop_if_interrupted
 from reports.verbs.check import accept, check
 from reports.verbs.compare import compare
+from reports.verbs.history import history
 from reports.verbs.limits import limits
 from reports.verbs.options import as_json, time_limit_option
 from reports.verbs.run import run
@@ -177,5 +178,5 @@ def calibrate(
         click.echo(f"To paste, as {name}:\n\n{text}")
 
 
-for verb in (accept, check, compare, limits, run, sweep, tradeoff):
+for verb in (accept, check, compare, history, limits, run, sweep, tradeoff):
     dropspin.add_command(verb)

@@ -31,7 +31,7 @@ from scenarios.loading import read_toml
 FORMAT = 1
 LARGEST_FILE = 50_000_000  # bytes
 DIGITS_BELOW = 3
-"""A value is written to a thousandth of its tolerance."""
+"""A value is written to a two-hundredth of its tolerance, and no shorter than this."""
 HEADER = (
     "Figures of rigid-body engines, measured by dropspin, accepted by somebody; one line each.",
     "value ± tolerance, in the unit of the metric; by: which acceptance it is from.",

@@ -169,7 +169,7 @@ def test_unchanged_engines_fail_nothing(before, accepted):
     st.sampled_from(["truth", "invariant", "model_error", "order", "ensemble"]),
 )
 def test_what_counts_as_worse(old, new, tolerance, kind):
-    """An error farther from 0 than it was; a lower order; moved is one on the other side of 0, or a mean; each by more than the tolerance."""
+    """An error farther from 0, a lower order; moved is one on the other side of 0, or a mean; each by more than the tolerance."""
 
     def one(value):
         return pd.DataFrame([dict.fromkeys(KEY, "x") | {"kind": kind, "value": value, "tolerance": tolerance, "unit": "1"}])

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from comparisons.engines.registry import engine
 from comparisons.metrics import METRICS
@@ -15,7 +15,7 @@ from comparisons.sweeps.fields import NoSuchField, assert_has, with_fields
 from comparisons.sweeps.jobs import OPTION, Sweep, configured
 from reference_impl.summary import FIGURES
 from scenarios import DropspinError, Scenario, SceneError, load
-from scenarios.body import Number, Positive
+from scenarios.body import Number, Positive, Table
 from scenarios.errors import UnknownName
 from scenarios.loading import read_toml
 
@@ -34,11 +34,7 @@ Seed = Annotated[int, Field(strict=True, ge=0, lt=2**62)]
 Names = Annotated[tuple[Annotated[str, Field(strict=True)], ...], Field(min_length=1), AfterValidator(_different)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Range(_Table):
+class Range(Table):
     """From one number to another."""
 
     first: Annotated[Number, Field(alias="from")]
@@ -62,17 +58,17 @@ class CountedRange(Range):
     count: Annotated[Count, Field(ge=2)]
 
 
-class Draws(_Table):
+class Draws(Table):
     """How many draws, and which."""
 
     count: Count
     seed: Seed
 
 
-Kind = TypeVar("Kind", bound=_Table)
+Kind = TypeVar("Kind", bound=Table)
 
 
-class Spec(_Table):
+class Spec(Table):
     """A spec as it is written."""
 
     scenes: Names
@@ -80,8 +76,8 @@ class Spec(_Table):
     dts: Annotated[tuple[Positive, ...], AfterValidator(_different)] = ()
     seeds: Count | Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_different)] | None = None
     metrics: Annotated[tuple[str, ...], AfterValidator(_different)] = ()
-    grid: dict[str, Any] = {}
-    random: dict[str, Any] = {}
+    grid: dict[str, Any] = Field(default_factory=dict)
+    random: dict[str, Any] = Field(default_factory=dict)
 
 
 def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:

@@ -52,12 +52,8 @@ def run(
     Raises:
         DropspinError: Something was asked for that cannot be: an unknown engine, a step that is no step, equal names.
     """
-    contestants = [contestant_named(name) for name in engines]
+    contestants, truths = prepared(scenes, engines, dts)
     labels = [contestant.label for contestant in contestants]
-    truths = [truth_for(scene) for scene in scenes]
-    _assert_sensible(scenes, truths, dts, labels)
-    if len(set(labels)) < len(labels):
-        raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
     stamp = provenance({"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)})
     stamp["names"] = {one.label: name.strip() for one, name in zip(contestants, engines, strict=True) if isinstance(name, str)}
     stamp["adapters"] = {contestant.label: adapter_code(contestant.engine) for contestant in contestants if contestant.engine is not None}
@@ -73,6 +69,23 @@ def run(
             parts.append(_run_scene(Phase(scene, truth), contestants, dts, cells, progress, stamp))
             keep(parts[-1])
     return joined(parts, stamp)
+
+
+def prepared(
+    scenes: Sequence[Scenario], engines: Sequence[str | Engine], dts: Sequence[float]
+) -> tuple[list[Contestant], list[Truth | None]]:
+    """The engines that a run would be of and the scenes' truths, once it is sure that all of it can be run.
+
+    Raises:
+        DropspinError: Something was asked for that cannot be.
+    """
+    contestants = [contestant_named(name) for name in engines]
+    labels = [contestant.label for contestant in contestants]
+    truths = [truth_for(scene) for scene in scenes]
+    _assert_sensible(scenes, truths, dts, labels)
+    if len(set(labels)) < len(labels):
+        raise DropspinError(f"an engine is named twice: {', '.join(labels)}; name each once.")
+    return contestants, truths
 
 
 def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:

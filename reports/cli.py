@@ -29,7 +29,6 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a sign gets a question mark, not a traceback
-    sys.path.append(os.getcwd())  # where a user's my_module:MyEngine is; last, so that nothing there hides what is installed
     heed_interrupts()
     try:
         sys.exit(_run())

@@ -10,7 +10,9 @@ from comparisons import ENSEMBLE_METRICS, METRICS, EngineMissing, engine, engine
 from comparisons.building import assert_built_as_meant
 from comparisons.calibration import Calibration, Measured
 from comparisons.isolation import Cells, Failed, Limits
+from comparisons.metrics import metrics_for
 from comparisons.provenance import processor, versions
+from comparisons.run import prepared
 from comparisons.simulating import Contestant, assert_step_fits, contestant_named
 from comparisons.verdicts import assert_expectations_can_be_judged
 from reports.html import left_out, modelled
@@ -28,6 +30,32 @@ def scene_rows() -> Rows:
         truth = truth_for(scene)
         rows.append({"scene": name, "truth": truth.name if truth else "", "tags": ", ".join(scene.tags), "summary": scene.summary})
     return rows
+
+
+def plan(scenes: Sequence[Scenario], engines: Sequence[str], dts: Sequence[float]) -> dict[str, Any]:
+    """What a run would be of, as JSON has it; `from` is what was asked for, which a run of one scene or engine can be asked for again.
+
+    Raises:
+        DropspinError: It could not be run.
+    """
+    contestants, truths = prepared(scenes, engines, dts)
+    metrics = [
+        [metric.name for metric in metrics_for(scene, truth)] + (list(ENSEMBLE_METRICS) if scene.ensemble else [])
+        for scene, truth in zip(scenes, truths, strict=True)
+    ]
+    return {
+        "scenes": [{"scene": one.name, "from": one.origin, "metrics": names} for one, names in zip(scenes, metrics, strict=True)],
+        "engines": [{"engine": one.label, "from": name, "missing": one.missing} for one, name in zip(contestants, engines, strict=True)],
+        "dts": list(dts),
+    }
+
+
+def plan_rows(found: dict[str, Any]) -> Rows:
+    """The same, for a table."""
+    missing = {one["engine"]: f" ({one['missing']})" if one["missing"] else "" for one in found["engines"]}
+    rows = [{"what": "engines", "is": ", ".join(f"{name}{why}" for name, why in missing.items())}]
+    rows.append({"what": "steps", "is": f"{', '.join(f'{dt:g}' for dt in found['dts'])} s"})
+    return rows + [{"what": one["scene"], "is": ", ".join(one["metrics"])} for one in found["scenes"]]
 
 
 def engine_rows() -> Rows:

@@ -20,6 +20,8 @@ def modules_after(statement):
         ("import reference_impl", {"mujoco", "pybullet", "pandas", "pydantic", "scenarios"}),
         ("import comparisons", {"mujoco", "pybullet", "numba", "matplotlib", "jinja2", "rich", "reports"}),
         ("import reports.cli", {"mujoco", "pybullet", "numba", "pandas", "scipy", "matplotlib", "rich"}),
+        ("import dropspin_command", {"scenarios", "comparisons", "reports", "click"}),
+        ("import dropspin_pytest", {"scenarios", "comparisons", "reports", "reference_impl", "click", "numpy", "tomlkit", "filelock"}),
         ("import reports", {"mujoco", "pybullet", "numba", "matplotlib"}),
     ],
 )

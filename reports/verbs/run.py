@@ -1,12 +1,17 @@
 """`dropspin run`."""
 
+import json
 import os
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
 
 from reports.interrupts import stop_if_interrupted
 from reports.verbs.options import as_json, baseline_option, time_limit_option
+
+if TYPE_CHECKING:
+    from scenarios import Scenario
 
 CORE_ENGINES = ("document", "mujoco", "pybullet")
 
@@ -39,6 +44,7 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
 )
 @time_limit_option(300.0, "an engine may take for one scene at one step")
 @baseline_option
+@click.option("--dry-run", is_flag=True, help="Check what is asked for, say what would be measured, and run nothing.")
 @click.option("--resume", is_flag=True, help="Go on with a run that was interrupted: measured scenes are not run again.")
 @as_json
 def run(
@@ -48,13 +54,14 @@ def run(
     output: str,
     time_limit: float,
     baseline: str | None,
+    dry_run: bool,
     resume: bool,
     json_output: bool,
 ) -> int:
     """Run scenes through engines, side by side, and write the report.
 
-    SCENE is a name of the catalogue or the path of a TOML file. Without arguments: the core catalogue, three engines, three
-    steps.
+    SCENE is a name of the catalogue, the path of a TOML file, or core: the core catalogue. Without arguments: the core catalogue,
+    three engines, three steps.
 
     Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
     """
@@ -63,17 +70,24 @@ def run(
     import scenarios
     from comparisons.regressions.baseline import load_baseline
     from comparisons.regressions.checking import check
+    from reports import look
     from reports.failing import failing
     from reports.folder import Measured, fill, run_folder
-    from reports.terminal import json_rows, progress_bar, status
+    from reports.terminal import json_rows, print_rows, progress_bar, status
     from reports.verbs.check import tell
 
-    everything = map(scenarios.load, scenarios.names())
-    loaded = [scenarios.load(name) for name in scenes] if scenes else [scene for scene in everything if "core" in scene.tags]
+    loaded = [scene for name in scenes or ["core"] for scene in (_core() if name == "core" else [scenarios.load(name)])]
     chosen = engines or CORE_ENGINES
     steps = dts or comparisons.DEFAULT_DTS
     named = frozenset(name.strip() for name in engines)
     accepted = None if baseline is None else load_baseline(baseline)
+    if dry_run:
+        plan = look.plan(loaded, chosen, steps)
+        if json_output:
+            click.echo(json.dumps(plan, indent=1, ensure_ascii=False))
+        else:
+            print_rows(look.plan_rows(plan), json_output=False)
+        return 0
     measured = Measured(output)
     try:
         with run_folder(output) as folder:
@@ -105,3 +119,10 @@ def run(
             tell(checked, accepted, baseline, [one for one in failing(checked.results, baseline) if one.accepted])
         click.echo(f"Report: {os.path.join(output, 'report.html')}")
     return checked.results.exit_code(named)
+
+
+def _core() -> "list[Scenario]":
+    """The scenes of the core catalogue."""
+    import scenarios
+
+    return [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags]

@@ -41,6 +41,15 @@ def rows(found: History) -> list[dict[str, str]]:
     return [row for move in found.moves for row in _of_move(found, move)]
 
 
+def listed(found: History) -> list[str]:
+    """The same, a line each."""
+    return [
+        f"{row['run']} · {row['engine']} · {row['scene']}: "
+        f"{row['figure']} at {row['step']} from {row['before']} to {row['now']}, {row['change']}"
+        for row in rows(found)
+    ]
+
+
 def sentences(found: History) -> list[str]:
     """What each move is put down to."""
     told = [

@@ -2,23 +2,21 @@
 
 import csv
 import json
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import scenarios
-from comparisons import engine, simulate
+from comparisons import compare, engine, history, simulate
 from comparisons.calibration import calibrate
 from comparisons.engines import mujoco_engine
 from comparisons.engines.base import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
 from comparisons.engines.mujoco_versions import flight_of, numbers_of
+from comparisons.store import restore
 from scenarios.mechanics import kinetic_energy
 
-DROPSPIN = Path(sys.executable).with_name("dropspin")
 FREE_BODY = """
 duration = 5.0
 [body]
@@ -143,20 +141,29 @@ def test_ensembles_without_threads(installed):
     assert engine("mujoco").prepare_ensemble(members, 1e-3) is None
 
 
+def older(version, folder):
+    """That version, installed from the package index into a folder of its own."""
+    there = folder / version
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, "--no-deps", "--target", there, f"mujoco=={version}"], check=True)
+    return there
+
+
+def with_version(there, *arguments, cwd):
+    """The command, with what is installed in a folder before everything else."""
+    program = f"import sys; sys.path.insert(0, {str(there)!r}); from reports.cli import main; main()"
+    return subprocess.run([sys.executable, "-P", "-c", program, *arguments], cwd=cwd, capture_output=True, text=True, check=False)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["3.2.4", "3.6.0", "3.10.0"])
 def test_older_versions_themselves(version, tmp_path):
     """Installed beside, from the package index, and run: E/E₀ as published, the versions told are of what ran, boxes are declined."""
-    there = tmp_path / "older"
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "--no-deps", "--target", there, f"mujoco=={version}"], check=True)
+    there = older(version, tmp_path)
     (tmp_path / "free-body.toml").write_text(FREE_BODY)
 
     def run(out, *arguments):
-        command = [DROPSPIN, "run", *arguments, "-o", out]
-        done = subprocess.run(
-            command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(there)}, capture_output=True, text=True, check=False
-        )
+        done = with_version(there, "run", *arguments, "-o", out, cwd=tmp_path)
         assert done.returncode in (0, 1), done.stdout + done.stderr  # 1 where a default profile misses what is expected
         provenance = json.loads((tmp_path / out / "run.json").read_text())
         rows = list(csv.DictReader((tmp_path / out / "results.csv").read_text().splitlines()))
@@ -182,3 +189,27 @@ def test_older_versions_themselves(version, tmp_path):
     assert verdicts["drop-box-flat", "mujoco"] == ({"passed", "measured"} if version == "3.10.0" else {"declined"})
     for scene in ("drop-ball", "drop-box-flat"):
         assert {"measured", "failed"} <= verdicts[scene, "mujoco[profile=default]"] <= {"measured", "failed", "passed"}
+
+
+@pytest.mark.slow
+def test_a_change_between_versions_is_found_and_is_the_engine_s(tmp_path):
+    """`compare` and `history` over five versions: the moves of implicitfast where they were, of Runge-Kutta's attitude at 4.0.0."""
+    (tmp_path / "free-body.toml").write_text(FREE_BODY)
+    implicitfast, rk4 = "mujoco[integrator=implicitfast]", "mujoco[integrator=rk4]"
+    versions = ["3.6.0", "3.7.0", "3.10.0", "3.11.0", "4.0.0"]
+    for version in versions:
+        there = older(version, tmp_path)
+        engines = [word for name in (implicitfast, rk4, "document") for word in ("-e", name)]
+        done = with_version(there, "run", "free-body.toml", *engines, "--dt", "0.01", "-o", f"runs/{version}", cwd=tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+    runs = {version: restore(tmp_path / "runs" / version) for version in versions}
+    changes = compare(runs["3.6.0"], runs["4.0.0"])
+    assert changes.blames[implicitfast].culprit == "engine"
+    assert changes.blames[implicitfast].said == "the engine's: mujoco 3.6.0 → 4.0.0"
+    assert "document" not in changes.blames
+    found = history(runs)
+    moves = [(found.names[move.run], move.engine) for move in found.moves]
+    assert moves == [("3.7.0", implicitfast), ("3.11.0", implicitfast), ("4.0.0", rk4)]
+    drifts = found.figures[(found.figures["metric"] == "energy_drift") & (found.figures["engine"] == implicitfast)]
+    ratios = 1.0 + drifts.sort_values("run")["value"]
+    np.testing.assert_allclose(ratios, [1.0868946, 1.0, 1.0, 0.9260083, 0.9260083], atol=5e-8)

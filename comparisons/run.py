@@ -91,7 +91,7 @@ def prepared(
 def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
     """Whether two runs had the same engines, steps, versions, code and machine."""
     asked = all(earlier["asked"][what] == stamp["asked"][what] for what in ("engines", "dts"))
-    return asked and all(earlier.get(what) == stamp[what] for what in ("versions", "python", "cpu", "code", "adapters"))
+    return asked and all(earlier[what] == stamp[what] for what in ("versions", "python", "cpu", "code", "adapters"))
 
 
 def _run_scene(

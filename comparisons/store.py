@@ -15,6 +15,8 @@ from comparisons.results import COLUMNS, Results, TrajectoryKey
 from scenarios import DropspinError, Trajectory, load
 
 ARRAYS = ("t", "position", "orientation", "velocity", "angular_velocity", "velocity_lag")
+FORMAT = 2
+"""Of the folder; 1 had no tolerances."""
 OUTCOME = tuple(field.name for field in fields(Outcome))
 
 
@@ -25,6 +27,7 @@ def save(results: Results, folder: Path) -> None:
     scenes = {name: scene.model_dump(mode="json", exclude={"name"}, exclude_defaults=True) for name, scene in results.scenes.items()}
     digests = {name: scene.digest for name, scene in results.scenes.items()}
     content = {
+        "format": FORMAT,
         "provenance": results.provenance,
         "engines": results.engines,
         "scenes": scenes,
@@ -46,14 +49,17 @@ def restore(folder: Path, *, arrays: bool = True) -> Results:
         arrays: Whether trajectories and ensembles are wanted too; figures alone are read much faster.
 
     Raises:
-        DropspinError: The folder holds no run.
+        DropspinError: The folder holds no run, or one of another version.
     """
     try:
         content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise DropspinError(f"{folder}: is a run of another version of dropspin, which this one cannot read; run it again.")
         frame = pd.read_parquet(folder / "results.parquet").astype(COLUMNS)
         tolerances = pd.read_parquet(folder / "tolerances.parquet")["tolerance"].to_numpy()
-    except (OSError, json.JSONDecodeError) as error:
-        raise DropspinError(f"{folder}: not the folder of a run ({error}); give the folder that dropspin run -o wrote.") from None
+    except (OSError, ValueError) as error:
+        said = " ".join(str(error).split())
+        raise DropspinError(f"{folder}: not the folder of a run ({said}); give the folder that dropspin run -o wrote.") from None
     files = {kind: content[kind] if arrays else {} for kind in ("trajectories", "ensembles")}
     trajectories = {
         key: Trajectory(**found | {"velocity_lag": float(found["velocity_lag"])})

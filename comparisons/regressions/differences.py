@@ -33,7 +33,7 @@ def surroundings(old: Stamp, new: Stamp) -> list[str]:
         for package in MEASURING
         if old["versions"][package] != new["versions"][package]
     ]
-    if old.get("code") != new.get("code"):
+    if old["code"] != new["code"]:
         found.append("dropspin's own code")
     return found + [f"{word} {old[key]} → {new[key]}" for key, word in MACHINE.items() if old[key] != new[key]]
 
@@ -46,7 +46,7 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Culprit, str]:
     name = engine.split("[", maxsplit=1)[0]
     if versions[0] != versions[1] and all(versions):
         found["engine"] = f"{name} {_listed(versions[0])} → {_listed(versions[1])}"
-    if old.get("adapters", {}).get(engine) != new.get("adapters", {}).get(engine):
+    if old["adapters"].get(engine) != new["adapters"].get(engine):
         found["adapter"] = f"the code of {name}'s adapter"
     changed = _changed_settings(before, after)
     if changed:

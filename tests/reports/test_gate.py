@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -202,6 +203,29 @@ def test_bad_usage(arguments, message, repository):
     assert message in done.stderr
     assert "Traceback" not in done.stderr + done.stdout
     assert sorted(repository.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("run.json", b'{"provenance": {}}', "is a run of another version of dropspin"),
+        ("run.json", b"[]", "is a run of another version of dropspin"),
+        ("run.json", b"{", "not the folder of a run"),
+        ("run.json", b"\xff\xfe", "not the folder of a run"),
+        ("results.parquet", b"PAR1", "not the folder of a run"),
+        ("tolerances.parquet", None, "not the folder of a run"),
+    ],
+)
+def test_folders_that_are_no_runs(file, content, message, repository, tmp_path):
+    """Older, cut off, or of something else: one line that says so."""
+    shutil.copytree(repository / "out/good", tmp_path / "run")
+    (tmp_path / "run" / file).unlink()
+    if content is not None:
+        (tmp_path / "run" / file).write_bytes(content)
+    done = dropspin("check", "run", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def scripts():

@@ -96,4 +96,4 @@ def again(results: Results, row: Row, baseline: str | None = None) -> str:
     named = [word for dt in steps for word in ("--dt", repr(float(dt)))]
     held = [] if baseline is None or row["kind"] != "baseline" else ["--baseline", baseline]
     engine = results.provenance["names"].get(row["engine"], row["engine"])  # my_module:MyEngine has a name of its own in results
-    return shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", engine, *named, *held])
+    return shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", engine, *named, *held, "-o", "out/again"])

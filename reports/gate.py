@@ -1,8 +1,10 @@
 """What a check against accepted figures came to: sentences, a Markdown summary, annotations, and rows for programs."""
 
 import os
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -22,39 +24,51 @@ ANNOTATIONS = 10
 """As many as GitHub shows of one step."""
 
 
-def sentences(checked: Checked, baseline: Baseline | None, path: str | None) -> list[str]:
+class Held(NamedTuple):
+    """What a run is held against: the accepted figures and their file; and the folder of the run, for the commands."""
+
+    baseline: Baseline
+    path: str
+    run: str
+
+    @property
+    def to_accept(self) -> str:
+        """The command that accepts the run's figures."""
+        return shlex.join(["dropspin", "accept", self.run, "--baseline", self.path, "--reason"]) + ' "…"'
+
+
+def sentences(checked: Checked, held: Held | None) -> list[str]:
     """What came of a check, the verdict last."""
     told = verdict_sentence(_without_baseline(checked.results))
-    if baseline is None:
+    if held is None:
         return [told]
     found = checked.changes
     regressed = checked.results.frame[(checked.results.frame["kind"] == "baseline") & (checked.results.frame["verdict"] == "failed")]
     listed = [_of_engine(str(engine), rows, found) for engine, rows in regressed.groupby("engine", sort=False)]
     if len(regressed):
-        listed += _since_then(checked, baseline)
+        listed += [*_since_then(checked, held.baseline), f"If that is as it should be from now on: {held.to_accept}"]
     better, new = (found[found["change"] == change] for change in ("better", "new"))
     if len(better):
-        listed.append(f"{_count(better, 'figure')} better than accepted; to hold engines to that from now on: {_accept(path)}")
+        listed.append(f"{_count(better, 'figure')} better than accepted; to hold engines to that from now on: {held.to_accept}")
     if len(new):
-        listed.append(f"{_count(new, 'figure')} new, and not accepted yet: {_accept(path)}")
+        listed.append(f"{_count(new, 'figure')} new, and not accepted yet: {held.to_accept}")
     if len(checked.not_run):
         where = checked.not_run.drop_duplicates(["scene", "engine"])
         listed.append(f"{len(checked.not_run):,} accepted figures were not run, of {len(where)} pairs of a scene and an engine.")
     known = checked.results.frame["reason"].str.startswith("accepted as a known failure").sum()
     if known:
         listed.append(f"{known:,} checks fail as they were known to when they were accepted.")
-    held = int(found["change"].isin(["same", "better"]).sum())
-    judged = held + len(regressed)
+    judged = int(found["change"].isin(["same", "better"]).sum()) + len(regressed)
     verdict = f"{len(regressed):,} of {judged:,} accepted figures fail." if len(regressed) else f"All {judged:,} accepted figures hold."
     return [*listed, f"{told} {verdict}"]
 
 
-def summary(checked: Checked, baseline: Baseline | None, path: str | None, found: Sequence[Failing]) -> str:
+def summary(checked: Checked, held: Held | None, found: Sequence[Failing]) -> str:
     """The same as Markdown that fits a comment on a pull request."""
     results = checked.results
     return markdown(
         "check.md",
-        sentences=sentences(checked, baseline, path),
+        sentences=sentences(checked, held),
         failing=found[:IN_SUMMARY],
         more=max(0, len(found) - IN_SUMMARY),
         shown=AT_MOST,
@@ -131,10 +145,6 @@ def _tally(rows: pd.DataFrame) -> dict[str, int]:
 
 def _count(rows: pd.DataFrame, what: str, one: str = "is", many: str = "are") -> str:
     return f"{len(rows):,} {what}{'' if len(rows) == 1 else 's'} {one if len(rows) == 1 else many}"
-
-
-def _accept(path: str | None) -> str:
-    return f"dropspin accept RUN --baseline {path} --reason …"
 
 
 def _escaped(text: str, more: str = "") -> str:

@@ -7,9 +7,9 @@ import click
 from reports.verbs.options import as_json, baseline_option, summary_option, write_text
 
 if TYPE_CHECKING:
-    from comparisons.regressions.baseline import Baseline
     from comparisons.regressions.checking import Checked
     from reports.failing import Failing
+    from reports.gate import Held
 
 BASELINE = "dropspin-baseline.toml"
 
@@ -38,27 +38,27 @@ def check(run: str, baseline: str | None, junit: str | None, summary: str | None
     from reports.terminal import json_rows
 
     results = restore(Path(run), arrays=False)
-    accepted = None if baseline is None else load_baseline(baseline)
-    checked = checked_against(results, accepted)
+    held = None if baseline is None else gate.Held(load_baseline(baseline), baseline, run)
+    checked = checked_against(results, None if held is None else held.baseline)
     found = failing(checked.results, baseline)
     if junit is not None:
         write_text(junit, junit_xml(checked.results, baseline).decode())
     if summary is not None:
-        write_text(summary, gate.summary(checked, accepted, baseline, found), append=True)
+        write_text(summary, gate.summary(checked, held, found), append=True)
     if json_output:
         click.echo(json_rows(checked.results.frame))
     else:
-        tell(checked, accepted, baseline, found)
+        tell(checked, held, found)
     return checked.results.exit_code(frozenset(results.provenance.get("named", [])))
 
 
-def tell(checked: "Checked", accepted: "Baseline | None", baseline: str | None, found: "list[Failing]") -> None:
+def tell(checked: "Checked", held: "Held | None", found: "list[Failing]") -> None:
     """Print what failed, then what came of the check; in GitHub's runners annotations too."""
     from reports import gate
     from reports.tables import print_failing
 
     print_failing(found, gate.AT_MOST)
-    for sentence in gate.sentences(checked, accepted, baseline):
+    for sentence in gate.sentences(checked, held):
         click.echo(sentence)
     for command in gate.annotations(found):
         click.echo(command)

@@ -73,21 +73,17 @@ def run(
     from reports import look
     from reports.failing import failing
     from reports.folder import Measured, fill, run_folder
-    from reports.terminal import json_rows, print_rows, progress_bar, status
+    from reports.gate import Held
+    from reports.terminal import json_rows, progress_bar, status
     from reports.verbs.check import tell
 
     loaded = [scene for name in scenes or ["core"] for scene in (_core() if name == "core" else [scenarios.load(name)])]
     chosen = engines or CORE_ENGINES
     steps = dts or comparisons.DEFAULT_DTS
     named = frozenset(name.strip() for name in engines)
-    accepted = None if baseline is None else load_baseline(baseline)
+    held = None if baseline is None else Held(load_baseline(baseline), baseline, output)
     if dry_run:
-        plan = look.plan(loaded, chosen, steps)
-        if json_output:
-            click.echo(json.dumps(plan, indent=1, ensure_ascii=False))
-        else:
-            print_rows(look.plan_rows(plan), json_output=False)
-        return 0
+        return _print_plan(look.plan(loaded, chosen, steps), json_output)
     measured = Measured(output)
     try:
         with run_folder(output) as folder:
@@ -103,7 +99,7 @@ def run(
                 results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
             stop_if_interrupted()
             results = replace(results, provenance={**results.provenance, "named": sorted(named)})
-            checked = check(results, accepted)
+            checked = check(results, None if held is None else held.baseline)
             if not json_output:
                 reports.print_table(results)
             with status("writing the report"):
@@ -115,10 +111,21 @@ def run(
     if json_output:
         click.echo(json_rows(checked.results.frame))
     else:
-        if accepted is not None:
-            tell(checked, accepted, baseline, [one for one in failing(checked.results, baseline) if one.accepted])
+        if held is not None:
+            tell(checked, held, [one for one in failing(checked.results, baseline) if one.accepted])
         click.echo(f"Report: {os.path.join(output, 'report.html')}")
     return checked.results.exit_code(named)
+
+
+def _print_plan(plan: dict[str, Any], json_output: bool) -> int:
+    from reports import look
+    from reports.terminal import print_rows
+
+    if json_output:
+        click.echo(json.dumps(plan, indent=1, ensure_ascii=False))
+    else:
+        print_rows(look.plan_rows(plan), json_output=False)
+    return 0
 
 
 def _core() -> "list[Scenario]":

@@ -1,7 +1,9 @@
 """The gate: what is planted is found and named first, what has not changed never fails, and each change is put down to what changed."""
 
 import datetime
+import os
 import re
+import subprocess
 import sys
 import tomllib
 from dataclasses import replace
@@ -160,6 +162,23 @@ def test_unchanged_engines_fail_nothing(before, accepted):
         assert set(checked.changes["change"]) == {"same"}
     elsewhere = figures(rerun(OnAnotherMachine)).merge(figures(before), on=KEY)
     assert (elsewhere["value_x"] != elsewhere["value_y"]).mean() > 0.3  # it does round otherwise
+
+
+@pytest.mark.slow
+def test_twenty_repeats_on_a_loaded_machine_fail_nothing():
+    """The default catalogue through MuJoCo and PyBullet, beside twice as many other processes at work as there are processors."""
+    scenes = [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags]
+    engines = ["mujoco", "pybullet"]
+    accepted, _ = accept(comparisons.run(scenes, engines), Baseline(), "first", TODAY)
+    burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * (os.cpu_count() or 1))]
+    try:
+        for _ in range(20):
+            checked = check(comparisons.run(scenes, engines), accepted)
+            assert set(checked.changes["change"]) == {"same"}
+            assert checked.results.exit_code() == 0
+    finally:
+        for burner in burners:
+            burner.kill()
 
 
 @given(

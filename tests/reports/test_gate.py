@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -203,6 +204,14 @@ def test_bad_usage(arguments, message, repository):
     assert message in done.stderr
     assert "Traceback" not in done.stderr + done.stdout
     assert sorted(repository.rglob("*")) == before
+
+
+def test_the_page_s_python_runs():
+    """As it stands."""
+    [block] = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/gate.md").read_text(), re.DOTALL | re.MULTILINE)
+    names: dict[str, object] = {}
+    exec(block, names)
+    assert set(names["changes"].figures["change"]) == {"same"}
 
 
 @pytest.mark.parametrize(

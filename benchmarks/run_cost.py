@@ -77,7 +77,7 @@ def run_cost() -> None:
     for engine in (Document, MuJoCo, PyBullet):
         watch(engine, "prepare", "building")
     watch(Document, "record_ensemble", "stepping and recording")
-    setattr(import_module("comparisons.run"), "Cells", Here)  # noqa: B010
+    import_module("comparisons.run").Cells = Here
     core = [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags]
     comparisons.run(core[:1], ["document"])  # compiled
     spent.clear()

@@ -9,6 +9,7 @@ from comparisons.metrics import METRICS
 from comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
 from comparisons.regressions.checking import check
 from comparisons.regressions.comparing import compare
+from comparisons.regressions.history import history
 from comparisons.results import Results
 from comparisons.run import DEFAULT_DTS, measure, run
 from comparisons.simulating import simulate
@@ -32,6 +33,7 @@ __all__ = [
     "compare",
     "engine",
     "engine_names",
+    "history",
     "limits",
     "load_baseline",
     "measure",

@@ -108,7 +108,7 @@ class Cells:
                 if self._closed:
                     raise Closed
                 if self._has_left(contestant.label) and not wait([task], timeout=GRACE).done:
-                    self._forget(contestant.label)
+                    self.renew(contestant)
                     raise Failed("crashed", "its process ended by itself, as if all were well")
             result: Result = task.result()
         except OutOfTime:
@@ -129,11 +129,7 @@ class Cells:
 
     def renew(self, contestant: Contestant) -> None:
         """Give an engine a new process for its next piece of work."""
-        self._forget(contestant.label)
-
-    def _forget(self, label: str) -> None:
-        """Begin anew with the next piece of work."""
-        pool = self._pools.pop(label)
+        pool = self._pools.pop(contestant.label)
         pool.stop()  # type: ignore[no-untyped-call]
         pool.join()
 

@@ -112,7 +112,7 @@ def range_rows(found: Sequence[Extremes]) -> list[dict[str, str]]:
     return [
         {
             "scene": line.scene.name,
-            "axis": line.axis.name + ("" if line.axis.unit == "1" else f" [{line.axis.unit}]"),
+            "axis": line.axis.label,
             "engine": line.engine,
             **_range(line),
         }
@@ -122,15 +122,14 @@ def range_rows(found: Sequence[Extremes]) -> list[dict[str, str]]:
 
 
 def _range(line: Explored) -> dict[str, str]:
-    own = line.at(line.base)
-    reach = line.reach(("sound",))
-    if reach is None:
+    points, sound = line.points, line.sound_range
+    if sound is None:
+        own = line.at(line.base)
         return {"sound from": "–", "to": "–", "beyond": f"{own.condition.replace('_', ' ')} as it is: {own.finding.said}"}
-    low, high = reach
-    first, last = (next(number for number, point in enumerate(line.points) if point.value == value) for value in reach)
-    outside = [line.points[number] for number in (first - 1, last + 1) if 0 <= number < len(line.points)]
+    first, last = sound
+    outside = [points[number] for number in (first - 1, last + 1) if 0 <= number < len(points)]
     beyond = "; ".join(f"{point.condition.replace('_', ' ')} at {point.value:.4g}" for point in outside)
-    return {"sound from": f"{low:.4g}", "to": f"{high:.4g}", "beyond": beyond or "as far as was looked"}
+    return {"sound from": f"{points[first].value:.4g}", "to": f"{points[last].value:.4g}", "beyond": beyond or "as far as was looked"}
 
 
 def write(found: Sequence[Extremes], folder: Path) -> None:

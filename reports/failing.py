@@ -95,4 +95,5 @@ def again(results: Results, row: Row, baseline: str | None = None) -> str:
     steps = every if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
     named = [word for dt in steps for word in ("--dt", repr(float(dt)))]
     held = [] if baseline is None or row["kind"] != "baseline" else ["--baseline", baseline]
-    return shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", row["engine"], *named, *held])
+    engine = results.provenance["names"].get(row["engine"], row["engine"])  # my_module:MyEngine has a name of its own in results
+    return shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", engine, *named, *held])

@@ -41,6 +41,15 @@ def rows(found: History) -> list[dict[str, str]]:
     return [row for move in found.moves for row in _of_move(found, move)]
 
 
+def listed(found: History) -> list[str]:
+    """The same, a line each."""
+    return [
+        f"{row['run']} · {row['engine']} · {row['scene']}: "
+        f"{row['figure']} at {row['step']} from {row['before']} to {row['now']}, {row['change']}"
+        for row in rows(found)
+    ]
+
+
 def sentences(found: History) -> list[str]:
     """What each move is put down to."""
     told = [
@@ -54,14 +63,10 @@ def sentences(found: History) -> list[str]:
 
 def write(found: History, folder: Path) -> None:
     """`history.csv` and `history.json` with every figure of every run, `history.md`, and a plot for each scene."""
-    table = found.figures.drop(columns="verdict").merge(found.stamps.rename_axis("number").reset_index(), left_on="run", right_on="number")
-    table = table.drop(columns=["run_x", "number"]).rename(columns={"run_y": "run"})
-    write_table(
-        folder,
-        "history",
-        [str(name) for name in table],
-        [{str(key): value for key, value in row.items()} for row in table.to_dict("records")],
-    )
+    figures = found.figures.drop(columns="verdict").assign(run=[found.names[number] for number in found.figures["run"]])
+    table = figures.merge(found.stamps, on="run")
+    records = [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
+    write_table(folder, "history", [str(name) for name in table], records)
     scenes = list(dict.fromkeys(found.figures["scene"]))
     for scene in scenes:
         history_figure(found, scene).savefig(folder / f"{scene}.svg")

@@ -32,7 +32,8 @@ def junit_xml(results: Results, baseline: str | None = None) -> bytes:
         rows = results.frame[(results.frame["engine"] == engine) & results.frame["verdict"].isin(JUDGED)]
         suite.add_testcases([_case(results, row, baseline) for row in rows.to_dict("records")])
         document.add_testsuite(suite)
-    document.update_statistics()  # type: ignore[no-untyped-call]
+    for total in ("tests", "failures", "errors", "time"):  # the library would add `skipped`, for which the schema has no place here
+        setattr(document, total, sum(getattr(suite, total) for suite in document))
     return bytes(document.tostring())  # type: ignore[no-untyped-call]
 
 

@@ -17,6 +17,19 @@ AT_MOST = 12
 """Lines of a table; JSON has them all."""
 
 
+def listed(changes: Changes) -> list[str]:
+    """What changed, a line for each metric of an engine in a scene, under a line for each kind of change."""
+    told = []
+    for title, lines in tables(changes):
+        told.append(title)
+        told += [
+            f"  {line['scene']} · {line['engine']}: {line['figure']} at {line['step']} from {line['before']} to {line['now']}"
+            f"{'' if line['ratio'] == '–' else ', ' + line['ratio'] + ' times'}, {line['tolerances']} times its tolerance away"
+            for line in lines
+        ]
+    return told
+
+
 def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
     """A title and rows for each kind of change that there is."""
     found = []
@@ -40,11 +53,8 @@ def sentences(changes: Changes, fail_speed: float | None) -> list[str]:
         told.append(f"In one of the runs only: {', '.join(changes.in_one_only)}.")
     told += [_speed(change, fail_speed) for change in changes.speed]
     regressed = changes.regressions
-    verdict = (
-        f"{_figures(len(regressed))} of {len(changes.figures):,} worse"
-        if len(regressed)
-        else f"None of {len(changes.figures):,} figures is worse"
-    )
+    total = _figures(len(changes.figures))
+    verdict = f"{len(regressed):,} of {total} are worse, moved or gone" if len(regressed) else f"None of {total} is worse"
     slower = [] if fail_speed is None else changes.slower(fail_speed)
     late = f"; slower than allowed: {', '.join(change.engine for change in slower)}" if slower else ""
     return [*told, f"{verdict}{late}."]
@@ -79,7 +89,7 @@ def _lines(figures: pd.DataFrame) -> list[dict[str, str]]:
 
 def _line(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
     before, after = row["before"], row["value"]
-    ratio = abs(after / before) if before else math.inf
+    ratio = abs(after / before) if abs(before) > row["tolerance"] else math.inf  # of what is rounding a ratio says nothing
     return {
         "scene": row["scene"],
         "engine": row["engine"],

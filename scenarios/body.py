@@ -19,7 +19,7 @@ PositiveVector = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=
 
 
 class Table(BaseModel):
-    """A table of a scene file: unknown keys are refused, values stay as loaded."""
+    """A table of a file: unknown keys are refused, values stay as loaded."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -128,6 +128,7 @@ LATE_IMPACTS = "impacts noticed late"
 SEMI_IMPLICIT_EULER = "semi-implicit Euler"
 EXPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term explicit"
 IMPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term implicit"
+MIDPOINT_GYROSCOPIC = "semi-implicit Euler with turns by the implicit midpoint rule"
 
 
 def may_tumble(scene: Scenario) -> bool:

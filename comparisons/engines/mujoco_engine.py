@@ -9,9 +9,8 @@ import numpy as np
 from mujoco import rollout
 
 from comparisons.engines.base import (
-    EXPLICIT_GYROSCOPIC,
-    IMPLICIT_GYROSCOPIC,
     LATE_IMPACTS,
+    MIDPOINT_GYROSCOPIC,
     PROFILES,
     SEMI_IMPLICIT_EULER,
     Array,
@@ -23,9 +22,9 @@ from comparisons.engines.base import (
     Number,
     Simulation,
     may_tumble,
-    version,
 )
 from comparisons.engines.mujoco_contact import IMPEDANCE, contact
+from comparisons.engines.mujoco_versions import SIDE_BY_SIDE, flight_of, numbers_of, refusal, refusal_of_boxes, solver
 from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.predictions import bounce_error, flight_error
 from reference_impl.simulate import usable_cores
@@ -34,6 +33,7 @@ from scenarios.body import Box, Sphere
 from scenarios.mechanics import is_diagonal, principal_axes
 from scenarios.rotations import conjugate, cross, rotate
 
+VERSION = numbers_of(mujoco.__version__)
 DEFAULT_INFINITE_FRICTION = 10.0  # with the pyramidal cones of the default, 1e6 would be no friction and no contact at all
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -48,10 +48,6 @@ NO_SLIP = 1e-3  # m/s; what is left of a slip that friction stops
 ROW = slice(1, 14)  # of a full state, after the time: position, quaternion, velocities
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-
-
-SOLVER = {"cone": "elliptic", "jacobian": "dense", "diagexact": "enable", "island": "disable", "autoreset": "disable"}
-"""What calibration sets of the solver, by the names that MJCF has for it."""
 
 REASONS = {
     "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; the default's spring leaves 0.13, whatever is asked",
@@ -91,16 +87,18 @@ class MuJoCo(Engine):
 
     @property
     def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
-        """Order of accuracy that the manual claims for the integrator."""
+        """Order of accuracy that the manual of any version claims for the integrator; RK4's turns keep it from 4.0 on."""
         return 4.0 if self.option("integrator") == "rk4" else 1.0
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Of the integrator; they differ in the gyroscopic term. The default's contacts are like nobody else's."""
         integrator = self.option("integrator")
+        tumbling = flight_of(integrator, VERSION)
         if integrator == "rk4":
-            return "classical Runge-Kutta"
-        gyroscopic = EXPLICIT_GYROSCOPIC if integrator == "euler" else IMPLICIT_GYROSCOPIC
-        flight = gyroscopic if may_tumble(scene) else SEMI_IMPLICIT_EULER
+            return tumbling
+        # The midpoint's turns are by the mean of two angular velocities, which differ under any torque.
+        torque = tumbling == MIDPOINT_GYROSCOPIC and (scene.damping is not None or scene.floor is not None)
+        flight = tumbling if torque or may_tumble(scene) else SEMI_IMPLICIT_EULER
         if scene.floor is None:
             return flight
         return f"{flight}, {LATE_IMPACTS}" if self._stops_in_a_step else None
@@ -122,8 +120,10 @@ class MuJoCo(Engine):
         return bounce_error(scene, truth, metric, dt, restitution_lost=1.0 - IMPEDANCE)
 
     def declines(self, scene: Scenario) -> str | None:
-        """What calibration cannot map."""
+        """What calibration cannot map, and what the installed version cannot do."""
         body, floor = scene.body, scene.floor
+        if (too_old := refusal(VERSION)) is not None:
+            return too_old
         if min(body.mass, *np.linalg.eigvalsh(body.inertia_tensor)) < mujoco.mjMINVAL:
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
         if scene.damping is not None and not is_diagonal(body.inertia_tensor):
@@ -134,6 +134,8 @@ class MuJoCo(Engine):
             return "only spheres and boxes are mapped onto a floor"
         if self.option("profile") == "default":
             return None
+        if isinstance(body, Box) and (too_old := refusal_of_boxes(VERSION)) is not None:
+            return too_old
         if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
             return "RK4 has no restitution in one step: all its stages see the contact's damper; use integrator=euler, or spring_steps=20"
         if floor.restitution < LEAST_OF_A_SPRING and "spring_steps" in self.options:
@@ -146,7 +148,8 @@ class MuJoCo(Engine):
         """As Python and as MJCF."""
         if self.option("profile") == "default" or not can_be_pasted(scene):
             return {}
-        values = {"engine": "MuJoCo", "dt": dt, "integrator": self.option("integrator"), "solver": SOLVER, "pair": self._pair(scene, dt)}
+        settings = {"integrator": self.option("integrator"), "solver": solver(VERSION), "pair": self._pair(scene, dt)}
+        values = {"engine": "MuJoCo", "dt": dt} | settings
         return {
             "python": rendered("mujoco.py.jinja", scene, why=self.reasons, **values),
             "mjcf": rendered("mujoco.xml.jinja", scene, **values),
@@ -162,7 +165,9 @@ class MuJoCo(Engine):
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return self._prepare(scene, dt)
 
-    def prepare_ensemble(self, members: Sequence[Scenario], dt: float) -> Ensemble:
+    def prepare_ensemble(self, members: Sequence[Scenario], dt: float) -> Ensemble | None:
+        if VERSION < SIDE_BY_SIDE:
+            return None
         return MuJoCoEnsemble([self._prepare(member, dt) for member in members])
 
     def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
@@ -170,7 +175,8 @@ class MuJoCo(Engine):
         if self.option("profile") == "default":
             return MuJoCoSimulation(scene, _default_specification(scene, dt, self.option("integrator")), settings)
         pair = self._pair(scene, dt)
-        return MuJoCoSimulation(scene, _specification(scene, dt, self.option("integrator"), pair), settings | SOLVER | pair)
+        settings |= solver(VERSION) if pair else {"autoreset": "disable"}
+        return MuJoCoSimulation(scene, _specification(scene, dt, self.option("integrator"), pair), settings | pair)
 
 
 class MuJoCoSimulation(Simulation):
@@ -180,7 +186,7 @@ class MuJoCoSimulation(Simulation):
         self._scene = scene
         self._model = specification.compile()
         self.staggered = settings["integrator"] != "rk4"
-        self.settings = {"version": version("mujoco"), **settings}
+        self.settings = {"version": mujoco.__version__, **settings}
         if scene.damping is not None:
             rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)
             rates[3:] *= np.diag(scene.body.inertia_tensor)
@@ -340,21 +346,23 @@ def _default_specification(scene: Scenario, dt: float, integrator: str) -> Any:
 
 
 def _specification(scene: Scenario, dt: float, integrator: str, pair: Mapping[str, Any]) -> Any:
-    """The settings of `SOLVER` and of a contact pair; without a pair, neither contacts nor constraints are looked for."""
+    """The solver's settings and those of a contact pair; without a pair, neither contacts nor constraints are looked for."""
     spec, body = _free_body(scene, dt, integrator)
-    option = spec.option
+    option, disable = spec.option, mujoco.mjtDisableBit
+    if not pair:
+        option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
+        return spec
+    flags = solver(VERSION)
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    disable, enable = mujoco.mjtDisableBit, mujoco.mjtEnableBit
-    option.disableflags |= disable.mjDSBL_ISLAND
-    option.enableflags = enable.mjENBL_DIAGEXACT
-    if pair:
-        passive = {"contype": 0, "conaffinity": 0}  # the pair is all there is
-        _add_shape(body, scene, name="shape", **passive)
-        spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **passive)
-        spec.add_pair(geomname1="floor", geomname2="shape", **pair)
-    else:
-        option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
+    if "island" in flags:
+        option.disableflags |= disable.mjDSBL_ISLAND
+    if "diagexact" in flags:
+        option.enableflags = mujoco.mjtEnableBit.mjENBL_DIAGEXACT
+    passive = {"contype": 0, "conaffinity": 0}  # the pair is all there is
+    _add_shape(body, scene, name="shape", **passive)
+    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **passive)
+    spec.add_pair(geomname1="floor", geomname2="shape", **pair)
     return spec
 
 

@@ -37,7 +37,6 @@ class Axis:
     Attributes:
         name: As on the command line.
         unit: SI; '1' for a ratio.
-        meaning: What is varied, and what is kept.
         applies: Whether a scene has it.
         values: The values to begin with, for a scene at a step, in order.
         base: The value that a scene has at a step.
@@ -49,7 +48,6 @@ class Axis:
 
     name: str
     unit: str
-    meaning: str
     applies: Callable[[Scenario], bool]
     values: Callable[[Setting], list[float]]
     base: Callable[[Setting], float]
@@ -57,6 +55,11 @@ class Axis:
     between: Between
     coordinate: Callable[[float], float] = math.log
     promised: bool = False
+
+    @property
+    def label(self) -> str:
+        """Its name, with the unit if it has one."""
+        return self.name if self.unit == "1" else f"{self.name} [{self.unit}]"
 
 
 def natural_time(scene: Scenario) -> float:
@@ -257,12 +260,17 @@ AXES = {
     axis.name: axis
     for axis in (
         Axis(
-            "step", "s", "the time step; for as long as the scene lasts", lambda scene: True, _steps, lambda s: s.dt, _with_step, _half_way
+            "step",
+            "s",
+            lambda scene: True,
+            _steps,
+            lambda setting: setting.dt,
+            _with_step,
+            _half_way,
         ),
         Axis(
             "spin",
             "rad/s",
-            "the angular velocity at the start, its axis kept; in flight for as many turns",
             lambda scene: _spin(scene) > 0.0,
             lambda setting: _logarithmic(0.01 / setting.dt, 10.0 / setting.dt, 7),
             lambda setting: _spin(setting.scene),
@@ -272,7 +280,6 @@ AXES = {
         Axis(
             "height",
             "m",
-            "how far the body falls; for as many times its fall",
             _falls,
             lambda setting: _logarithmic(1e-3, 1e6, 10),
             lambda setting: setting.scene.clearance,
@@ -282,7 +289,6 @@ AXES = {
         Axis(
             "inertia-ratio",
             "1",
-            "the largest moment of inertia over the least; the largest kept, and the shape",
             lambda scene: may_tumble(scene) and not isinstance(scene.body, Sphere) and is_diagonal(scene.body.inertia_tensor),
             lambda setting: _logarithmic(1.0, 1e6, 7),
             _inertia_ratio,
@@ -292,7 +298,6 @@ AXES = {
         Axis(
             "mass",
             "kg",
-            "the mass, inertia with it: the motion should be the same",
             lambda scene: True,
             _masses,
             lambda setting: setting.scene.body.mass,
@@ -303,7 +308,6 @@ AXES = {
         Axis(
             "restitution",
             "1",
-            "the floor's restitution",
             lambda scene: scene.floor is not None and scene.floor.restitution < 1.0,
             lambda setting: [0.0, 0.5, 0.9, 0.99, 0.999, 0.9999],
             lambda setting: setting.scene.floor.restitution if setting.scene.floor is not None else math.nan,
@@ -314,7 +318,6 @@ AXES = {
         Axis(
             "duration",
             "s",
-            "how long it goes on",
             lambda scene: True,
             _durations,
             lambda setting: setting.scene.duration,
@@ -324,7 +327,6 @@ AXES = {
         Axis(
             "size",
             "m",
-            "the body's size; falls from as high",
             lambda scene: scene.floor is not None,
             _sizes,
             lambda setting: setting.scene.body.size,
@@ -334,7 +336,6 @@ AXES = {
         Axis(
             "scale",
             "1",
-            "all lengths times a factor, all times and the step times its root: the motion should be the same",
             lambda scene: True,
             lambda setting: [value / setting.scene.body.size for value in _sizes(setting)],
             lambda setting: 1.0,

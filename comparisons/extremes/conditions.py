@@ -10,11 +10,11 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.comparison import Comparison, Unresolved, exactly
+from comparisons.comparison import Comparison, Unresolved
 from comparisons.metrics import metrics_for
 from scenarios import Scenario, Trajectory, Truth
 from scenarios.body import Sphere
-from scenarios.mechanics import energy, lowest_height
+from scenarios.mechanics import lowest_height
 from scenarios.model import TOUCHING
 from scenarios.rotations import length, rotate
 
@@ -56,7 +56,7 @@ class Run(NamedTuple):
         scene: The scene.
         dt: The engine's step [s].
         own: Its motion for as long as the scene lasts.
-        whole: Its motion to the end, the start first; rows may be farther apart than in `own`.
+        whole: Its motion to the end; it begins with `own`.
         truth: The scene's.
     """
 
@@ -74,25 +74,27 @@ def worst(findings: list[Finding]) -> Finding:
 
 def judged(run: Run, within: float) -> Finding:
     """The worst that a run shows; `within` is how large an error may be."""
-    if run.own.first_bad_row is not None or run.whole.first_bad_row is not None:
-        bad = next(motion for motion in (run.own, run.whole) if motion.first_bad_row is not None)
-        return Finding("diverged", "not finite", math.inf, f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s")
+    bad = run.whole.first_bad_row
+    if bad is not None:
+        return Finding("diverged", "not finite", math.inf, f"the state is not finite at t = {run.whole.t[bad]:g} s")
     with np.errstate(all="ignore"):  # numbers may be too large for their squares
-        found = [*_energy_that_rises(run), *_tunnels(run), *_sinks(run), *_errors(run, within), *_lost(run), *_restless(run)]
+        whole = Comparison.with_truth(run.scene, run.whole, run.truth)
+        exact = None if whole.reference is None else whole.reference[: len(run.own)]
+        own = Comparison.with_truth(run.scene, run.own, run.truth, exact)
+        found = [*_energy_that_rises(whole), *_tunnels(run), *_sinks(run), *_errors(run, own, within), *_lost(own), *_restless(run, whole)]
     return worst(found)
 
 
-def _energy_that_rises(run: Run) -> Iterator[Finding]:
+def _energy_that_rises(whole: Comparison) -> Iterator[Finding]:
     """Above the start's; on a floor that grips, Newton's restitution may add some, and more is allowed there."""
     try:
-        scale = Comparison.with_truth(run.scene, run.whole, run.truth).energy_scale
+        scale = whole.energy_scale
     except Unresolved:
         return
-    over_time = energy(run.scene, run.whole)
-    gain = float(np.max(over_time) - over_time[0]) / scale
+    gain = float(np.max(whole.energy) - whole.energy[0]) / scale
     if not gain <= BLOWN_UP:
         yield Finding("diverged", "blows up", gain, f"the energy rises by {gain:.1e} of the scene's")
-    elif gain > (GAIN_BY_LAW if _may_gain(run.scene) else GAIN):
+    elif gain > (GAIN_BY_LAW if _may_gain(whole.scene) else GAIN):
         yield Finding("gains_energy", "gains energy", gain, f"the energy rises by {gain:.2g} of the scene's")
 
 
@@ -123,14 +125,13 @@ def _sinks(run: Run) -> Iterator[Finding]:
         yield Finding("sinks", "sinks", end, f"{end:.3g} m below the floor after {run.whole.t[-1]:.3g} s, {half_way:.3g} m half way")
 
 
-def _errors(run: Run, within: float) -> Iterator[Finding]:
-    case = Comparison.with_truth(run.scene, run.own, run.truth)
-    known = ERRORS if run.own.t[1] < 1.5 * run.dt else ERRORS_OF_FEW_ROWS
+def _errors(run: Run, own: Comparison, within: float) -> Iterator[Finding]:
+    known = ERRORS if own.dt < 1.5 * run.dt else ERRORS_OF_FEW_ROWS
     for metric in metrics_for(run.scene, run.truth):
         if metric.name not in known:
             continue
         try:
-            size = abs(metric.average([case]).value)
+            size = abs(metric.average([own]).value)
         except Unresolved:
             continue
         if size <= within:
@@ -142,23 +143,22 @@ def _errors(run: Run, within: float) -> Iterator[Finding]:
             yield Finding("inaccurate", metric.name, size if math.isfinite(size) else math.inf, said)
 
 
-def _lost(run: Run) -> Iterator[Finding]:
+def _lost(own: Comparison) -> Iterator[Finding]:
     """Somewhere else than the truth, whatever the metrics can resolve."""
-    if run.truth is None:
+    if own.reference is None:
         return
-    exact = exactly(run.truth, run.own.t).position
-    way, size = float(length(exact - exact[0]).max()), run.scene.body.size
+    exact = own.reference.position
+    way, size = float(length(exact - exact[0]).max()), own.scene.body.size
     way = way if way > DEEPER * size else size
-    astray = float(length(run.own.position[: len(exact)] - exact).max()) / way
+    astray = float(length(own.motion.position[: len(exact)] - exact).max()) / way
     if not astray <= ASTRAY:
         yield Finding("inaccurate", "astray", astray, f"its place is off by {astray:.2g} of the way it goes")
 
 
-def _restless(run: Run) -> Iterator[Finding]:
+def _restless(run: Run, whole: Comparison) -> Iterator[Finding]:
     """Moving on where the truth rests, in the last tenth of the run."""
-    truth, times = run.truth, run.whole.t
-    late = times >= 0.9 * times[-1]
-    if truth is None or run.scene.floor is None or not truth.covers(times[late]).all() or truth(times[late]).velocity.any():
+    exact, late = whole.reference, run.whole.t >= 0.9 * run.whole.t[-1]
+    if exact is None or run.scene.floor is None or len(exact) < len(run.whole) or exact.velocity[late].any():
         return
     fastest = float(np.linalg.norm(run.whole.velocity[late], axis=1).max())
     allowed = run.dt * float(np.linalg.norm(run.scene.acceleration))

@@ -1,11 +1,11 @@
 """Where an engine breaks: a few values along an axis, and between any two with different conditions, bisection."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 from comparisons.extremes.axes import Axis, Setting
-from comparisons.extremes.conditions import Finding
+from comparisons.extremes.conditions import Condition, Finding
 from comparisons.extremes.running import Runner
 from scenarios import Scenario
 
@@ -13,19 +13,19 @@ NEAR = 1.03
 """How near to each other, as a ratio, the two values of an edge are."""
 MOST_EDGES = 3
 """Between two of the first values; more are a matter of chance."""
-UNSTEADY = frozenset({"timed_out"})
-"""Conditions whose edges depend on the machine, and are not looked for."""
+UNSTEADY = "timed_out"
+"""The condition whose edges depend on the machine, and are not looked for."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """What becomes of an engine at a value. The finding's condition is one of `CONDITIONS`, or `declined`."""
+    """What becomes of an engine at a value."""
 
     value: float
     finding: Finding
 
     @property
-    def condition(self) -> str:
+    def condition(self) -> Condition:
         """The finding's."""
         return self.finding.condition
 
@@ -58,17 +58,18 @@ class Explored:
         """Where the condition changes."""
         return [Edge(first, second) for first, second in pairwise(self.points) if first.condition != second.condition]
 
-    def reach(self, allowed: Sequence[str]) -> tuple[float, float] | None:
-        """From the scene's own value, how far down and up the condition is one of these; None if it is not at the scene's own."""
-        own = next(number for number, point in enumerate(self.points) if point.value == self.base)
-        if self.points[own].condition not in allowed:
+    @property
+    def sound_range(self) -> tuple[int, int] | None:
+        """From the scene's own value, which point is the first and which the last that is sound; None if it is not at its own."""
+        sound = [point.condition == "sound" for point in self.points]
+        first = last = next(number for number, point in enumerate(self.points) if point.value == self.base)
+        if not sound[first]:
             return None
-        first = last = own
-        while first > 0 and self.points[first - 1].condition in allowed:
+        while first > 0 and sound[first - 1]:
             first -= 1
-        while last < len(self.points) - 1 and self.points[last + 1].condition in allowed:
+        while last < len(sound) - 1 and sound[last + 1]:
             last += 1
-        return self.points[first].value, self.points[last].value
+        return first, last
 
 
 def explored(
@@ -94,7 +95,7 @@ def explored(
 def _find_edges(point: Callable[[float], Point], axis: Axis, near: float, low: Point, high: Point) -> None:
     """Bisect to where the lower value's condition ends, and go on from there."""
     for _ in range(MOST_EDGES):
-        if low.condition == high.condition or {low.condition, high.condition} & UNSTEADY:
+        if low.condition == high.condition or UNSTEADY in (low.condition, high.condition):
             return
         below, above = low, high
         while (middle := axis.between(below.value, above.value, near)) is not None:

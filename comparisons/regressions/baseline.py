@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 import pandas as pd
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from tomlkit.items import InlineTable
 
 from comparisons.ensembles import ENSEMBLE_METRICS
@@ -25,13 +25,14 @@ from comparisons.regressions.figures import KEY, changes, figures, steps_asked
 from comparisons.results import Results
 from comparisons.validating import validated
 from scenarios import DropspinError
+from scenarios.body import Table
 from scenarios.errors import did_you_mean
 from scenarios.loading import read_toml
 
 FORMAT = 1
 LARGEST_FILE = 50_000_000  # bytes
 DIGITS_BELOW = 3
-"""A value is written to a thousandth of its tolerance."""
+"""A value is written to a two-hundredth of its tolerance, and no shorter than this."""
 HEADER = (
     "Figures of rigid-body engines, measured by dropspin, accepted by somebody; one line each.",
     "value ± tolerance, in the unit of the metric; by: which acceptance it is from.",
@@ -41,29 +42,26 @@ STUDIES = {"_order": "order", "_limit": "model_error"}
 """How the names of figures end that several steps together give, and of which kind they are."""
 
 
-class Acceptance(BaseModel):
+class Acceptance(Table):
     """When, why, and of which versions figures were accepted."""
 
-    model_config = ConfigDict(extra="forbid")
     date: datetime.date
     reason: Annotated[str, Field(min_length=1)]
     versions: dict[str, str]
 
 
-class _Line(BaseModel):
+class _Line(Table):
     """A figure in the file."""
 
-    model_config = ConfigDict(extra="forbid")
     value: Annotated[float, Field(allow_inf_nan=False)]
     tolerance: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     by: Annotated[int, Field(ge=1)]
     known_failure: bool = False
 
 
-class _File(BaseModel):
+class _File(Table):
     """The whole file, but for the figures' lines."""
 
-    model_config = ConfigDict(extra="forbid")
     format: Literal[1]
     accepted: dict[Annotated[int, Field(ge=1)], Acceptance]
     scenes: dict[str, str]

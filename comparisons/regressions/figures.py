@@ -76,8 +76,11 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     upper = np.where(way == "larger", np.inf, np.where(errors, np.fmax(old, 0.0), old) + tolerance)
     better = np.where(errors, np.abs(new) < np.abs(old) - tolerance, (way == "larger") & (new > old + tolerance))
     within = (lower <= new) & (new <= upper)
+    other_side = errors & (np.abs(new) <= np.abs(old) + tolerance)
     change = np.select(
-        [np.isnan(old), np.isnan(new), within & better, within, way == "neither"], ["new", "gone", "better", "same", "moved"], "worse"
+        [np.isnan(old), np.isnan(new), within & better, within, (way == "neither") | other_side],
+        ["new", "gone", "better", "same", "moved"],
+        "worse",
     )
     unit = both["unit_after"].where(both["unit_after"].notna(), both["unit_before"])
     found = {"unit": unit, "value": new, "before": old, "tolerance": tolerance, "lower": lower, "upper": upper, "change": change}

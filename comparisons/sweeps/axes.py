@@ -65,8 +65,8 @@ class Listed(Axis):
 
 
 @dataclass(frozen=True)
-class Spaced(Axis):
-    """Values evenly apart from one end to the other, both among them."""
+class _Between(Axis):
+    """So many values from one number to another."""
 
     first: float
     last: float
@@ -75,11 +75,6 @@ class Spaced(Axis):
 
     def __len__(self) -> int:
         return self.count
-
-    def at(self, places: Places) -> NDArray[Any]:
-        found = between(self.first, self.last, self.spacing, places / (self.count - 1))
-        found[places == self.count - 1] = self.last  # to the last digit
-        return found
 
     @property
     def told(self) -> Sequence[Any]:
@@ -87,24 +82,23 @@ class Spaced(Axis):
 
 
 @dataclass(frozen=True)
-class Drawn(Axis):
+class Spaced(_Between):
+    """Values evenly apart from one end to the other, both among them."""
+
+    def at(self, places: Places) -> NDArray[Any]:
+        found = between(self.first, self.last, self.spacing, places / (self.count - 1))
+        found[places == self.count - 1] = self.last  # to the last digit
+        return found
+
+
+@dataclass(frozen=True)
+class Drawn(_Between):
     """Values drawn at random: each depends on the seed, the axis's name and its own number alone."""
 
-    first: float
-    last: float
-    count: int
-    spacing: Spacing
     seed: int
-
-    def __len__(self) -> int:
-        return self.count
 
     def at(self, places: Places) -> NDArray[Any]:
         return between(self.first, self.last, self.spacing, uniform(self.seed, self.name, places))
-
-    @property
-    def told(self) -> Sequence[Any]:
-        return self.first, self.last
 
 
 def between(first: float, last: float, spacing: Spacing, shares: NDArray[np.float64]) -> NDArray[np.float64]:

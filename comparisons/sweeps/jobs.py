@@ -55,12 +55,15 @@ class Jobs:
         """The values that are of the scene."""
         return {name: column for name, column in self.values.items() if not name.startswith(OPTION)}
 
+    def engine_at(self, place: int) -> Engine:
+        """The engine of a job, with its options."""
+        return configured(self.engine, [(name, column[place]) for name, column in self.values.items() if name.startswith(OPTION)])
+
     def labels(self) -> list[str]:
         """The canonical name of each's engine, with its options."""
-        options = {name: column for name, column in self.values.items() if name.startswith(OPTION)}
-        if not options:
+        if len(self.fields) == len(self.values):  # no options among them
             return [self.engine.label] * len(self)
-        return [configured(self.engine, zip(options, row, strict=True)).label for row in zip(*options.values(), strict=True)]
+        return [self.engine_at(place).label for place in range(len(self))]
 
     def starts(self) -> list[int | None]:
         """The number of each's start; None for the scene's own."""

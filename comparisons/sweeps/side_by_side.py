@@ -17,7 +17,7 @@ import reference_impl
 from comparisons.engines.document import Document, reference_body, reference_world
 from comparisons.simulating import LEAST_STEPS, MOST_STEPS
 from comparisons.sweeps.fields import Path, path_of, put, with_fields
-from comparisons.sweeps.jobs import OPTION, Jobs, configured
+from comparisons.sweeps.jobs import OPTION, Jobs
 from comparisons.sweeps.outcomes import Outcomes, origins, truth_metrics
 from comparisons.sweeps.singly import scene_of
 from reference_impl.summary import Moved
@@ -38,7 +38,7 @@ def run_side_by_side(jobs: Jobs, found: Outcomes, metrics: tuple[str, ...]) -> N
     """Run what can be run side by side; the verdicts of all other jobs stay empty."""
     for places in _alike(jobs):
         some = jobs[places]
-        engine = configured(some.engine, [(name, column[0]) for name, column in some.values.items() if name.startswith(OPTION)])
+        engine = some.engine_at(0)
         scene = _representative(some)
         # How many steps a sequential contact leaves unsolved is told of each job, and is counted for one alone.
         if isinstance(engine, Document) and engine.option("contact") == "mean" and scene is not None:

@@ -8,7 +8,7 @@ from comparisons.building import assert_built_as_meant, sound_limits, sound_reco
 from comparisons.engines.base import Diverged
 from comparisons.simulating import assert_step_fits
 from comparisons.sweeps.fields import with_fields
-from comparisons.sweeps.jobs import OPTION, Jobs, configured
+from comparisons.sweeps.jobs import Jobs
 from comparisons.sweeps.outcomes import Outcomes, moved_alone, truth_metrics
 from scenarios import DropspinError, Scenario
 from scenarios.ensemble import spread_start
@@ -19,7 +19,7 @@ def run_singly(jobs: Jobs, place: int, found: Outcomes, metrics: tuple[str, ...]
     dt = float(jobs.dts[place])
     try:
         scene = scene_of(jobs, place)
-        engine = configured(jobs.engine, [(name, column[place]) for name, column in jobs.values.items() if name.startswith(OPTION)])
+        engine = jobs.engine_at(place)
         assert_step_fits(scene, dt)
         refusal = engine.declines(scene)
     except DropspinError as error:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from comparisons.engines.registry import engine
 from comparisons.metrics import METRICS
@@ -16,7 +16,7 @@ from comparisons.sweeps.jobs import OPTION, Sweep, configured
 from comparisons.validating import validated
 from reference_impl.summary import FIGURES
 from scenarios import DropspinError, Scenario, SceneError, load
-from scenarios.body import Number, Positive
+from scenarios.body import Number, Positive, Table
 from scenarios.errors import UnknownName
 from scenarios.loading import read_toml
 
@@ -35,11 +35,7 @@ Seed = Annotated[int, Field(strict=True, ge=0, lt=2**62)]
 Names = Annotated[tuple[Annotated[str, Field(strict=True)], ...], Field(min_length=1), AfterValidator(_different)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Range(_Table):
+class Range(Table):
     """From one number to another."""
 
     first: Annotated[Number, Field(alias="from")]
@@ -63,14 +59,14 @@ class CountedRange(Range):
     count: Annotated[Count, Field(ge=2)]
 
 
-class Draws(_Table):
+class Draws(Table):
     """How many draws, and which."""
 
     count: Count
     seed: Seed
 
 
-class Spec(_Table):
+class Spec(Table):
     """A spec as it is written."""
 
     scenes: Names
@@ -78,8 +74,8 @@ class Spec(_Table):
     dts: Annotated[tuple[Positive, ...], AfterValidator(_different)] = ()
     seeds: Count | Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_different)] | None = None
     metrics: Annotated[tuple[str, ...], AfterValidator(_different)] = ()
-    grid: dict[str, Any] = {}
-    random: dict[str, Any] = {}
+    grid: dict[str, Any] = Field(default_factory=dict)
+    random: dict[str, Any] = Field(default_factory=dict)
 
 
 def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:

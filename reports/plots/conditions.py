@@ -47,7 +47,7 @@ def plot_stability_map(plane: Mapped, axes: "Axes") -> None:
         _draw_segments(line, number, 1.0, axes)
     axes.set_yticks(range(len(plane.rows)), [f"{value:.3g}" for value, _ in plane.rows])
     along, across = plane.axes
-    axes.set_ylabel(_named(across))
+    axes.set_ylabel(across.label)
     _label(along, [point.value for _, line in plane.rows for point in line.points], axes)
     axes.set_title(_in_lines(plane.engine), fontsize=8)
 
@@ -87,12 +87,8 @@ def _label(axis: Axis, values: Sequence[float], axes: "Axes") -> None:
     axes.set_xticks([axis.coordinate(tick) for tick in ticks], [f"{tick:g}".replace("e-0", "e-").replace("e+0", "e") for tick in ticks])
     if high > low:
         axes.set_xlim(axis.coordinate(low), axis.coordinate(high))
-    axes.set_xlabel(_named(axis))
+    axes.set_xlabel(axis.label)
     axes.grid(visible=False)
-
-
-def _named(axis: Axis) -> str:
-    return axis.name + ("" if axis.unit == "1" else f" [{axis.unit}]")
 
 
 def extremes_figure(found: Extremes) -> "Figure":

@@ -6,13 +6,15 @@ import numpy as np
 
 from comparisons.regressions.history import History
 from reports.colours import engine_colours
-from reports.plots.style import metric_label, thinner
+from reports.plots.style import metric_label, power, thinner
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
 LONGEST_LABEL = 22
+SMALLEST, MOST_TICKS = 1e-3, 7
+"""Figures below this share of the largest are drawn near 0, on a linear part of the axis."""
 
 
 def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -> None:
@@ -24,6 +26,8 @@ def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -
         metric: One of its metrics.
         axes: What to draw into.
     """
+    from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
+
     figures = history.figures
     shown = figures[(figures["scene"] == scene_name) & (figures["metric"] == metric) & ~figures["kind"].isin(["order", "model_error"])]
     steps = min(shown["steps"], key=float)
@@ -41,9 +45,20 @@ def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -
         axes.plot(at["run"], at["value"], "o", markersize=13.0, markerfacecolor="none", markeredgecolor=colours[engine])
     sizes = shown["value"].abs()
     if sizes.max() > 0.0:  # figures of several engines, orders of magnitude apart, each visible
-        axes.set_yscale("symlog", linthresh=max(float(sizes[sizes > 0.0].min()), 1e-3 * float(sizes.max())))
+        smallest = max(float(sizes[sizes > 0.0].min()), SMALLEST * float(sizes.max()))
+        linear = float(10.0 ** np.floor(np.log10(smallest)))
+        axes.set_yscale("symlog", linthresh=linear)
+        ticks = SymmetricalLogLocator(linthresh=linear, base=10.0)
+        ticks.set_params(numticks=MOST_TICKS)
+        axes.yaxis.set_major_locator(ticks)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _signed(value)))
+    axes.set_xlabel("run")
     axes.set_xticks(np.arange(len(history.names)), run_labels(history), rotation=30, ha="right")
     axes.set_ylabel(f"{metric_label(metric)}\nat {1e3 * float(steps):g} ms")
+
+
+def _signed(value: float) -> str:
+    return "0" if value == 0.0 else power(value) if value > 0.0 else f"−{power(-value)}"
 
 
 def run_labels(history: History) -> list[str]:

@@ -115,6 +115,8 @@ def label_powers(axes: "Axes", name: str) -> None:
     """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+    if not axes.has_data():  # no engine got as far
+        return
     axis: Axis = getattr(axes, f"{name}axis")
     low, high = axis.get_view_interval()
     if high < LEAST * low:  # else nothing round is in it

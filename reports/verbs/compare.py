@@ -38,7 +38,6 @@ def compare(old: str, new: str, fail_speed: float | None, summary: str | None, j
     from comparisons.regressions.comparing import compare as compared
     from comparisons.store import restore
     from reports import regressions
-    from reports.terminal import print_rows
 
     changes = compared(restore(Path(old), arrays=False), restore(Path(new), arrays=False))
     if summary is not None:
@@ -46,10 +45,7 @@ def compare(old: str, new: str, fail_speed: float | None, summary: str | None, j
     if json_output:
         click.echo(json.dumps(regressions.as_data(changes), indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        for title, rows in regressions.tables(changes):
-            click.echo(title)
-            print_rows(rows, json_output=False)
-        for sentence in regressions.sentences(changes, fail_speed):
-            click.echo(sentence)
+        for line in [*regressions.listed(changes), *regressions.sentences(changes, fail_speed)]:
+            click.echo(line)
     slower = [] if fail_speed is None else changes.slower(fail_speed)
     return int(bool(len(changes.regressions)) or bool(slower))

@@ -19,7 +19,7 @@ def history(runs: tuple[str, ...], output: str, json_output: bool) -> None:
     """
     from comparisons.regressions.history import history as followed
     from reports import history as told
-    from reports.terminal import print_rows, status
+    from reports.terminal import status
     from reports.written import folder_made
 
     with folder_made(output) as folder:
@@ -30,8 +30,6 @@ def history(runs: tuple[str, ...], output: str, json_output: bool) -> None:
     if json_output:
         click.echo(json.dumps(told.rows(found), indent=1, ensure_ascii=False))
         return
-    if found.moves:
-        print_rows(told.rows(found), json_output=False)
-    for sentence in told.sentences(found):
-        click.echo(sentence)
+    for line in [*told.listed(found), *told.sentences(found)]:
+        click.echo(line)
     click.echo(f"Written: {os.path.join(output, 'history.md')}")

@@ -95,32 +95,6 @@ def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
             simulation.advance(3)
 
 
-def rotation_energy(name, steps=500):
-    """E/E₀ of MuJoCo's own free-body test after 5 s: half extents .1 .2 .3, 1 kg, ω₀ = (1, 2, 3), dt .01."""
-    from scenarios.mechanics import kinetic_energy
-
-    scene = scenarios.load(
-        {
-            "duration": steps * 0.01,
-            "body": {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0},
-            "start": {"angular_velocity": [1.0, 2.0, 3.0]},
-        }
-    )
-    energies = kinetic_energy(scene, simulate(scene, name, 0.01))
-    return energies[-1] / energies[0]
-
-
-def test_published_free_body_energies():
-    """Euler 1.0868946 in any version; RK4 1 - 2e-10; implicitfast .9260 from MuJoCo 3.11 on."""
-    assert rotation_energy("mujoco") == pytest.approx(1.0868946, abs=5e-8)
-    assert rotation_energy("mujoco[integrator=rk4]") == pytest.approx(1.0, abs=1e-9)
-    import mujoco
-
-    if tuple(map(int, mujoco.__version__.split(".")[:2])) >= (3, 11):
-        assert rotation_energy("mujoco[integrator=implicitfast]") == pytest.approx(0.9260, abs=5e-5)
-    assert rotation_energy("pybullet") == pytest.approx(0.9260, abs=5e-4)  # the same discretisation
-
-
 # Velocity ratio of a ball dropped from 1 m, at 1/60, 1/240, 1/1000 and 1/4000 s: v+ = e v- at any step.
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 @pytest.mark.parametrize(("restitution", "dt"), list(product([0.0, 0.3, 0.5, 0.8, 0.95], [1 / 60, 1 / 240, 1 / 1000, 1 / 4000])))

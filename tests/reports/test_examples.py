@@ -35,7 +35,7 @@ def test_every_block_runs_and_draws(drawer):
             assert len(axes.get_legend().get_texts()) >= 3
             assert axes.name == "3d" or (axes.get_xlabel() and axes.get_ylabel()), path
             found[path.name] = figure
-    assert len(found) == 11
+    assert len(found) == 12
 
 
 def test_pictures_and_page_belong_together(drawer):

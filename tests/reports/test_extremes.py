@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
@@ -47,8 +48,19 @@ def test_tables(study):
         {"scene": "spin-principal", "engine": "a", "accurate up to": "1 s, 5 rad", "stable up to": "10 s, 50 rad"}
     ]
     ranges = extremes.range_rows([study])
-    assert ranges[0]["sound from"], ranges[0]["to"] == ("1", "10")
-    assert ranges[0]["beyond"] == "diverged at 100"
+    assert [ranges[0][key] for key in ("axis", "sound from", "to", "beyond")] == ["spin [rad/s]", "1", "10", "diverged at 100"]
+
+
+def test_ranges():
+    """Both ways from the scene's own value, as far as it is sound all the way; none if it is not there."""
+    found = line("a", ["sound", "inaccurate", "sound", "sound", "sound", "clamped", "sound"])
+    study = Extremes(SPIN, 5e-3, 0.1, (replace(found, base=1e3), replace(found, base=10.0), line("a", ["sound"])), (), {})
+    told = [(row["sound from"], row["to"], row["beyond"]) for row in extremes.range_rows([study])]
+    assert told == [
+        ("100", "1e+04", "inaccurate at 10; clamped at 1e+05"),
+        ("–", "–", "inaccurate as it is: it is off by 0.2"),
+        ("1", "1", "as far as was looked"),
+    ]
 
 
 def test_files(study, tmp_path):

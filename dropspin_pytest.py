@@ -164,9 +164,8 @@ class Runs:
             unfinished.replace(kept)
         if not found["rows"]:
             pytest.fail(found["said"], pytrace=False)
-        labels = json.loads((folder / "run.json").read_text(encoding="utf-8"))["engines"]
-        by_label = dict(zip(labels, engines or labels, strict=True))
-        return Result(found["rows"][0]["scene"], found["rows"], folder, given, by_label, tuple(dts))
+        names = json.loads((folder / "run.json").read_text(encoding="utf-8"))["provenance"]["names"]
+        return Result(found["rows"][0]["scene"], found["rows"], folder, given, names, tuple(dts))
 
     def _dropspin(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """The installed command, in the root directory; pytest's `pythonpath` holds for the user's engines too."""

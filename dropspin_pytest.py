@@ -47,15 +47,17 @@ class Result:
         scene: The scene's name.
         rows: The rows of `dropspin run --json`: one for each figure, with its value, bounds, verdict and reason.
         folder: With the report and the data; `dropspin check` and `dropspin accept` take it.
-        command: What runs it again, without engines and steps.
+        given: The scene's name or path.
         engines: By their names in the rows, as they were asked for.
+        dts: The steps that were asked for [s]; none for dropspin's own.
     """
 
     scene: str
     rows: list[Row] = field(repr=False)
     folder: Path
-    command: tuple[str, ...] = field(repr=False)
+    given: str = field(repr=False)
     engines: Mapping[str, str] = field(repr=False)
+    dts: tuple[float, ...] = field(repr=False)
 
     def value(self, metric: str, dt: float | None = None, engine: str | None = None) -> float:
         """What was measured, in the metric's unit; NaN if that is no number.
@@ -138,16 +140,15 @@ class Runs:
         from filelock import FileLock
 
         engines, dts = self.engines if engines is None else engines, self.dts if dts is None else dts
-        asked = _options(engines, dts, self.baseline)
-        content = json.dumps(scene, sort_keys=True) if isinstance(scene, Mapping) else os.fspath(scene)
-        name = f"{_title(scene)}-{hashlib.sha256(json.dumps([content, asked]).encode()).hexdigest()[:8]}"
+        asked = [scene if isinstance(scene, Mapping) else os.fspath(scene), _options(engines, dts, self.baseline)]
+        name = f"{_title(scene)}-{hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]}"
         if name not in self._results:
             # The system itself gives the lock back when a worker dies; a folder made as a lock would stay, and all others wait for ever.
             with FileLock(self.folder / f"{name}.lock"):
-                self._results[name] = self._kept_or_new(name, scene, engines, asked)
+                self._results[name] = self._kept_or_new(name, scene, engines, dts)
         return self._results[name]
 
-    def _kept_or_new(self, name: str, scene: Scene, engines: Sequence[str], asked: list[str]) -> Result:
+    def _kept_or_new(self, name: str, scene: Scene, engines: Sequence[str], dts: Sequence[float]) -> Result:
         __tracebackhide__ = True
         folder, kept = self.folder / name, self.folder / f"{name}.json"
         if isinstance(scene, Mapping):
@@ -155,16 +156,16 @@ class Runs:
         given = os.path.relpath(scene, self.root) if os.path.isabs(scene) else os.fspath(scene)
         found = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
         if found.get("session") != self.session:
+            asked = _options(engines, dts, self.baseline)
             done = self._dropspin("run", given, *asked, "-o", os.path.relpath(folder, self.root), "--json")
-            if not done.stdout:
-                pytest.fail(_said(done), pytrace=False)
-            found = {"session": self.session, "rows": json.loads(done.stdout)}
+            found = {"session": self.session, "rows": json.loads(done.stdout or "[]"), "said": _said(done)}
             unfinished = kept.with_suffix(".unfinished")
             unfinished.write_text(json.dumps(found), encoding="utf-8")
             unfinished.replace(kept)
-        labels = json.loads((folder / "run.json").read_text(encoding="utf-8"))["engines"]
-        by_label = dict(zip(labels, engines or labels, strict=True))
-        return Result(found["rows"][0]["scene"], found["rows"], folder, (NAME, "run", given), by_label)
+        if not found["rows"]:
+            pytest.fail(found["said"], pytrace=False)
+        names = json.loads((folder / "run.json").read_text(encoding="utf-8"))["provenance"]["names"]
+        return Result(found["rows"][0]["scene"], found["rows"], folder, given, names, tuple(dts))
 
     def _dropspin(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """The installed command, in the root directory; pytest's `pythonpath` holds for the user's engines too."""
@@ -175,8 +176,8 @@ class Runs:
             command, cwd=self.root, env=environment, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", check=False
         )
 
-    def judge(self, node: pytest.Item, result: Result, rows: Iterable[Row]) -> None:
-        """Fail or skip a test by the verdicts of some rows of a run; keep them for the summary."""
+    def judge(self, node: pytest.Item, result: Result, rows: Iterable[Row], *, pytrace: bool = False) -> None:
+        """Fail or skip a test by the verdicts of some rows of a run, with the lines that called if asked; keep them for the summary."""
         __tracebackhide__ = True
         fails = FAILING | {"missing"} if self.named else FAILING
         judged = [row | {"fails": row["verdict"] in fails, "told": _told(row), "share": _share(row)} for row in rows]
@@ -184,7 +185,7 @@ class Runs:
         node.stash.setdefault(JUDGED, []).extend(said)
         failing = [row for row in judged if row["fails"]]
         if failing:
-            pytest.fail(self._failure(result, failing), pytrace=not isinstance(node, Metric))
+            pytest.fail(self._failure(result, failing), pytrace=pytrace)
         if not any(row["verdict"] == "passed" for row in judged):
             reasons = [f"{row['engine']} {row['verdict']}: {row['reason']}" for row in judged if row["verdict"] in STOPPED | {"limited"}]
             pytest.skip(reasons[0] if reasons else "nothing is expected of it at these steps")
@@ -196,13 +197,14 @@ class Runs:
         for row in failing[:AT_MOST]:
             order = orders.get((row["engine"], row["metric"]))
             observed = "" if order is None or row["kind"] == "order" else f" (observed order {order:.2f})"
-            lines += [f"{result.scene}, {row['engine']}: {row['told']}{observed}", f"    {row['reason']}"]
+            reason = [f"    {row['reason']}"] if row["metric"] and row["reason"] else []
+            lines += [f"{result.scene}, {row['engine']}: {row['told']}{observed}", *reason]
         more = [f"and {len(failing) - AT_MOST} more"] if len(failing) > AT_MOST else []
         engines = dict.fromkeys(result.engines[row["engine"]] for row in failing)
         # What several steps show together takes all of them to show again.
-        dts = sorted({row["dt"] for row in failing}, reverse=True) if all(row["dt"] is not None for row in failing) else self.dts
+        dts = sorted({row["dt"] for row in failing}, reverse=True) if all(row["dt"] is not None for row in failing) else result.dts
         paths = os.pathsep.join(os.path.relpath(path, self.root) for path in self.config.getini("pythonpath"))
-        again = shlex.join([*([f"PYTHONPATH={paths}"] if paths else []), *result.command, *_options(engines, dts, self.baseline)])
+        again = shlex.join([*([f"PYTHONPATH={paths}"] if paths else []), NAME, "run", result.given, *_options(engines, dts, self.baseline)])
         accept = []
         if any(row["verdict"] == "failed" and row["metric"] for row in failing):
             known = ["--known-failures"] if any(row["kind"] != "baseline" for row in failing) else []
@@ -412,7 +414,7 @@ def dropspin_check(request: pytest.FixtureRequest, dropspin_run: Callable[..., R
     def check(scene: Scene | Result, engine: str | Sequence[str] | None = None, dt: float | Sequence[float] | None = None) -> Result:
         __tracebackhide__ = True
         result = scene if isinstance(scene, Result) else dropspin_run(scene, engine, dt)
-        request.config.stash[RUNS].judge(request.node, result, result.rows)
+        request.config.stash[RUNS].judge(request.node, result, result.rows, pytrace=True)
         return result
 
     return check

@@ -165,6 +165,23 @@ def test_interrupted_runs_leave_nothing(how, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_dry_run(tmp_path):
+    """What would be measured of what, as programs can ask for it again; nothing is written."""
+    (tmp_path / "mine.toml").write_text(SCENE)
+    done = dropspin("run", "./mine.toml", "-e", "mujoco[ integrator=euler ]", "--dt", "0.002", "--dry-run", "--json", cwd=tmp_path)
+    plan = json.loads(done.stdout)
+    assert plan["engines"] == [{"engine": "mujoco", "from": "mujoco[ integrator=euler ]", "missing": ""}]
+    assert plan["dts"] == [0.002]
+    [scene] = plan["scenes"]
+    assert (scene["scene"], scene["from"]) == ("mine", "./mine.toml")
+    assert set(scene["metrics"]) == set(
+        comparisons.run([scenarios.load(tmp_path / "mine.toml")], ["mujoco"], [2e-3]).measurements["metric"]
+    )
+    assert "spin-principal" in dropspin("run", "core", "--dry-run", cwd=tmp_path).stdout
+    assert dropspin("run", "core", "--dt", "0", "--dry-run", cwd=tmp_path).returncode == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+
+
 def rows_of(folder):
     with (folder / "results.csv").open(newline="") as file:
         return [{key: value for key, value in row.items() if key != "time_per_step"} for row in csv.DictReader(file)]

@@ -30,6 +30,8 @@ BASELINE = "dropspin-baseline.toml"
 """Where `dropspin accept` writes to unless told."""
 AT_MOST = 12
 """How many failures one test tells."""
+APART = ("-o", "out/again")
+"""Where the command runs to that does it again: it must not replace a run that somebody wants."""
 MARKER = (
     "dropspin(*scenes, engine=None, dt=None): call the test for each scene and engine, with the run as the fixture dropspin_result; "
     "on the tests that --dropspin-scene collects too, so that -m dropspin selects all of them."
@@ -204,7 +206,9 @@ class Runs:
         # What several steps show together takes all of them to show again.
         dts = sorted({row["dt"] for row in failing}, reverse=True) if all(row["dt"] is not None for row in failing) else result.dts
         paths = os.pathsep.join(os.path.relpath(path, self.root) for path in self.config.getini("pythonpath"))
-        again = shlex.join([*([f"PYTHONPATH={paths}"] if paths else []), NAME, "run", result.given, *_options(engines, dts, self.baseline)])
+        again = shlex.join(
+            [*([f"PYTHONPATH={paths}"] if paths else []), NAME, "run", result.given, *_options(engines, dts, self.baseline), *APART]
+        )
         accept = []
         if any(row["verdict"] == "failed" and row["metric"] for row in failing):
             known = ["--known-failures"] if any(row["kind"] != "baseline" for row in failing) else []

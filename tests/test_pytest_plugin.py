@@ -106,7 +106,7 @@ def test_scenes_as_tests(repository):
             "dropspin::spin-principal::energy_error[[]absent:Engine] FAILED*",
             "spin-principal, faulty: energy_error at 0.004 s is 0.002, expected ± 1e-06: 2e+03 times its bound",
             "    nothing changes; measured 1.2e-13, single precision would give 1e-7",
-            "Again: dropspin run spin-principal -e engines:Faulty --dt 0.004",
+            "Again: dropspin run spin-principal -e engines:Faulty --dt 0.004 -o out/again",
             "Accept: dropspin accept .pytest_cache/d/dropspin/spin-principal-* --baseline dropspin-baseline.toml --known-failures *",
             "spin-principal, dying: crashed: its process was ended by SIGABRT",
             "spin-principal, absent:Engine: missing: *no_such_engine, which is not installed.",
@@ -231,7 +231,7 @@ def test_accepted_figures(repository):
             "dropspin::spin-principal::angular_momentum_error[[]absent:Engine] SKIPPED*",
             "spin-principal, faulty: accepted angular_momentum_error at 0.004 s is 0.001, expected -1e-06 … 0.000101: 9.9 times its bound",
             "    accepted 0.0001 ± 1e-06 on 2026-01-31, as it was; worse by 900 times its tolerance",
-            "Again: dropspin run spin-principal -e engines:Faulty --dt 0.004 --baseline base.toml",
+            "Again: dropspin run spin-principal -e engines:Faulty --dt 0.004 --baseline base.toml -o out/again",
             "Accept: dropspin accept .pytest_cache/d/dropspin/spin-principal-* --baseline base.toml --known-failures --reason *",
         ]
     )

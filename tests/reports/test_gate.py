@@ -119,11 +119,12 @@ def test_the_command_that_does_it_again(repository, tmp_path):
     """Is one command, ends as the check did, and measures the same figure."""
     found = json.loads(dropspin("check", "out/failing", "--baseline", "dropspin-baseline.toml", "--json", cwd=repository).stdout)
     [row] = [row for row in found if row["kind"] == "baseline" and row["metric"] == "restitution_error" and row["dt"] == 0.004]
-    command = f"dropspin run drop-ball -e {ENGINE} --dt 0.004 --baseline dropspin-baseline.toml"
+    command = f"dropspin run drop-ball -e {ENGINE} --dt 0.004 --baseline dropspin-baseline.toml -o out/again"
     checked = dropspin("check", "out/failing", "--baseline", "dropspin-baseline.toml", "--junit", str(tmp_path / "j.xml"), cwd=repository)
     assert checked.returncode == 1
     assert command in (tmp_path / "j.xml").read_text()
-    done = dropspin(*command.split()[1:], "-o", str(tmp_path / "again"), "--json", cwd=repository, RELEASE="failing")
+    done = dropspin(*command.split()[1:], "--json", cwd=repository, RELEASE="failing")
+    shutil.rmtree(repository / "out/again")
     assert done.returncode == 1
     [again] = [one for one in json.loads(done.stdout) if one["kind"] == "baseline" and one["metric"] == "restitution_error"]
     assert (again["value"], again["verdict"]) == (row["value"], "failed")

@@ -16,7 +16,7 @@ from comparisons.building import assert_starts_as_meant, sound_record
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Diverged, Engine
 from comparisons.metrics import last_time_in_motion
-from comparisons.tolerances import OF_TWO_DRAWS
+from comparisons.tolerances import OF_TWO_DRAWS, tolerance
 from scenarios import Scenario, Trajectory, members
 from scenarios.mechanics import angular_momentum, energy
 
@@ -120,7 +120,8 @@ def ensemble_rows(scene: Scenario, label: str, dt: float, outcome: Outcome) -> l
     rows = []
     for name, metric in ENSEMBLE_METRICS.items():
         mean = _mean(metric.of_each(outcome))
-        draws = {"tolerance": OF_TWO_DRAWS * (mean["upper"] - mean["value"])}
+        luck = OF_TWO_DRAWS * (mean["upper"] - mean["value"])
+        draws = {"tolerance": tolerance(scene, metric.unit, np.float64, scene.steps(dt), luck)}
         rows.append(shared | {"metric": name, "unit": metric.unit, "verdict": "measured", "cause": "chaotic"} | mean | draws)
     return rows
 

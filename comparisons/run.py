@@ -19,7 +19,7 @@ from comparisons.provenance import adapter_code, provenance
 from comparisons.results import Results, TrajectoryKey, as_frame, joined
 from comparisons.simulating import Attempt, Contestant, assert_step_fits, contestant_named
 from comparisons.studies import Claim, blame_settings, study_rows
-from comparisons.tolerances import ONE_DRAW, tolerance
+from comparisons.tolerances import FEW_DRAWS, tolerance
 from comparisons.verdicts import assert_expectations_can_be_judged, excused, judge
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
@@ -158,7 +158,7 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
     beside = zip(phases, attempt.phases, exact, strict=True)
     cases = [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in beside]
     attempt.cases = cases
-    nudged = None if attempt.nudged is None else Comparison.with_truth(scene, attempt.nudged, truth, exact[0])
+    nudged = [Comparison.with_truth(scene, motion, truth, exact[0]) for motion in attempt.nudged]
     rows = [shared | {"verdict": "limited", "reason": limit.said} for limit in attempt.limits]
     for metric in metrics_for(scene, truth):
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}
@@ -166,7 +166,8 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
             row["truth"] = truth.name
         measured = _measured(scene, dt, attempt.label, metric, cases)
         average = measured["average"]
-        luck = average.jump if nudged is None else ONE_DRAW * abs(_value_or_nan(metric, nudged) - average.value)
+        moves = [abs(_value_or_nan(metric, case) - average.value) for case in nudged]
+        luck = FEW_DRAWS * float(np.max(moves)) if nudged else average.jump
         measured["tolerance"] = tolerance(scene, metric.unit, attempt.precision, steps, luck)
         rows.append(row | excused({"metric": metric.name} | measured, attempt.limits))
     if truth is None:

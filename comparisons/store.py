@@ -57,7 +57,7 @@ def restore(folder: Path, *, arrays: bool = True) -> Results:
             raise DropspinError(f"{folder}: is a run of another version of dropspin, which this one cannot read; run it again.")
         frame = pd.read_parquet(folder / "results.parquet").astype(COLUMNS)
         tolerances = pd.read_parquet(folder / "tolerances.parquet")["tolerance"].to_numpy()
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, KeyError) as error:
         said = " ".join(str(error).split())
         raise DropspinError(f"{folder}: not the folder of a run ({said}); give the folder that dropspin run -o wrote.") from None
     files = {kind: content[kind] if arrays else {} for kind in ("trajectories", "ensembles")}

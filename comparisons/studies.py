@@ -101,7 +101,7 @@ def _series(scene: Scenario, claim: Claim, metric: str, measured: Sequence[Row])
         np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both])
         for both in zip(*(average[:2] for average in averages), strict=True)
     )
-    rounded = np.asarray(rounding(scene, METRICS[metric].unit, claim.precision, steps))
+    rounded = rounding(scene, METRICS[metric].unit, claim.precision, steps)
     if METRICS[metric].unit == "rad":
         errors[np.abs(errors) > LOST] = math.nan
     if metric == "position_error" and scene.starts_above_floor:

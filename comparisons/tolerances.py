@@ -1,7 +1,7 @@
 """How far a figure may move before it says that something has changed: a tolerance for each, from how it was measured.
 
     metrics    rounding over so many steps, and what luck may do: one of the start phases falling into the neighbouring step,
-               or, where there is one start only, what a start that is moved by some ulp makes of the figure
+               or, where there is one start only, what starts that are moved by some ulp make of the figure
     orders     what becomes of them when the errors that they were found from move by their tolerances
     limits     the same, and no less than their own uncertainty
     means      of ensembles: the confidence interval of the difference between two draws
@@ -21,33 +21,40 @@ Array = NDArray[np.float64]
 NEGLIGIBLE = 3e-8
 """Errors as small as this, of the metric's own scale, are put down to rounding and to the residues of iterative solvers."""
 ULPS_A_STEP = 16.0
-NUDGE = 16.0 * float(np.finfo(float).eps)
-"""By how much of itself each number of a start is moved, up or down, to see what becomes of rounding."""
-ONE_DRAW = 10.0
-"""What one nudge has moved a figure by tells what another would by its order of magnitude only."""
+NUDGE = 16.0
+"""By how many ulp of the engine's precision each number of a start is moved, up or down, to see what becomes of rounding."""
+NUDGES = 4
+FEW_DRAWS = 10.0
+"""What a few nudges have moved a figure by tells what others would by its order of magnitude only."""
+TRUTH = 1e-12
+"""How far truths may be from each other that are computed with other libraries."""
 OF_TWO_DRAWS = math.sqrt(2.0)
 """The interval of a difference between two means, of one mean's."""
 
 
-def rounding(scene: Scenario, unit: str, precision: type, steps: float | Array) -> float | Array:
+def rounding(scene: Scenario, unit: str, precision: type, steps: Array) -> Array:
     """What rounding alone may bring about in so many steps of an engine, solvers' residues included, in a metric's unit."""
-    return _scale(scene, unit) * (NEGLIGIBLE + _of_steps(precision, steps))
+    rounded: Array = _scale(scene, unit) * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(precision).eps) * steps)
+    return rounded
 
 
 def tolerance(scene: Scenario, unit: str, precision: type, steps: int, luck: float) -> float:
-    """How far a metric may move: by luck, and by rounding; without contact there is no iterative solver to leave a residue."""
+    """How far a metric may move: by luck, and by rounding that goes now up, now down; without a floor no solver leaves a residue."""
     residue = 0.0 if scene.floor is None else NEGLIGIBLE
-    return luck + _scale(scene, unit) * float(residue + _of_steps(precision, steps))
+    rounded = ULPS_A_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
+    return luck + _scale(scene, unit) * (residue + TRUTH + rounded)
 
 
-def nudged(scene: Scenario) -> Scenario:
-    """The scene from a start that a few ulp tell from its own."""
-    signs = np.where(np.arange(13) % 3 == 0, -1.0, 1.0)  # not all alike: that would be a change of units
-    return scene.starting_at(scene.initial_state * (1.0 + NUDGE * signs))
+def nudged(scene: Scenario, precision: type) -> list[Scenario]:
+    """The scene from starts that a few ulp tell from its own.
 
-
-def _of_steps(precision: type, steps: float | Array) -> float | Array:
-    return ULPS_A_STEP * float(np.finfo(precision).eps) * steps
+    A body that touches the floor stays at its height: a few ulp of single precision would put it somewhere else.
+    """
+    start, sizes = scene.initial_state, np.full(13, NUDGE * float(np.finfo(precision).eps))
+    if scene.floor is not None and not scene.starts_above_floor:
+        sizes[:7] = NUDGE * float(np.finfo(float).eps)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (NUDGES, 13))
+    return [scene.starting_at(start * (1.0 + sizes * some)) for some in signs]
 
 
 def _scale(scene: Scenario, unit: str) -> float:

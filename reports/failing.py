@@ -83,6 +83,8 @@ def what_fails(row: Row) -> str:
     if not row["metric"]:
         return row["reason"] if row["verdict"] in FAILURES else f"{word(row['verdict'])}. {row['reason']}"
     what = subject(row["metric"], row["kind"], row["truth"])
+    if row["kind"] == "baseline":  # to more digits than a table has: tolerances are small
+        return f"{what} is {row['value']:.6g}, {row['reason']}"
     allowed = bound(row["lower"], row["upper"])
     expected = f", expected {allowed}" if allowed else ""
     return f"{what} is {written(row['value'])}{expected}: {row['reason']}"

@@ -12,9 +12,10 @@ from comparisons import Results
 from comparisons.provenance import versions_behind
 from comparisons.regressions.baseline import Baseline
 from comparisons.regressions.checking import Checked
+from comparisons.verdicts import FAILURES
 from reports.failing import Failing
+from reports.findings import STUDIES, verdict_sentence
 from reports.findings import counts as counts_of
-from reports.findings import verdict_sentence
 from reports.html import markdown
 
 AT_MOST = 12
@@ -58,9 +59,15 @@ def sentences(checked: Checked, held: Held | None) -> list[str]:
     known = checked.results.frame["reason"].str.startswith("accepted as a known failure").sum()
     if known:
         listed.append(f"{known:,} checks fail as they were known to when they were accepted.")
-    judged = int(found["change"].isin(["same", "better"]).sum()) + len(regressed)
-    verdict = f"{len(regressed):,} of {judged:,} accepted figures fail." if len(regressed) else f"All {judged:,} accepted figures hold."
-    return [*listed, f"{told} {verdict}"]
+    studies = found["kind"].isin(STUDIES)
+    failed = int((found["change"].isin(["worse", "moved"]) | ((found["change"] == "gone") & ~studies)).sum())
+    judged = int(found["change"].isin(["same", "better"]).sum()) + failed
+    other = regressed.loc[regressed["reason"].str.startswith("the scene simulates"), "scene"].nunique()
+    if other:
+        listed.append(f"{other} {'scene simulates' if other == 1 else 'scenes simulate'} something else than when figures were accepted.")
+    if failed or other:
+        return [*listed, f"{failed:,} of {judged:,} accepted figures fail. {told}"]
+    return [*listed, f"{told} All {judged:,} accepted figures hold."]
 
 
 def summary(checked: Checked, held: Held | None, found: Sequence[Failing]) -> str:
@@ -91,8 +98,11 @@ def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bo
             f"{tally.failed:,} checks of this run fail, and will fail dropspin check, whatever is accepted; "
             "--known-failures accepts them as known."
         )
+    unknown = int((results.frame["verdict"].isin(FAILURES) & results.frame["value"].isna()).sum())
+    if unknown and known_failures:
+        listed.append(f"{unknown:,} checks fail without a figure, which cannot be accepted as known.")
     if tally.broken:
-        listed.append(f"{tally.broken:,} runs of an engine broke down; there are no figures of them.")
+        listed.append(f"{tally.broken:,} runs of an engine broke down; what was accepted of them before stays.")
     return listed
 
 
@@ -114,14 +124,14 @@ def _without_baseline(results: Results) -> Results:
 def _of_engine(engine: str, rows: pd.DataFrame, found: pd.DataFrame) -> str:
     """How many figures of an engine fail, where, and what has moved most."""
     scenes = rows["scene"].nunique()
-    total = found.loc[found["engine"] == engine, "scene"].nunique() or scenes
+    total = len({*found.loc[found["engine"] == engine, "scene"], *rows["scene"]})
     measured = rows[rows["value"].notna()]
     most = ""
     if len(measured):
         metric = measured["metric"].iloc[0]
         where = measured.loc[measured["metric"] == metric, "scene"].unique()
         most = f"; most of all {metric.replace('_', ' ')} in {', '.join(where[:3])}{' …' if len(where) > 3 else ''}"
-    return f"{engine}: {_count(rows, 'accepted figure', 'fails', 'fail')}, in {scenes} of {total} scenes{most}."
+    return f"{engine}: accepted figures fail in {scenes} of {total} scenes{most}."
 
 
 def _since_then(checked: Checked, baseline: Baseline) -> list[str]:

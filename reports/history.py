@@ -1,5 +1,6 @@
 """What a history of runs says: rows, sentences, files."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +33,9 @@ def find_runs(places: tuple[str, ...]) -> dict[str, Path]:
 
 def load_runs(found: dict[str, Path]) -> dict[str, Any]:
     """Their figures, by names that are as short as they can be told apart."""
-    short = [path.name for path in found.values()]
-    return {path.name if short.count(path.name) == 1 else place: restore(path, arrays=False) for place, path in found.items()}
+    short = {place: path.resolve().name for place, path in found.items()}
+    alike = Counter(short.values())
+    return {short[place] if alike[short[place]] == 1 else place: restore(path, arrays=False) for place, path in found.items()}
 
 
 def rows(found: History) -> list[dict[str, str]]:
@@ -65,7 +67,8 @@ def write(found: History, folder: Path) -> None:
     """`history.csv` and `history.json` with every figure of every run, `history.md`, and a plot for each scene."""
     figures = found.figures.drop(columns="verdict").assign(run=[found.names[number] for number in found.figures["run"]])
     table = figures.merge(found.stamps, on="run")
-    records = [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
+    told = table.astype(object).where(table.notna(), None)  # JSON knows no NaN
+    records = [{str(key): value for key, value in row.items()} for row in told.to_dict("records")]
     write_table(folder, "history", [str(name) for name in table], records)
     scenes = list(dict.fromkeys(found.figures["scene"]))
     for scene in scenes:

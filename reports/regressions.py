@@ -24,7 +24,8 @@ def listed(changes: Changes) -> list[str]:
         told.append(title)
         told += [
             f"  {line['scene']} · {line['engine']}: {line['figure']} at {line['step']} from {line['before']} to {line['now']}"
-            f"{'' if line['ratio'] == '–' else ', ' + line['ratio'] + ' times'}, {line['tolerances']} times its tolerance away"
+            f"{'' if line['ratio'] == '–' else ', ' + line['ratio'] + ' times'}"
+            f"{'' if line['tolerances'] == '–' else ', ' + line['tolerances'] + ' times its tolerance away'}"
             for line in lines
         ]
     return told

@@ -108,6 +108,6 @@ def print_failing(found: Sequence[Failing], at_most: int, console: Console | Non
     """Print what failed, a line each, with the command that does it again."""
     out = console or Console()
     for one in found[:at_most]:
-        out.print(Text(f"✗ {one.sentence}. Again: {one.again}", style="red"))
+        out.print(Text(f"✗ {one.sentence.rstrip('.')}. Again: {one.again}", style="red"), soft_wrap=True)  # a command is one line
     if len(found) > at_most:
         out.print(Text(f"✗ and {len(found) - at_most} more like these", style="red"))

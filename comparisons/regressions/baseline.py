@@ -24,6 +24,7 @@ from comparisons.provenance import versions_behind
 from comparisons.regressions.figures import KEY, changes, figures, steps_asked
 from comparisons.results import Results
 from comparisons.validating import validated
+from comparisons.verdicts import BREAKDOWNS
 from scenarios import DropspinError
 from scenarios.body import Table
 from scenarios.errors import did_you_mean
@@ -112,6 +113,7 @@ def load_baseline(path: str | Path) -> Baseline:
             raise DropspinError(f"{where}: scenes: {scene!r} has figures, but no digest; accept them again.")
         for engine, steps in engines.items():
             for step, named in steps.items():
+                _assert_steps(f"{where}: figures of {scene}, {engine}", step)
                 for name, content in named.items():
                     here = f"{where}: figures of {scene}, {engine}, {step}: {name}"
                     metric, kind = _metric_and_kind(here, name)
@@ -129,7 +131,8 @@ def accept(
 ) -> tuple[Baseline, pd.DataFrame]:
     """The baseline that a run's figures make of an earlier one, and how they differ from what was accepted, as `changes` has it.
 
-    Figures of scenes, engines and steps that the run is not of stay; so do figures that have not moved beyond their tolerance.
+    Figures of scenes, engines and steps that the run is not of stay; so do figures that have not moved beyond their tolerance, and those of
+    engines that broke down in a scene, or are missing: that is nothing to accept. Of a scene that simulates something else now, all go.
 
     Args:
         results: The run.
@@ -144,13 +147,18 @@ def accept(
     scenes = {name: scene.digest for name, scene in results.scenes.items()}
     same_scene = old["scene"].map(lambda name: earlier.scenes[name] == scenes[name]).astype(bool)
     found = changes(old[same_scene], mine)
-    kept = old[same_scene].merge(found.loc[found["change"] == "same", KEY], on=KEY)
+    broken = results.frame.loc[results.frame["verdict"].isin(BREAKDOWNS | {"missing"}), ["scene", "engine"]].drop_duplicates()
+    lost = found[found["change"] == "gone"].merge(broken, on=["scene", "engine"])
+    kept = old[same_scene].merge(pd.concat([found[found["change"] == "same"], lost])[KEY], on=KEY)
     if known_failures:
-        kept = kept.drop(columns="known_failure").merge(mine[[*KEY, "known_failure"]], on=KEY)
+        failing = pd.MultiIndex.from_frame(mine.loc[mine["known_failure"], KEY])
+        kept = kept.assign(known_failure=pd.MultiIndex.from_frame(kept[KEY]).isin(failing))
     number = max(earlier.acceptances, default=0) + 1
     moved = mine.merge(kept[KEY], on=KEY, how="left", indicator=True)
     moved = moved[moved["_merge"] == "left_only"].assign(by=number)
-    everything = pd.concat([earlier.figures.drop(old.index), kept, moved], ignore_index=True)[list(COLUMNS)]
+    outside = earlier.figures.drop(old.index)
+    outdated = outside["scene"].map(lambda name: earlier.scenes[name] != scenes.get(name, earlier.scenes[name])).astype(bool)
+    everything = pd.concat([outside[~outdated], kept, moved], ignore_index=True)[list(COLUMNS)]
     acceptances = {**earlier.acceptances, number: Acceptance(date=date, reason=reason, versions=versions_behind(results.provenance))}
     used = set(everything["by"])
     return Baseline({n: one for n, one in acceptances.items() if n in used}, {**earlier.scenes, **scenes}, everything), found
@@ -206,6 +214,15 @@ def _inline(content: Mapping[str, Any]) -> InlineTable:
     table = tomlkit.inline_table()
     table.update(content)
     return table
+
+
+def _assert_steps(where: str, steps: str) -> None:
+    try:
+        written = ", ".join(repr(float(step)) for step in steps.split(","))
+    except ValueError:
+        raise DropspinError(f"{where}: {steps!r} is no step, nor several; write them in seconds, such as '0.004'.") from None
+    if written != steps:
+        raise DropspinError(f"{where}: {steps!r}: write it as {written!r}, or runs at this step will not find it.")
 
 
 def _metric_and_kind(where: str, name: str) -> tuple[str, str]:

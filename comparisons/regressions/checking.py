@@ -10,6 +10,7 @@ from comparisons.regressions.baseline import Baseline
 from comparisons.regressions.figures import KEY, changes, figures, steps_in_words
 from comparisons.results import Results, as_frame
 from comparisons.verdicts import FAILURES, Verdict
+from scenarios import DropspinError
 
 VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed", "gone": "failed"}
 ACCEPTED = {"order": "accepted order", "model_error": "accepted limit", "ensemble": "accepted mean"}
@@ -38,11 +39,19 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
 
     A figure fails that is worse than accepted by more than its tolerance, or gone. One that is better passes. A check of the run that
     fails, and was accepted as a known failure, is `limited` as long as its figure is not worse.
+
+    Raises:
+        DropspinError: No accepted figure is of what was run: a gate that looks at nothing must not stay open.
     """
     if baseline is None:
         nothing = figures(results).iloc[:0]
         return Checked(results, changes(nothing, nothing), nothing)
     accepted = baseline.covering(results)
+    if accepted.empty:
+        raise DropspinError(
+            f"none of the {len(baseline.figures):,} accepted figures is of this run's scenes, engines and steps; "
+            "run what was accepted, or accept what was run."
+        )
     digests = {name: scene.digest for name, scene in results.scenes.items()}
     another = accepted["scene"].map(lambda name: baseline.scenes[name] != digests[name]).astype(bool)
     mine = figures(results)

@@ -9,6 +9,7 @@ from comparisons.regressions.differences import Blame, blame, surroundings
 from comparisons.regressions.figures import changes, figures, steps_asked
 from comparisons.regressions.speed import SpeedChange, speed_changes
 from comparisons.results import Results
+from scenarios import DropspinError
 
 STUDIES = ("order", "model_error")
 
@@ -52,10 +53,15 @@ def compare(old: Results, new: Results) -> Changes:
     """Hold a run against an earlier one.
 
     Figures of scenes, engines and steps that were asked for in one of the runs only are neither new nor gone: they are left out.
+
+    Raises:
+        DropspinError: They have none in common.
     """
     other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
     before, after = figures(old), figures(new)
     found = changes(_shared(before, new, other), _shared(after, old, other))
+    if found.empty:
+        raise DropspinError("the runs have no figure in common: no scene, engine and step that both were asked for.")
     found = found.sort_values("in_tolerances", ascending=False, ignore_index=True, na_position="last")
     changed = found.groupby("engine")["change"].agg(lambda change: bool((change != "same").any()))
     unmoved = [str(engine) for engine, moved in changed.items() if not moved]

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from comparisons.provenance import MEASURING
 
 Stamp = Mapping[str, Any]
-Culprit = Literal["engine", "adapter", "settings", "surroundings", "either", "nothing"]
+Culprit = Literal["engine", "adapter", "settings", "surroundings", "either", "absent", "nothing"]
 MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
 
 
@@ -17,8 +17,9 @@ class Blame:
     """What the changes of an engine's figures are put down to.
 
     Attributes:
-        culprit: The engine's version, else its adapter's code, else its settings; the surroundings (dropspin, its code, the libraries, the
-            machine); `either` where both differ and nothing tells them apart; `nothing` where all that is stamped is the same.
+        culprit: `absent` if it measured nothing in one of the runs; the engine's version, else its adapter's code, else its settings; the
+            surroundings (dropspin, its code, the libraries, the machine); `either` where both differ and nothing tells them apart;
+            `nothing` where all that is stamped is the same.
         said: The same in a sentence, without the engine's name.
     """
 
@@ -42,7 +43,7 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Culprit, str]:
     """What differs of an engine itself; what weighs most comes first."""
     found: dict[Culprit, str] = {}
     before, after = (stamp["settings"].get(engine, {}) for stamp in (old, new))
-    versions = [{settings.get("version") for settings in stamped.values()} for stamped in (before, after)]
+    versions = [{str(settings["version"]) for settings in stamped.values() if "version" in settings} for stamped in (before, after)]
     name = engine.split("[", maxsplit=1)[0]
     if versions[0] != versions[1] and all(versions):
         found["engine"] = f"{name} {_listed(versions[0])} → {_listed(versions[1])}"
@@ -63,6 +64,9 @@ def blame(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str]) -> Blam
         engine: Label of the engine, some figures of which have changed.
         unmoved: Other engines that ran in both, and whose figures are all the same: witnesses that it is not the surroundings.
     """
+    silent = [word for word, stamp in (("earlier", old), ("later", new)) if not stamp["settings"].get(engine)]
+    if silent:
+        return Blame("absent", f"it measured nothing in the {silent[0]} run: it broke down, declined, or is missing")
     own, around = of_engine(old, new, engine), surroundings(old, new)
     if not own and not around:
         return Blame("nothing", "nothing that is stamped differs; the engine is not deterministic, or has changed under the same version")

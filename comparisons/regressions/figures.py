@@ -68,7 +68,8 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     held = [*KEY, "value", "tolerance", "unit"]
     both = before[held].merge(after[held], how="outer", on=KEY, suffixes=("_before", "_after"), sort=False)
     old, new = both["value_before"].to_numpy(), both["value_after"].to_numpy()
-    tolerance = np.fmax(both["tolerance_before"].to_numpy(), both["tolerance_after"].to_numpy())
+    # The earlier one's alone: what has gone wrong must not widen what it is held to.
+    tolerance = both["tolerance_before"].fillna(both["tolerance_after"]).to_numpy()
     way = both["kind"].map(BETTER).to_numpy()
     errors = way == "smaller"
     # An error may be anything between 0 and what it was; on the other side of 0 it is another error.

@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import pandas as pd
 
 from comparisons.provenance import versions_behind
-from comparisons.regressions.comparing import Changes, compare
-from comparisons.regressions.differences import Blame
-from comparisons.regressions.figures import figures
+from comparisons.regressions.differences import Blame, blame
+from comparisons.regressions.figures import KEY, changes, figures
 from comparisons.results import Results
 from scenarios import DropspinError
 
@@ -74,16 +72,31 @@ def history(runs: Mapping[str, Results]) -> History:
 
 
 def _moves(results: Sequence[Results]) -> list[Move]:
-    compared: dict[tuple[int, int], Changes] = {}
+    """Where figures moved: each is held against what it last moved to, so that no slow drift escapes, and no run that lacks it hides one."""
+    engines = list(dict.fromkeys(engine for one in results for engine in one.engines))
+    held = {engine: figures(results[0]).iloc[:0] for engine in engines}
+    scenes: dict[str, str] = {}
+    last: dict[str, int] = {}
     found = []
-    for engine in dict.fromkeys(engine for one in results for engine in one.engines):
-        having = [number for number, one in enumerate(results) if engine in one.provenance["settings"]]
-        for before, run in pairwise(having):
-            if (before, run) not in compared:
-                compared[before, run] = compare(results[before], results[run])
-            changes = compared[before, run]
-            moved = changes.of("worse", "moved", "better")
-            moved = moved[moved["engine"] == engine]
-            if len(moved):
-                found.append(Move(engine, before, run, moved, changes.blames[engine]))
-    return sorted(found, key=lambda move: (move.run, move.engine))
+    for run, one in enumerate(results):
+        digests = {name: scene.digest for name, scene in one.scenes.items()}
+        other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
+        scenes |= digests
+        measured = {str(engine): rows for engine, rows in figures(one).groupby("engine", sort=False)}
+        moved = {}
+        for engine, now in measured.items():
+            before = held[engine][~held[engine]["scene"].isin(other)]
+            change = changes(before, now)
+            differing = change[change["change"].isin(["worse", "moved", "better"])].sort_values("in_tolerances", ascending=False)
+            moved[engine] = differing.reset_index(drop=True)
+            stays = change[change["change"].isin(["same", "gone"])]
+            kept = before.merge(stays[KEY], on=KEY)
+            fresh = now.merge(change[~change["change"].isin(["same", "gone"])][KEY], on=KEY)
+            held[engine] = pd.concat([kept, fresh], ignore_index=True) if len(kept) else fresh
+        unmoved = [engine for engine, differing in moved.items() if differing.empty and engine in last]
+        for engine, differing in moved.items():
+            if len(differing):
+                stamps = results[last[engine]].provenance, one.provenance
+                found.append(Move(engine, last[engine], run, differing, blame(*stamps, engine, unmoved)))
+        last |= dict.fromkeys(measured, run)
+    return found

@@ -93,6 +93,8 @@ def accept(runs: tuple[str, ...], reason: str, baseline: str, known_failures: bo
 
     if not reason.strip():
         raise click.UsageError("--reason is empty; say why these are the figures from now on.")
+    if not reason.isprintable():
+        raise click.UsageError("--reason: has signs that are no text, or more than one line; say it in one line of text.")
     held = load_baseline(baseline) if os.path.exists(baseline) else Baseline()
     changes, told = [], []
     for run in runs:

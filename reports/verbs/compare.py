@@ -40,6 +40,8 @@ def compare(old: str, new: str, fail_speed: float | None, summary: str | None, j
     from reports import regressions
 
     changes = compared(restore(Path(old), arrays=False), restore(Path(new), arrays=False))
+    if fail_speed is not None and not changes.speed:
+        raise click.UsageError("--fail-speed: takes two engines that ran the same scenes in both runs; speed is told beside another's.")
     if summary is not None:
         write_text(summary, regressions.summary(changes, fail_speed), append=True)
     if json_output:

@@ -105,8 +105,8 @@ def test_check(release, repository, schema, tmp_path):
     if release == "failing":
         first = told.split("✗")[1]
         assert "drop-ball · my-engine" in first
-        assert "restitution error is 5.00e-03, expected " in first
-        assert "first measured; worse by 1.67e+05 times its tolerance" in first
+        assert "restitution error is 0.005, accepted -" in first
+        assert "first measured; worse by 1.67e+05 times its tolerance. Again: " in first
         assert "Again: dropspin run drop-ball -e my_engine:MyEngine --dt 0.00" in first
         assert "--baseline dropspin-baseline.toml" in first
         assert "Since they were accepted: my-engine good → failing." in told
@@ -159,7 +159,7 @@ def test_compare(repository, tmp_path):
     data = json.loads(dropspin("compare", "out/good", "out/failing", "--json", cwd=repository).stdout)
     assert data["put_down_to"][LABEL]["culprit"] == "engine"
     assert {figure["scene"] for figure in data["figures"]} == {"drop-ball"}
-    same = dropspin("compare", "out/good", "out/good", "--fail-speed", "20%", cwd=repository)
+    same = dropspin("compare", "out/good", "out/good", cwd=repository)
     assert same.returncode == 0
     assert same.stdout.splitlines()[-1].startswith("None of ")
 
@@ -185,6 +185,8 @@ def test_history(repository, tmp_path):
         (["check", "out/good", "--junit", "my_engine.py/x"], "my_engine.py"),
         (["accept", "out/good"], "Missing option '--reason'"),
         (["accept", "out/good", "--reason", " "], "--reason is empty"),
+        (["accept", "out/good", "--reason", "a\nb"], "say it in one line"),
+        (["compare", "out/good", "out/good", "--fail-speed", "20%"], "takes two engines"),
         (["accept", "--reason", "x"], "Missing argument 'RUN...'"),
         (["accept", "out/good", "--reason", "x", "--baseline", "my_engine.py"], "my_engine.py: not TOML"),
         (["accept", "out/good", "--reason", "x", "--baseline", "my_engine.py/b.toml"], "my_engine.py/b.toml: cannot be written"),

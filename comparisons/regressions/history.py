@@ -72,7 +72,7 @@ def history(runs: Mapping[str, Results]) -> History:
 
 
 def _moves(results: Sequence[Results]) -> list[Move]:
-    """Where figures moved: each is held against what it last moved to, so that no slow drift escapes, and no run that lacks it hides one."""
+    """Where figures moved: each is held against what it last moved to, so no slow drift escapes, and no run that lacks it hides one."""
     engines = list(dict.fromkeys(engine for one in results for engine in one.engines))
     held = {engine: figures(results[0]).iloc[:0] for engine in engines}
     scenes: dict[str, str] = {}

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from comparisons.regressions.baseline import Baseline
-from comparisons.regressions.figures import KEY, changes, figures, steps_in_words
+from comparisons.regressions.figures import KEY, changes, figures, most_changed_first, steps_in_words
 from comparisons.results import Results, as_frame
 from comparisons.verdicts import FAILURES, Verdict
 from scenarios import DropspinError
@@ -57,7 +57,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     mine = figures(results)
     comparable = mine[~mine["scene"].isin(accepted.loc[another, "scene"])]
     found = changes(accepted[~another], comparable).merge(accepted[[*KEY, "by", "known_failure"]], on=KEY, how="left")
-    found = found.sort_values("in_tolerances", ascending=False, ignore_index=True, na_position="last")
+    found = most_changed_first(found)
     rows = [_another_scene(scene, engine) for scene, engine in accepted.loc[another, ["scene", "engine"]].drop_duplicates().to_numpy()]
     rows += _lost_rows(results, found[found["change"] == "gone"])
     rows += [_row(row, baseline) for row in found[~found["change"].isin(["new", "gone"])].to_dict("records")]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from comparisons.regressions.differences import Blame, blame, surroundings
-from comparisons.regressions.figures import changes, figures, steps_asked
+from comparisons.regressions.figures import changes, figures, most_changed_first, steps_asked
 from comparisons.regressions.speed import SpeedChange, speed_changes
 from comparisons.results import Results
 from scenarios import DropspinError
@@ -62,7 +62,7 @@ def compare(old: Results, new: Results) -> Changes:
     found = changes(_shared(before, new, other), _shared(after, old, other))
     if found.empty:
         raise DropspinError("the runs have no figure in common: no scene, engine and step that both were asked for.")
-    found = found.sort_values("in_tolerances", ascending=False, ignore_index=True, na_position="last")
+    found = most_changed_first(found)
     changed = found.groupby("engine")["change"].agg(lambda change: bool((change != "same").any()))
     unmoved = [str(engine) for engine, moved in changed.items() if not moved]
     stamps = old.provenance, new.provenance

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from comparisons.results import Results
-from comparisons.studies import ARTEFACTS
+from comparisons.studies import ARTEFACTS, JUMPING
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
 """What tells figures apart; `steps` is the time step in words, of orders and limits all the steps that they were found from."""
@@ -86,3 +86,10 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     unit = both["unit_after"].where(both["unit_after"].notna(), both["unit_before"])
     found = {"unit": unit, "value": new, "before": old, "tolerance": tolerance, "lower": lower, "upper": upper, "change": change}
     return both[KEY].assign(**found, in_tolerances=np.abs(new - old) / tolerance)
+
+
+def most_changed_first(found: pd.DataFrame) -> pd.DataFrame:
+    """Changes in the order in which they tell most: by tolerances; counts, which jump from 0 to something, after all others."""
+    ordered = found.assign(jumps=found["metric"].isin(list(JUMPING)))
+    ordered = ordered.sort_values(["jumps", "in_tolerances"], ascending=[True, False], na_position="last", kind="stable")
+    return ordered.drop(columns="jumps").reset_index(drop=True)

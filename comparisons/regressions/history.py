@@ -7,7 +7,7 @@ import pandas as pd
 
 from comparisons.provenance import versions_behind
 from comparisons.regressions.differences import Blame, blame
-from comparisons.regressions.figures import KEY, changes, figures
+from comparisons.regressions.figures import KEY, changes, figures, most_changed_first
 from comparisons.results import Results
 from scenarios import DropspinError
 
@@ -87,8 +87,7 @@ def _moves(results: Sequence[Results]) -> list[Move]:
         for engine, now in measured.items():
             before = held[engine][~held[engine]["scene"].isin(other)]
             change = changes(before, now)
-            differing = change[change["change"].isin(["worse", "moved", "better"])].sort_values("in_tolerances", ascending=False)
-            moved[engine] = differing.reset_index(drop=True)
+            moved[engine] = most_changed_first(change[change["change"].isin(["worse", "moved", "better"])])
             stays = change[change["change"].isin(["same", "gone"])]
             kept = before.merge(stays[KEY], on=KEY)
             fresh = now.merge(change[~change["change"].isin(["same", "gone"])][KEY], on=KEY)

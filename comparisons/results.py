@@ -68,13 +68,15 @@ class Results:
         """The rows of errors whose limit as the step goes to 0 is not 0, by their causes: `model`, `setting`."""
         return self.frame[(self.frame["kind"] == "model_error") & self.frame["cause"].isin(causes)]
 
-    def exit_code(self, named: frozenset[str] = frozenset()) -> int:
-        """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""
+    @property
+    def breakdowns(self) -> "pd.Series[bool]":
+        """For each row, whether an engine broke down, or is missing though it was named."""
         verdicts = self.frame["verdict"]
-        missing = (verdicts == "missing") & self.frame["engine"].isin(named)
-        if verdicts.isin(BREAKDOWNS).any() or missing.any():
-            return 3
-        return int(verdicts.isin(FAILURES).any())
+        return verdicts.isin(BREAKDOWNS) | ((verdicts == "missing") & self.frame["engine"].isin(self.provenance.get("named", [])))
+
+    def exit_code(self) -> int:
+        """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""
+        return 3 if self.breakdowns.any() else int(self.frame["verdict"].isin(FAILURES).any())
 
 
 def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:

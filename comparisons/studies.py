@@ -22,6 +22,8 @@ from scenarios import Scenario
 Row = dict[str, Any]
 Array = NDArray[np.float64]
 
+STUDIES = ("order", "model_error")
+"""Kinds of rows that several steps together give."""
 ARTEFACTS = frozenset({"energy_error_raw"})
 """Metrics that show how a state is sampled rather than how wrong it is."""
 JUMPING = frozenset({"out_of_step"})

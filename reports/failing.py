@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from comparisons import Results
-from comparisons.verdicts import BREAKDOWNS, FAILURES
-from reports.findings import STUDIES
+from comparisons.studies import STUDIES
+from comparisons.verdicts import FAILURES
 from reports.numbers import bound, step, subject, word, written
 
 Row = Mapping[Hashable, Any]
@@ -52,9 +52,7 @@ def failing(results: Results, baseline: str | None = None) -> list[Failing]:
         results: The run, with the rows of a check if there was one.
         baseline: The file of the figures it was held against, for the commands.
     """
-    frame = results.frame
-    missing = (frame["verdict"] == "missing") & frame["engine"].isin(results.provenance.get("named", []))
-    rows = frame[frame["verdict"].isin(BREAKDOWNS | FAILURES) | missing]
+    rows = results.frame[results.breakdowns | results.frame["verdict"].isin(FAILURES)]
     urgency = rows["kind"].ne("baseline").astype(int).where(rows["verdict"].isin(FAILURES), -1)
     grouped: dict[tuple[str, ...], list[Row]] = {}
     for row in rows.assign(urgency=urgency).sort_values("urgency", kind="stable").to_dict("records"):

@@ -7,6 +7,7 @@ import pandas as pd
 
 from comparisons import Results
 from comparisons.engines.base import calibrated_label
+from comparisons.studies import STUDIES
 from comparisons.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 
 NEGLIGIBLE = 1e-4
@@ -15,10 +16,6 @@ NEGLIGIBLE = 1e-4
 # Worst first: the verdict that stands for a scene and an engine in the matrix.
 SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "limited", "no_truth", "passed", "measured")
 assert set(SEVERITY) == set(VERDICTS)
-
-
-STUDIES = ("order", "model_error")
-"""Kinds of rows that several steps together give."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a check against accepted figures came to: sentences, a Markdown summary, annotations, and rows for programs."""
+"""What a check against accepted figures came to: sentences, a Markdown summary, and annotations."""
 
 import os
 import shlex
@@ -11,11 +11,12 @@ import pandas as pd
 from comparisons import Results
 from comparisons.provenance import versions_behind
 from comparisons.regressions.baseline import Baseline
-from comparisons.regressions.checking import Checked
+from comparisons.regressions.checking import ANOTHER_SCENE, KNOWN, Checked
+from comparisons.regressions.figures import regressed
 from comparisons.verdicts import FAILURES
 from reports.failing import Failing
-from reports.findings import STUDIES, verdict_sentence
 from reports.findings import counts as counts_of
+from reports.findings import verdict_sentence
 from reports.html import markdown
 
 AT_MOST = 12
@@ -44,9 +45,9 @@ def sentences(checked: Checked, held: Held | None) -> list[str]:
     if held is None:
         return [told]
     found = checked.changes
-    regressed = checked.results.frame[(checked.results.frame["kind"] == "baseline") & (checked.results.frame["verdict"] == "failed")]
-    listed = [_of_engine(str(engine), rows, found) for engine, rows in regressed.groupby("engine", sort=False)]
-    if len(regressed):
+    rows = checked.results.frame[(checked.results.frame["kind"] == "baseline") & (checked.results.frame["verdict"] == "failed")]
+    listed = [_of_engine(str(engine), some, found) for engine, some in rows.groupby("engine", sort=False)]
+    if len(rows):
         listed += [*_since_then(checked, held.baseline), f"If that is as it should be from now on: {held.to_accept}"]
     better, new = (found[found["change"] == change] for change in ("better", "new"))
     if len(better):
@@ -56,13 +57,12 @@ def sentences(checked: Checked, held: Held | None) -> list[str]:
     if len(checked.not_run):
         where = checked.not_run.drop_duplicates(["scene", "engine"])
         listed.append(f"{len(checked.not_run):,} accepted figures were not run, of {len(where)} pairs of a scene and an engine.")
-    known = checked.results.frame["reason"].str.startswith("accepted as a known failure").sum()
+    known = checked.results.frame["reason"].str.startswith(KNOWN).sum()
     if known:
         listed.append(f"{known:,} checks fail as they were known to when they were accepted.")
-    studies = found["kind"].isin(STUDIES)
-    failed = int((found["change"].isin(["worse", "moved"]) | ((found["change"] == "gone") & ~studies)).sum())
+    failed = len(regressed(found))
     judged = int(found["change"].isin(["same", "better"]).sum()) + failed
-    other = regressed.loc[regressed["reason"].str.startswith("the scene simulates"), "scene"].nunique()
+    other = rows.loc[rows["reason"].str.startswith(ANOTHER_SCENE), "scene"].nunique()
     if other:
         listed.append(f"{other} {'scene simulates' if other == 1 else 'scenes simulate'} something else than when figures were accepted.")
     if failed or other:
@@ -122,7 +122,7 @@ def _without_baseline(results: Results) -> Results:
 
 
 def _of_engine(engine: str, rows: pd.DataFrame, found: pd.DataFrame) -> str:
-    """How many figures of an engine fail, where, and what has moved most."""
+    """Where figures of an engine fail, and what has moved most."""
     scenes = rows["scene"].nunique()
     total = len({*found.loc[found["engine"] == engine, "scene"], *rows["scene"]})
     measured = rows[rows["value"].notna()]

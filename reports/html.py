@@ -11,11 +11,11 @@ from markupsafe import Markup
 
 from comparisons import ENSEMBLE_METRICS, METRICS, Results
 from comparisons.provenance import first_settings
+from comparisons.studies import STUDIES
 from reports import numbers
 from reports.colours import engine_colours
 from reports.findings import (
     NEGLIGIBLE,
-    STUDIES,
     counts,
     failures,
     finding_sentences,

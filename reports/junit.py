@@ -24,12 +24,13 @@ def junit_xml(results: Results, baseline: str | None = None) -> bytes:
         baseline: The file of the figures it was held against, for the commands that do it again.
     """
     document = JUnitXml("dropspin")
+    frame = results.frame.assign(broke_down=results.breakdowns)
     for engine in results.engines:
         suite = TestSuite(engine)
         suite.timestamp = datetime.fromisoformat(results.provenance["started"]).strftime("%Y-%m-%dT%H:%M:%S")
         for name, found in versions_behind(results.provenance).items():
             suite.add_property(name, found)
-        rows = results.frame[(results.frame["engine"] == engine) & results.frame["verdict"].isin(JUDGED)]
+        rows = frame[(frame["engine"] == engine) & frame["verdict"].isin(JUDGED)]
         suite.add_testcases([_case(results, row, baseline) for row in rows.to_dict("records")])
         document.add_testsuite(suite)
     for total in ("tests", "failures", "errors", "time"):  # the library would add `skipped`, for which the schema has no place here
@@ -48,7 +49,7 @@ def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -
     verdict = row["verdict"]
     if verdict in FAILURES:
         case.result = [_with_text(Failure(said, verdict), does_it_again)]
-    elif verdict in BREAKDOWNS or (verdict == "missing" and row["engine"] in results.provenance.get("named", [])):
+    elif row["broke_down"]:
         case.result = [_with_text(Error(said, verdict), does_it_again)]
     elif verdict != "passed":
         case.result = [Skipped(f"{word(verdict)}: {_printable(row['reason'])}")]

@@ -38,7 +38,7 @@ def folder_made(folder: str) -> Iterator[Path]:
 
 
 def write_table(folder: Path, stem: str, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows twice: as CSV, and as JSON with numbers as numbers, and None for what is none."""
+    """Write rows twice: as CSV, and as JSON with numbers as numbers."""
     with (folder / f"{stem}.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns)
         writer.writeheader()

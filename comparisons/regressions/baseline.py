@@ -21,7 +21,7 @@ from tomlkit.items import InlineTable
 from comparisons.ensembles import ENSEMBLE_METRICS
 from comparisons.metrics import METRICS
 from comparisons.provenance import versions_behind
-from comparisons.regressions.figures import KEY, changes, figures, steps_asked
+from comparisons.regressions.figures import KEY, asked_for, changes, figures
 from comparisons.results import Results
 from comparisons.validating import validated
 from comparisons.verdicts import BREAKDOWNS
@@ -91,13 +91,6 @@ class Baseline:
     scenes: Mapping[str, str] = field(default_factory=dict)
     figures: pd.DataFrame = field(default_factory=lambda: _table([]))
 
-    def covering(self, results: Results) -> pd.DataFrame:
-        """The figures of those scenes, engines and steps that a run was asked for."""
-        mine = self.figures
-        return mine[
-            mine["scene"].isin(list(results.scenes)) & mine["engine"].isin(results.engines) & mine["steps"].isin(steps_asked(results))
-        ]
-
 
 def load_baseline(path: str | Path) -> Baseline:
     """Read a baseline.
@@ -143,7 +136,7 @@ def accept(
     """
     mine = figures(results)
     mine["known_failure"] = (mine["verdict"] == "failed") & known_failures
-    old = earlier.covering(results)
+    old = asked_for(earlier.figures, results)
     scenes = {name: scene.digest for name, scene in results.scenes.items()}
     same_scene = old["scene"].map(lambda name: earlier.scenes[name] == scenes[name]).astype(bool)
     found = changes(old[same_scene], mine)

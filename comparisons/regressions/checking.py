@@ -7,14 +7,19 @@ import numpy as np
 import pandas as pd
 
 from comparisons.regressions.baseline import Baseline
-from comparisons.regressions.figures import KEY, changes, figures, most_changed_first, steps_in_words
+from comparisons.regressions.figures import KEY, asked_for, changes, figures, most_changed_first, steps_in_words
 from comparisons.results import Results, as_frame
+from comparisons.studies import STUDIES
 from comparisons.verdicts import FAILURES, Verdict
 from scenarios import DropspinError
 
 VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed", "gone": "failed"}
 ACCEPTED = {"order": "accepted order", "model_error": "accepted limit", "ensemble": "accepted mean"}
 """What stands in the column `truth` of a row of kind `baseline`: of all others, `accepted`."""
+
+ANOTHER_SCENE = "the scene simulates something else than when its figures were accepted"
+KNOWN = "accepted as a known failure"
+"""How the reasons begin of an engine whose scene was changed, and of checks that fail as they were known to."""
 
 Row = dict[str, Any]
 
@@ -46,7 +51,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     if baseline is None:
         nothing = figures(results).iloc[:0]
         return Checked(results, changes(nothing, nothing), nothing)
-    accepted = baseline.covering(results)
+    accepted = asked_for(baseline.figures, results)
     if accepted.empty:
         raise DropspinError(
             f"none of the {len(baseline.figures):,} accepted figures is of this run's scenes, engines and steps; "
@@ -98,14 +103,14 @@ def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Row]:
             rows.append(_shared(first) | {"metric": "", "unit": "", "verdict": "failed", "reason": reason})
             continue
         for row in lost.to_dict("records"):
-            of_errors = row["kind"] in ("order", "model_error")
+            of_errors = row["kind"] in STUDIES
             reason = f"accepted {row['before']:.6g}, " + ("cannot be told any more" if of_errors else "and it is gone")
             rows.append(_shared(row) | {"value": np.nan, "verdict": "measured" if of_errors else "failed", "reason": reason})
     return rows
 
 
 def _another_scene(scene: str, engine: str) -> Row:
-    reason = "the scene simulates something else than when its figures were accepted; accept them again"
+    reason = f"{ANOTHER_SCENE}; accept them again"
     return {"scene": scene, "engine": engine, "dt": np.nan, "kind": "baseline", "truth": "accepted", "verdict": "failed", "reason": reason}
 
 
@@ -115,6 +120,6 @@ def _known(results: Results, found: pd.DataFrame) -> pd.DataFrame:
     keys = pd.MultiIndex.from_frame(results.frame.assign(steps=steps_in_words(results))[KEY])
     rows = keys.isin(pd.MultiIndex.from_frame(excused[KEY])) & results.frame["verdict"].isin(FAILURES).to_numpy()
     frame = results.frame.copy()
-    frame.loc[rows, "reason"] = "accepted as a known failure; " + frame.loc[rows, "reason"]
+    frame.loc[rows, "reason"] = f"{KNOWN}; " + frame.loc[rows, "reason"]
     frame.loc[rows, "verdict"] = "limited"
     return frame

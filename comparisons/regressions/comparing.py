@@ -6,12 +6,10 @@ from dataclasses import dataclass
 import pandas as pd
 
 from comparisons.regressions.differences import Blame, blame, surroundings
-from comparisons.regressions.figures import changes, figures, most_changed_first, steps_asked
+from comparisons.regressions.figures import asked_for, changes, figures, most_changed_first, regressed
 from comparisons.regressions.speed import SpeedChange, speed_changes
 from comparisons.results import Results
 from scenarios import DropspinError
-
-STUDIES = ("order", "model_error")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +38,8 @@ class Changes:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """What a gate is closed by: worse, moved, or gone; an order or limit that can no longer be told follows from errors that moved."""
-        lost = self.of("gone")
-        return pd.concat([self.of("worse", "moved"), lost[~lost["kind"].isin(STUDIES)]])
+        """What a gate is closed by: worse, moved, or gone."""
+        return regressed(self.figures)
 
     def slower(self, share: float) -> list[SpeedChange]:
         """The engines that have become slower by more than some share, beyond doubt."""
@@ -59,7 +56,7 @@ def compare(old: Results, new: Results) -> Changes:
     """
     other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
     before, after = figures(old), figures(new)
-    found = changes(_shared(before, new, other), _shared(after, old, other))
+    found = changes(*(held[~held["scene"].isin(other)] for held in (asked_for(before, new), asked_for(after, old))))
     if found.empty:
         raise DropspinError("the runs have no figure in common: no scene, engine and step that both were asked for.")
     found = most_changed_first(found)
@@ -68,12 +65,6 @@ def compare(old: Results, new: Results) -> Changes:
     stamps = old.provenance, new.provenance
     blames = {str(engine): blame(*stamps, str(engine), unmoved) for engine, moved in changed.items() if moved}
     return Changes(found, blames, surroundings(*stamps), other, _in_one_only(old, new), speed_changes(old, new))
-
-
-def _shared(held: pd.DataFrame, other: Results, left_out: list[str]) -> pd.DataFrame:
-    """The figures of scenes, engines and steps that another run was asked for too."""
-    known = held["scene"].isin(list(other.scenes)) & ~held["scene"].isin(left_out)
-    return held[known & held["engine"].isin(other.engines) & held["steps"].isin(steps_asked(other))]
 
 
 def _in_one_only(old: Results, new: Results) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from comparisons.results import Results
-from comparisons.studies import ARTEFACTS, JUMPING
+from comparisons.studies import ARTEFACTS, JUMPING, STUDIES
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
 """What tells figures apart; `steps` is the time step in words, of orders and limits all the steps that they were found from."""
@@ -40,9 +40,10 @@ def steps_in_words(results: Results) -> pd.Series:
     return results.frame["dt"].map(lambda dt: _every(results) if np.isnan(dt) else repr(dt))
 
 
-def steps_asked(results: Results) -> set[str]:
-    """The steps that a run's figures may belong to, as `steps_in_words` has them."""
-    return {_every(results), *map(repr, _dts(results))}
+def asked_for(held: pd.DataFrame, results: Results) -> pd.DataFrame:
+    """Those of some figures that are of scenes, engines and steps that a run was asked for."""
+    steps = {_every(results), *map(repr, _dts(results))}
+    return held[held["scene"].isin(list(results.scenes)) & held["engine"].isin(results.engines) & held["steps"].isin(steps)]
 
 
 def _every(results: Results) -> str:
@@ -86,6 +87,15 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     unit = both["unit_after"].where(both["unit_after"].notna(), both["unit_before"])
     found = {"unit": unit, "value": new, "before": old, "tolerance": tolerance, "lower": lower, "upper": upper, "change": change}
     return both[KEY].assign(**found, in_tolerances=np.abs(new - old) / tolerance)
+
+
+def regressed(found: pd.DataFrame) -> pd.DataFrame:
+    """The changes that close a gate: worse, moved, or gone.
+
+    An order or a limit that can no longer be told follows from the errors, which are figures of their own.
+    """
+    lost = (found["change"] == "gone") & ~found["kind"].isin(STUDIES)
+    return found[found["change"].isin(["worse", "moved"]) | lost]
 
 
 def most_changed_first(found: pd.DataFrame) -> pd.DataFrame:

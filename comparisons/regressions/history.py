@@ -67,14 +67,15 @@ def history(runs: Mapping[str, Results]) -> History:
         {"run": name, "started": one.provenance["started"], "commit": one.provenance["commit"]} | versions_behind(one.provenance)
         for name, one in ordered
     ]
-    every = pd.concat([figures(one).assign(run=number) for number, one in enumerate(results)], ignore_index=True)
-    return History(names, pd.DataFrame(stamps), every, _moves(results))
+    measured = [figures(one) for one in results]
+    every = pd.concat([rows.assign(run=number) for number, rows in enumerate(measured)], ignore_index=True)
+    return History(names, pd.DataFrame(stamps), every, _moves(results, measured))
 
 
-def _moves(results: Sequence[Results]) -> list[Move]:
+def _moves(results: Sequence[Results], figures_of: Sequence[pd.DataFrame]) -> list[Move]:
     """Where figures moved: each is held against what it last moved to, so no slow drift escapes, and no run that lacks it hides one."""
     engines = list(dict.fromkeys(engine for one in results for engine in one.engines))
-    held = {engine: figures(results[0]).iloc[:0] for engine in engines}
+    held = dict.fromkeys(engines, figures_of[0].iloc[:0])
     scenes: dict[str, str] = {}
     last: dict[str, int] = {}
     found = []
@@ -82,7 +83,7 @@ def _moves(results: Sequence[Results]) -> list[Move]:
         digests = {name: scene.digest for name, scene in one.scenes.items()}
         other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
         scenes |= digests
-        measured = {str(engine): rows for engine, rows in figures(one).groupby("engine", sort=False)}
+        measured = {str(engine): rows for engine, rows in figures_of[run].groupby("engine", sort=False)}
         moved = {}
         for engine, now in measured.items():
             before = held[engine][~held[engine]["scene"].isin(other)]

@@ -80,7 +80,6 @@ def run(
     loaded = [scene for name in scenes or ["core"] for scene in (_core() if name == "core" else [scenarios.load(name)])]
     chosen = engines or CORE_ENGINES
     steps = dts or comparisons.DEFAULT_DTS
-    named = frozenset(name.strip() for name in engines)
     held = None if baseline is None else Held(load_baseline(baseline), baseline, output)
     if dry_run:
         return _print_plan(look.plan(loaded, chosen, steps), json_output)
@@ -98,7 +97,7 @@ def run(
                 limits = comparisons.Limits(processor_time=time_limit)
                 results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
             stop_if_interrupted()
-            results = replace(results, provenance={**results.provenance, "named": sorted(named)})
+            results = replace(results, provenance={**results.provenance, "named": sorted({name.strip() for name in engines})})
             checked = check(results, None if held is None else held.baseline)
             if not json_output:
                 reports.print_table(results)
@@ -114,7 +113,7 @@ def run(
         if held is not None:
             tell(checked, held, [one for one in failing(checked.results, baseline) if one.accepted])
         click.echo(f"Report: {os.path.join(output, 'report.html')}")
-    return checked.results.exit_code(named)
+    return checked.results.exit_code()
 
 
 def _print_plan(plan: dict[str, Any], json_output: bool) -> int:

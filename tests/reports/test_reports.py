@@ -67,7 +67,7 @@ class Page(HTMLParser):
 def test_folder_holds_everything(results, folder):
     """The documented files, and none that are not."""
     found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    expected = {"run.json", "results.parquet", "results.csv", "report.html", "report.md"}
+    expected = {"run.json", "results.parquet", "tolerances.parquet", "results.csv", "report.html", "report.md", "junit.xml"}
     assert expected <= found
     others = found - expected
     assert all(re.fullmatch(r"plots/\d\d-(time|flight|bounces|convergence)\.svg|trajectories/[\w.=-]+\.npz", name) for name in others), (

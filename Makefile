@@ -3,13 +3,16 @@ PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: report test test-slow faults bench examples lint clean
+.PHONY: report test test-browser test-slow faults bench examples lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
 
 test: $(VENV)/.installed-dev          ## set up, run the whole test suite
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+
+test-browser: $(VENV)/.installed-browser  ## the report and the replay in a real browser; needs Chromium
+	$(BIN)/python -m pytest tests/browser
 
 test-slow: $(VENV)/.installed-dev     ## the studies that take minutes
 	$(BIN)/python -m pytest -m slow
@@ -44,4 +47,8 @@ $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev
+	touch $@
+
+$(VENV)/.installed-browser: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group browser
 	touch $@

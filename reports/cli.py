@@ -16,6 +16,8 @@ from reports.verbs.compare import compare
 from reports.verbs.history import history
 from reports.verbs.limits import limits
 from reports.verbs.options import as_json, time_limit_option
+from reports.verbs.replay import replay
+from reports.verbs.report import report
 from reports.verbs.run import run
 from reports.verbs.sweep import sweep
 from reports.verbs.tradeoff import tradeoff
@@ -108,9 +110,10 @@ def doctor(json_output: bool) -> None:
 
 @dropspin.command()
 @click.argument("engine_name", metavar="ENGINE")
+@click.option("--check", "checks", multiple=True, metavar="CHECK", help="Make this check only, by its name in the table; repeat for more.")
 @time_limit_option(60.0, "each check may take")
 @as_json
-def conform(engine_name: str, time_limit: float, json_output: bool) -> int:
+def conform(engine_name: str, checks: tuple[str, ...], time_limit: float, json_output: bool) -> int:
     """Is this adapter right? Hold an engine's adapter against the protocol and against motions that tell mistakes apart.
 
     ENGINE is a name, as in `dropspin list engines`, or your own as my_module:MyEngine.
@@ -123,7 +126,7 @@ def conform(engine_name: str, time_limit: float, json_output: bool) -> int:
 
     chosen = engine(engine_name)
     with status(f"checking {chosen.label}"):
-        found = findings(chosen, Limits(processor_time=time_limit))
+        found = findings(chosen, Limits(processor_time=time_limit), checks)
     stop_if_interrupted()
     print_rows([{"check": one.check, "verdict": one.verdict, "what was found": one.said} for one in found], json_output)
     verdicts = {one.verdict for one in found}
@@ -177,5 +180,5 @@ def calibrate(
         click.echo(f"To paste, as {name}:\n\n{text}")
 
 
-for verb in (accept, check, compare, history, limits, run, sweep, tradeoff):
+for verb in (accept, check, compare, history, limits, replay, report, run, sweep, tradeoff):
     dropspin.add_command(verb)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.extremes import Explored, Extremes, Point, Surprise, surprises
+from reports.section import Section
 from reports.written import write_table
 
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "across", "across_value", "condition", "criterion", "figure", "said")
@@ -137,26 +138,20 @@ def write(found: Sequence[Extremes], folder: Path) -> None:
     from reports.plots import extremes_figure, stability_figure
 
     write_table(folder, "limits", COLUMNS, [row for one in found for row in rows(one)])
-    parts = ["# Where engines break"]
+    section = Section("Where engines break")
     if any(one.explored for one in found):
-        told = "\n".join(f"{number}. {said}" for number, said in enumerate(sentences(found), 1))
-        parts += ["## Surprises first", told or "None."]
-    if step_rows(found):
-        parts += ["## The largest steps", _markdown(step_rows(found))]
+        section.add_heading("Surprises first")
+        section.add_list(sentences(found) or ["None."])
+    if steps := step_rows(found):
+        section.add_heading("The largest steps")
+        section.add_table(steps)
     for one in found:
-        parts.append(f"## {one.scene.name}")
+        section.add_heading(one.scene.name)
         if one.explored:
-            extremes_figure(one).savefig(folder / f"{one.scene.name}.svg")
-            parts += [f"![{one.scene.name}]({one.scene.name}.svg)", _markdown(range_rows([one]))]
+            section.add_picture(one.scene.name, extremes_figure(one))
+            section.add_table(range_rows([one]))
         for along, across in dict.fromkeys((plane.axes[0].name, plane.axes[1].name) for plane in one.mapped):
-            name = f"{one.scene.name}-{along}-{across}.svg"
-            stability_figure(one, along, across).savefig(folder / name)
-            parts.append(f"![{along} and {across}]({name})")
-        parts += [f"Left out: {engine}, {why}." for engine, why in one.left_out.items()]
-    (folder / "limits.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-
-
-def _markdown(table: Sequence[dict[str, str]]) -> str:
-    heads = list(table[0])
-    lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row.values()] for row in table)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+            section.add_picture(f"{one.scene.name}-{along}-{across}", stability_figure(one, along, across))
+        for engine, why in one.left_out.items():
+            section.add_text(f"Left out: {engine}, {why}.")
+    section.write(folder, "limits")

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-import pandas as pd
-
 from comparisons import Results
 from comparisons.engines.base import calibrated_label
 from comparisons.studies import STUDIES
@@ -43,11 +41,6 @@ def worst_verdicts(results: Results) -> dict[tuple[str, str], str]:
     for scene, engine, verdict in zip(own["scene"], own["engine"], own["verdict"], strict=True):
         worst[scene, engine] = min(verdict, worst.get((scene, engine), verdict), key=SEVERITY.index)
     return worst
-
-
-def failures(results: Results) -> pd.DataFrame:
-    """The rows that failed or broke down."""
-    return results.frame[results.frame["verdict"].isin(FAILURES | BREAKDOWNS)]
 
 
 def lasting_errors(results: Results, cause: str) -> dict[str, list[str]]:

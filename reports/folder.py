@@ -4,28 +4,32 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from comparisons import Results
 from comparisons.store import restore, save
-from reports.html import FIGURES, html_report, markdown_report, svg_plots
+from reports.html import FIGURES, figures, html_report, markdown_report
 from reports.junit import junit_xml
+from reports.section import Section
+from reports.svg import save_png, svg
 from scenarios import DropspinError
 
 OURS = frozenset(
-    {"run.json", "results.parquet", "tolerances.parquet", "results.csv", "report.html", "report.md", "junit.xml", "plots"}
+    {"run.json", "results.parquet", "tolerances.parquet", "results.csv", "report.html", "report.md", "replay.html", "junit.xml", "plots"}
     | {"trajectories", "ensembles"}
 )
 
 
-def write(results: Results, folder: str | Path) -> Path:
+def write(results: Results, folder: str | Path, sections: Sequence[Section] = (), png: bool = False) -> Path:
     """Write a run: its data, the reports and the plots. An earlier run in the same folder is replaced.
 
     Args:
         results: The run.
         folder: Where to; made if it does not exist.
+        sections: What other studies have to tell, for the report.
+        png: Whether plots are wanted as PNG too.
 
     Returns:
         The path of report.html.
@@ -34,19 +38,22 @@ def write(results: Results, folder: str | Path) -> Path:
         DropspinError: The folder holds something that is not a run, or cannot be written.
     """
     with run_folder(folder) as unfinished:
-        fill(results, unfinished)
+        fill(results, unfinished, sections, png)
     return Path(folder) / "report.html"
 
 
-def fill(results: Results, folder: Path) -> None:
+def fill(results: Results, folder: Path, sections: Sequence[Section] = (), png: bool = False) -> None:
     """Write everything of a run into an empty folder."""
     save(results, folder)
     results.frame.to_csv(folder / "results.csv", index=False)
     (folder / "plots").mkdir()
-    plots = dict(svg_plots(results))
-    for name, text in plots.items():
-        (folder / "plots" / f"{name}.svg").write_text(text, encoding="utf-8")
-    (folder / "report.html").write_text(html_report(results, plots), encoding="utf-8")
+    plots = {}
+    for name, figure in figures(results):
+        plots[name] = svg(figure, f"s{name}")
+        (folder / "plots" / f"{name}.svg").write_text(plots[name], encoding="utf-8")
+        if png:
+            save_png(figure, folder / "plots" / f"{name}.png")
+    (folder / "report.html").write_text(html_report(results, plots, sections), encoding="utf-8")
     (folder / "report.md").write_text(markdown_report(results), encoding="utf-8")
     (folder / "junit.xml").write_bytes(junit_xml(results))
 
@@ -159,5 +166,5 @@ def _files_of_run(folder: Path) -> set[str]:
         arrays, scenes = {*content["trajectories"], *content["ensembles"]}, content["scenes"]
     except (OSError, ValueError, TypeError, KeyError):
         return set()
-    plots = {f"plots/{number:02d}-{kind}.svg" for number in range(len(scenes)) for kind in FIGURES}
+    plots = {f"plots/{number:02d}-{kind}.{ending}" for number in range(len(scenes)) for kind in FIGURES for ending in ("svg", "png")}
     return {*OURS, *arrays, *plots}

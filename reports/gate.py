@@ -17,7 +17,7 @@ from comparisons.verdicts import FAILURES
 from reports.failing import Failing
 from reports.findings import counts as counts_of
 from reports.findings import verdict_sentence
-from reports.html import markdown
+from reports.html import page
 
 AT_MOST = 12
 """How many of what failed are told one by one where people read; JUnit and JSON have them all."""
@@ -73,7 +73,7 @@ def sentences(checked: Checked, held: Held | None) -> list[str]:
 def summary(checked: Checked, held: Held | None, found: Sequence[Failing]) -> str:
     """The same as Markdown that fits a comment on a pull request."""
     results = checked.results
-    return markdown(
+    return page(
         "check.md",
         sentences=sentences(checked, held),
         failing=found[:IN_SUMMARY],

@@ -1,7 +1,7 @@
 """The report: one HTML file that needs no network."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -13,20 +13,23 @@ from comparisons import ENSEMBLE_METRICS, METRICS, Results
 from comparisons.provenance import first_settings
 from comparisons.studies import STUDIES
 from reports import numbers
+from reports.apart import taken_apart
 from reports.colours import engine_colours
+from reports.failing import failing
 from reports.findings import (
     NEGLIGIBLE,
     counts,
-    failures,
     finding_sentences,
     lasting_errors,
     profile_comparisons,
     verdict_sentence,
     worst_verdicts,
 )
+from reports.methods import leading_errors, step_costs
 from reports.plots import bounce_figure, convergence_figure, ensemble_figure, flight_figure, time_figure
 from reports.plots.spins import wobbles_freely
-from reports.svg import svg
+from reports.replay import as_data, replay_of
+from reports.section import Section
 from scenarios import Scenario, truth_for
 
 if TYPE_CHECKING:
@@ -40,6 +43,8 @@ FIGURES: dict[str, Callable[[Results, str], "Figure | None"]] = {
     "ensemble": ensemble_figure,
 }
 """What is drawn of a scene, where it has it."""
+STUCK = {"model": "model error", "setting": "setting"}
+"""Why an error stays as the step goes to 0, and the words for it."""
 
 
 @cache
@@ -52,38 +57,40 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"written": numbers.written, "step": numbers.step, "word": numbers.word, "cell": _markdown_cell}
+    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "written")}
+    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": numbers.MARKS}
     return environment
 
 
-def html_report(results: Results, plots: dict[str, str]) -> str:
+def html_report(results: Results, plots: dict[str, str], sections: Sequence[Section] = ()) -> str:
     """The whole page.
 
     Args:
         results: The run.
-        plots: SVG elements by name, from `svg_plots`.
+        plots: SVG elements, by the names of `figures`.
+        sections: What other studies have to tell.
     """
-    return _environment().get_template("report.html").render(_context(results, plots))
+    return page("report.html", **_context(results, plots), sections=sections)
 
 
 def markdown_report(results: Results) -> str:
     """The same in short, for a pull request."""
-    return markdown("report.md", **_context(results, {}))
+    return page("report.md", **_context(results, {}))
 
 
-def markdown(template: str, **content: Any) -> str:
-    """A Markdown page of ours."""
+def page(template: str, **content: Any) -> str:
+    """An HTML or Markdown page of ours."""
     return _environment().get_template(template).render(content)
 
 
-def svg_plots(results: Results) -> Iterator[tuple[str, str]]:
-    """Name and SVG of each plot of the report."""
+def figures(results: Results) -> "Iterator[tuple[str, Figure]]":
+    """Name and figure of each plot of the report."""
     for number, scene in enumerate(results.scenes):
         for kind, draw in FIGURES.items():
             figure = draw(results, scene)
             if figure is not None:
-                yield f"{number:02d}-{kind}", svg(figure, f"s{number:02d}-{kind}")
+                yield f"{number:02d}-{kind}", figure
 
 
 def _markdown_cell(text: str) -> str:
@@ -91,24 +98,45 @@ def _markdown_cell(text: str) -> str:
     return re.sub(r"([\\|`*_\[\]<>#])", r"\\\1", " ".join(str(text).split()))
 
 
+def _markdown_code(text: str) -> str:
+    """Text as code, whatever backticks it has."""
+    fence = "`" * (1 + max((len(found) for found in re.findall("`+", text)), default=0))
+    room = " " if len(fence) > 1 else ""
+    return f"{fence}{room}{text}{room}{fence}"
+
+
 def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
-    worst = worst_verdicts(results)
+    chips = _chips(results)
     return {
         "verdict": verdict_sentence(results),
         "held": counts(results).failed == 0 and counts(results).broken == 0,
         "findings": finding_sentences(results),
         "engines": results.engines,
         "colours": engine_colours(results.engines),
-        "matrix": {name: {engine: worst.get((name, engine), "missing") for engine in results.engines} for name in results.scenes},
-        "stuck": {"model error": lasting_errors(results, "model"), "setting": lasting_errors(results, "setting")},
+        "chips": list(dict.fromkeys(chip for scene in chips.values() for mine in scene.values() for chip in mine)),
+        "stuck": list(STUCK.values()),
         "negligible": NEGLIGIBLE,
+        "leading": leading_errors(results),
+        "costs": step_costs(results),
         "profiles": profile_comparisons(results),
-        "failures": [_row(row) for row in failures(results).itertuples()],
-        "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
+        "failures": failing(results),
+        "scenes": [_scene(results, number, name, plots) | {"chips": chips[name]} for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,
         "provenance": results.provenance,
         "settings": first_settings(results.provenance),
+    }
+
+
+def _chips(results: Results) -> dict[str, dict[str, list[str]]]:
+    """By scene and engine: the verdict that counts, and why an error stays, if one does."""
+    worst, stuck = worst_verdicts(results), {words: lasting_errors(results, cause) for cause, words in STUCK.items()}
+    return {
+        scene: {
+            engine: [worst.get((scene, engine), "missing"), *(words for words, where in stuck.items() if scene in where[engine])]
+            for engine in results.engines
+        }
+        for scene in results.scenes
     }
 
 
@@ -119,6 +147,7 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
     dts = sorted(frame["dt"].dropna().unique(), reverse=True)
     own = results.measurements[results.measurements["scene"] == name]
     studies = frame[frame["kind"].isin(STUDIES)]
+    motions = replay_of(results, name)
     return {
         "id": f"scene-{number:02d}",
         "name": name,
@@ -130,6 +159,9 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         "metrics": list(own["metric"].unique()),
         "cells": {(row.metric, row.engine, row.dt): _row(row) for row in own.itertuples()},
         "trends": _trends(studies),
+        "apart": taken_apart(results, name),
+        "figures": _figures(pd.concat([own, studies])),
+        "replay": None if motions is None else as_data(motions),
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
         "agreement": _agreement(frame, min(dts)),
         "ensemble": _ensemble(frame, min(dts)),
@@ -177,6 +209,12 @@ def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
             "reason": "; ".join(reasons),
         }
     return trends
+
+
+def _figures(rows: pd.DataFrame) -> list[dict[str, Any]]:
+    """What was measured, metric by metric, then engine by engine, the limit last."""
+    metrics = {metric: number for number, metric in enumerate(dict.fromkeys(rows["metric"]))}
+    return [_row(row) for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).itertuples()]
 
 
 def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:

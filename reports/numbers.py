@@ -48,6 +48,16 @@ def step(dt: float) -> str:
     return "→ 0" if math.isnan(dt) else f"{dt:g}"
 
 
+def in_ms(dt: float) -> str:
+    """A step in milliseconds, or the limit."""
+    return "→ 0" if math.isnan(dt) else f"{1e3 * dt:g} ms"
+
+
+def unit(of: str) -> str:
+    """A unit, as it stands behind what is measured in it; nothing for a ratio."""
+    return "" if of == "1" else f" [{of}]"
+
+
 def subject(metric: str, kind: str, truth: str = "") -> str:
     """What a row is about; what one of kind `baseline` is about, stands in its column `truth`."""
     words = metric.replace("_", " ")

@@ -8,7 +8,7 @@ import pandas as pd
 
 from comparisons.regressions.comparing import Changes
 from comparisons.regressions.speed import SpeedChange
-from reports.html import markdown
+from reports.html import page
 from reports.numbers import subject, written
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
@@ -65,7 +65,7 @@ def summary(changes: Changes, fail_speed: float | None) -> str:
     """The same as Markdown that fits a comment on a pull request."""
     found = tables(changes)
     held = not len(changes.regressions) and not (fail_speed is not None and changes.slower(fail_speed))
-    return markdown("compare.md", held=held, tables=found, sentences=sentences(changes, fail_speed))
+    return page("compare.md", held=held, tables=found, sentences=sentences(changes, fail_speed))
 
 
 def as_data(changes: Changes) -> dict[str, Any]:

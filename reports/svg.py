@@ -1,12 +1,18 @@
-"""A matplotlib figure as SVG: small, deterministic, in the colours of the page it stands in."""
+"""A matplotlib figure as SVG, small, deterministic, in the colours of the page it stands in; and as PNG."""
 
 import io
+import json
 import re
 from typing import TYPE_CHECKING
 
+from markupsafe import escape
+
 from reports.plots import FAINT, INK
+from reports.plots.style import TIME
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
 
@@ -22,4 +28,25 @@ def svg(figure: "Figure", identifier: str) -> str:
     text = text.replace(INK, "currentColor").replace(FAINT, "currentColor")
     text = re.sub(r'\bid="([^"]+)"', rf'id="{identifier}-\1"', text)
     text = re.sub(r'(url\(#|href="#)([^")]+)', rf"\1{identifier}-\2", text)
-    return re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL).strip()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL).strip()
+    # A hundredth of a point is more than can be seen.
+    text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found.group()), text)
+    panels = over_time(figure)
+    return text.replace("<svg ", f'<svg data-over-time="{escape(json.dumps(panels))}" ', 1) if panels else text
+
+
+def save_png(figure: "Figure", file: "Path") -> None:
+    """Save a figure as PNG, on white."""
+    figure.savefig(file, dpi=200, facecolor="white", metadata={"Software": None})
+
+
+def over_time(figure: "Figure") -> list[dict[str, float]]:
+    """Where panels over time are in a figure that was drawn: edges in points from the upper left, and from when to when they show [s]."""
+    width, height = 72.0 * figure.get_size_inches()
+    found = []
+    for axes in figure.axes:
+        if axes.get_xlabel() == TIME:
+            box, (first, last) = axes.get_position(), axes.get_xlim()
+            edges = {"left": box.x0 * width, "right": box.x1 * width, "top": (1.0 - box.y1) * height, "bottom": (1.0 - box.y0) * height}
+            found.append({name: round(float(value), 6) for name, value in {**edges, "from": first, "to": last}.items()})
+    return found

@@ -9,6 +9,7 @@ import numpy as np
 
 from comparisons.metrics import METRICS
 from comparisons.tradeoff import SIDE_BY_SIDE, Point, TradeOff
+from reports.section import Section
 from reports.written import write_table
 
 COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "side_by_side", "on_front")
@@ -84,13 +85,13 @@ def write(found: Sequence[TradeOff], within: Sequence[float], folder: Path) -> N
     from reports.plots import tradeoff_figure
 
     write_table(folder, "tradeoff", COLUMNS, [row for one in found for row in rows(one)])
-    parts = []
+    section = Section("What accuracy costs")
     for one in found:
-        listed = "\n".join(f"- {sentence}" for sentence in sentences(one, within))
-        parts.append(f"![{one.scene.name}]({one.scene.name}.svg)\n\n{listed}")
-        tradeoff_figure(one).savefig(folder / f"{one.scene.name}.svg")
-    told = "\n\n".join(parts)
-    (folder / "tradeoff.md").write_text(f"# What accuracy costs\n\n{told}\n", encoding="utf-8")
+        section.add_heading(one.scene.name)
+        section.add_picture(one.scene.name, tradeoff_figure(one))
+        section.add_table(front_rows(one))
+        section.add_list(sentences(one, within))
+    section.write(folder, "tradeoff")
 
 
 def _named(point: Point) -> str:

@@ -3,7 +3,7 @@
 import json
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import chdir
 from typing import Any, Literal, NamedTuple, cast
 
@@ -17,6 +17,7 @@ from comparisons.engines.base import Diverged, Engine, Limit
 from comparisons.isolation import Cells, Failed, Limits
 from comparisons.simulating import Contestant
 from scenarios import Scenario, load, names, truth_for
+from scenarios.errors import UnknownName
 from scenarios.rotations import angle_between_orientations
 from scenarios.truths import LAWS, Law
 
@@ -51,17 +52,27 @@ class Declined(Exception):
     """The engine runs none of the scenes that would show it."""
 
 
-def conform(engine: Engine, limits: Limits = Limits(processor_time=60.0)) -> list[Finding]:  # noqa: B008 - it cannot be changed
+def conform(
+    engine: Engine,
+    limits: Limits = Limits(processor_time=60.0),  # noqa: B008 - it cannot be changed
+    checks: Sequence[str] = (),
+) -> list[Finding]:
     """Hold an adapter against the protocol, and its motion against scenes that tell one mistake from another.
 
     Args:
         engine: The engine.
         limits: What each check may use.
+        checks: Which checks to make; all if none is named.
+
+    Raises:
+        UnknownName: There is no such check.
     """
+    for unknown in set(checks) - CHECKS.keys():
+        raise UnknownName("check", unknown, CHECKS)
     contestant = Contestant(engine.label, engine)
     found = []
     with Cells(limits) as cells:
-        for check in CHECKS:
+        for check in checks or CHECKS:
             try:
                 found.append(cells.call(contestant, _finding, check))
             except Failed as failure:

@@ -24,6 +24,8 @@ Simulated = Callable[[Scenario], Scenario]
 Told = Callable[[Array], Array]
 Change = Callable[[Array, Array], Array]
 """From a part of states, and their orientations."""
+Exact = dict[Scenario, Array | None]
+"""The states of scenes at a probe's times, shape (2, 13); None where no closed form has them."""
 
 POSITION, ORIENTATION, VELOCITY, SPIN = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
 STANDARD_GRAVITY = 9.81
@@ -56,13 +58,19 @@ class Mistake:
     is_a_trait: bool = False
     about: str = ""
 
-    def motion(self, probe: Probe) -> Array | None:
-        """What an engine with this mistake gives of a probe, shape (2, 13); None where no closed form can say."""
+    def motion(self, probe: Probe, known: Exact) -> Array | None:
+        """What an engine with this mistake gives of a probe, shape (2, 13); None where no closed form can say.
+
+        Many mistakes simulate the same: `known` has what was found before, and gets what is found now.
+        """
         try:
-            truth = truth_for(self.simulated(probe.scene))
+            scene = self.simulated(probe.scene)
+            if scene not in known:
+                known[scene] = _exactly(scene, probe.times)
         except (DropspinError, ValueError):  # no such body, or one that starts below the floor
             return None
-        return None if truth is None or not truth.covers(probe.times).all() else self.told(truth(probe.times).states)
+        states = known[scene]
+        return None if states is None else self.told(states)
 
     def start(self, scene: Scenario) -> Array:
         """The state at the start with this mistake, shape (13,)."""
@@ -82,12 +90,21 @@ def explained(probe: Probe, found: Array) -> Mistake | None:
     """The mistake, or the two, that give what an engine gave of a probe, shape (2, 13); None if there are none."""
     # The truth of a box on its corner takes long, too long for thousands of pairs.
     singly = [mistake for mistake in MISTAKES if mistake.about != "start"]  # which is looked at by itself
+    known: Exact = {}
     for candidates in (singly, _pairs() if probe.scene.floor is None or isinstance(probe.scene.body, Sphere) else ()):
-        near = [(round(probe.off(found, motion), 3), mistake) for mistake in candidates if (motion := mistake.motion(probe)) is not None]
-        off, best = min(near, key=lambda one: one[0], default=(np.inf, None))
-        if off <= 1.0:
-            return best
+        near = [(mistake, motion) for mistake in candidates if (motion := mistake.motion(probe, known)) is not None]
+        if not near:
+            continue
+        off = np.round(probe.off(found, np.array([motion for _, motion in near])), 3)
+        if off.min() <= 1.0:
+            return near[int(np.argmin(off))][0]
     return None
+
+
+def _exactly(scene: Scenario, times: Array) -> Array | None:
+    """States at some times, shape (2, 13); None where no closed form has all of them."""
+    truth = truth_for(scene)
+    return None if truth is None or not truth.covers(times).all() else truth(times).states
 
 
 def explained_start(scene: Scenario, state: Array, allowed: float) -> Mistake | None:

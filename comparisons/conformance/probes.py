@@ -45,17 +45,19 @@ class Probe:
         steps = self.scene.steps(DT)
         return np.array([steps // 2, steps])
 
-    def off(self, found: Array, meant: Array) -> float:
-        """How far states, shape (2, 13), are from others, over what is allowed; infinite where they are no numbers."""
-        worst = float(np.max(differences(found, meant) / np.array(self.allowed)))
-        return worst if np.isfinite(worst) else float("inf")
+    def off(self, found: Array, meant: Array) -> Array:
+        """How far states, shape (2, 13), are from others, shape (..., 2, 13), over what is allowed; infinite where they are no numbers."""
+        worst = np.max(differences(found, meant) / np.array(self.allowed), axis=-1)
+        return np.where(np.isfinite(worst), worst, np.inf)
 
 
 def differences(found: Array, meant: Array) -> Array:
-    """The largest difference of position [m], attitude [rad], velocity [m/s], angular velocity [rad/s] between states, shape (4,)."""
-    apart = [np.linalg.norm(found[:, part] - meant[:, part], axis=1) for part in (slice(0, 3), slice(7, 10), slice(10, 13))]
-    turned = angle_between_orientations(found[:, 3:7], meant[:, 3:7])
-    return np.array([apart[0].max(), turned.max(), apart[1].max(), apart[2].max()])
+    """The largest difference of position [m], attitude [rad], velocity [m/s], angular velocity [rad/s] between states, shape (..., 4)."""
+    position, velocity, spin = (
+        np.linalg.norm(found[..., part] - meant[..., part], axis=-1) for part in (slice(0, 3), slice(7, 10), slice(10, 13))
+    )
+    turned = angle_between_orientations(found[..., 3:7], meant[..., 3:7])
+    return np.stack([position, turned, velocity, spin], axis=-1).max(axis=-2)
 
 
 def _probe(name: str, allowed: tuple[float, float, float, float], duration: float, body: dict[str, Any], **tables: Any) -> Probe:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from comparisons import Results
-from reports.plots.style import Array, at_one_step
+from reports.plots.style import TIME, Array, at_one_step
 from scenarios import DropspinError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> 
     """Draw the energy left over time: each engine's median, and between which values eight of ten lie."""
     for outcome, look in at_one_step(results, results.ensembles, scene_name, min):
         _draw_spread(outcome.t, outcome.energy, look, axes)
-    axes.set_xlabel("time [s]")
+    axes.set_xlabel(TIME)
     axes.set_ylabel("energy, over the scene's")
 
 
@@ -34,7 +34,7 @@ def plot_angular_momentum_of_ensemble(results: Results, scene_name: str, axes: "
     for outcome, look in at_one_step(results, results.ensembles, scene_name, min):
         if outcome.angular_momentum is not None:
             _draw_spread(outcome.t, outcome.angular_momentum, look, axes)
-    axes.set_xlabel("time [s]")
+    axes.set_xlabel(TIME)
     axes.set_ylabel("|L|, over r √(2 E M)")
 
 
@@ -43,7 +43,7 @@ def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> No
     for outcome, look in at_one_step(results, results.ensembles, scene_name, min):
         axes.ecdf(outcome.rest_time, **look)
     axes.set_xlim(0.0, results.scenes[scene_name].duration)
-    axes.set_xlabel("time [s]")
+    axes.set_xlabel(TIME)
     axes.set_ylabel("share at rest")
 
 

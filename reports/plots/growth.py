@@ -7,7 +7,7 @@ import numpy as np
 from comparisons import Results
 from comparisons.comparison import Comparison, Unresolved
 from comparisons.errors import ERRORS
-from reports.plots.style import ROUNDING, Array, at_one_step, label_powers, metric_label, stride
+from reports.plots.style import ROUNDING, TIME, Array, at_one_step, label_powers, metric_label, stride
 from scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
     for motion, look in at_one_step(results, results.trajectories, scene_name, min):
         axes.semilogy(*_sizes(scene, motion, truth, metric), **look)
     label_powers(axes, "y")
-    axes.set_xlabel("time [s]")
+    axes.set_xlabel(TIME)
     axes.set_ylabel(metric_label(metric))
 
 

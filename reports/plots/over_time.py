@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from comparisons import Results
-from reports.plots.style import Array, as_truth, at_one_step, exactly, thinned
+from reports.plots.style import TIME, Array, as_truth, at_one_step, exactly, thinned
 from scenarios import Scenario, Trajectory, truth_for
 from scenarios.mechanics import angular_momentum, energy
 from scenarios.rotations import rotate
@@ -59,6 +59,6 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
     if truth is not None:
         exact = exactly(scene, truth)
         axes.plot(exact.t, quantity(scene, exact), **as_truth())
-    axes.set_xlabel("time [s]")
+    axes.set_xlabel(TIME)
     axes.set_ylabel(LABELS.get(quantity, ""))
     axes.ticklabel_format(axis="y", useOffset=False)

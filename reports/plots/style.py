@@ -39,6 +39,8 @@ REPORT: Any = {
     "figure.facecolor": "none",
     "legend.frameon": False,
 }
+TIME = "time [s]"
+"""Label of every axis of time, by which a replay knows where to show its own."""
 MOST_POINTS = 800
 ROUNDING = 1e-17
 """Where exact zeros are drawn on logarithmic axes."""

@@ -15,7 +15,13 @@ from scenarios import DropspinError, load
 
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95)
 STEPS = (1 / 60, 1 / 240, 1e-3)
-CASES = [(name, e, dt) for name in ("mujoco", "pybullet") for e in RESTITUTIONS for dt in STEPS]
+# Each restitution at one step, each step at several; the rest of the grid takes minutes.
+CASES = [
+    pytest.param(name, e, dt, marks=[] if number % len(STEPS) == place else [pytest.mark.slow])
+    for name in ("mujoco", "pybullet")
+    for number, e in enumerate(RESTITUTIONS)
+    for place, dt in enumerate(STEPS)
+]
 FORGET = "import sys\nassert not {'comparisons', 'scenarios', 'reports', 'reference_impl'} & set(sys.modules)\n"
 
 

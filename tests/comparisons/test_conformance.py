@@ -12,6 +12,7 @@ from comparisons import engine
 from comparisons.conformance import conform
 from comparisons.engines.pybullet_engine import PyBullet
 from scenarios import load
+from scenarios.errors import UnknownName
 
 sys.path.insert(0, str(Path(__file__).parent))
 import engines_for_tests as made
@@ -31,8 +32,9 @@ def documented(*changes):
     return namespace["Flyer"]()
 
 
-def bad(engine_):
-    return {one.check: (one.verdict, one.said) for one in conform(engine_) if one.verdict not in ("passed", "declined")}
+def bad(engine_, *checks):
+    found = conform(engine_, checks=checks)
+    return {one.check: (one.verdict, one.said) for one in found if one.verdict not in ("passed", "declined")}
 
 
 def test_the_documented_adapter_is_right_and_short():
@@ -144,7 +146,7 @@ def record(first, given):
 def test_a_mistake_is_named(changes, check, words, tmp_path, monkeypatch):
     """Planted in the documented adapter; one of them writes into the working directory."""
     monkeypatch.chdir(tmp_path)
-    found = bad(documented(*changes))
+    found = bad(documented(*changes), check)
     assert check in found, found
     assert words in found[check][1]
     assert found[check][0] in ("failed", "crashed", "noted")
@@ -194,7 +196,7 @@ def body(**values):
 )
 def test_a_mistake_on_the_floor_is_named(change, check, words):
     """Planted in an adapter to Bullet."""
-    found = bad(with_scene(change))
+    found = bad(with_scene(change), check)
     assert check in found, found
     assert words in found[check][1]
 
@@ -211,7 +213,7 @@ def test_what_ends_the_process_costs_its_check_only():
                 ctypes.string_at(0)
             return super().prepare(scene, dt)
 
-    found = {one.check: one for one in conform(Faulting())}
+    found = {one.check: one for one in conform(Faulting(), checks=["falling", "tumbling", "fast", "turning"])}
     assert found["falling"].verdict == "crashed"
     assert found["falling"].said == "its process was ended by SIGSEGV"
     assert found["tumbling"].verdict == "passed"
@@ -219,7 +221,7 @@ def test_what_ends_the_process_costs_its_check_only():
 
 def test_sleep_is_seen():
     """Bullet with its own sleeping thresholds puts a slow body to sleep after two seconds."""
-    found = bad(engine("pybullet[profile=default]"))
+    found = bad(engine("pybullet[profile=default]"), "coasting", "creeping")
     assert "creeping" in found
     assert found["coasting"][0] == "failed"
 
@@ -250,7 +252,8 @@ def test_steps_that_differ_in_the_last_bits_are_no_fault():
 
 def test_nan_is_a_fault_and_no_crash():
     """Of the adapter's, in words."""
-    found = bad(documented((TOLD, TOLD.replace("np.", "(np.nan if self.data.time else 1.0) * np."))))
+    found = bad(documented((TOLD, TOLD.replace("np.", "(np.nan if self.data.time else 1.0) * np."))), "time", "staggered", "falling")
+    assert len(found) == 3
     assert "crashed" not in {verdict for verdict, _ in found.values()}
     assert "not finite" in found["time"][1]
     assert "not finite" in found["staggered"][1]
@@ -258,13 +261,13 @@ def test_nan_is_a_fault_and_no_crash():
 
 def test_what_is_off_by_rounding_is_called_so():
     """A start 1e-12 off is no quaternion in another order."""
-    found = bad(documented(("self.data.qpos = [*x,", "self.data.qpos = [*(x + 1e-12),")))
+    found = bad(documented(("self.data.qpos = [*x,", "self.data.qpos = [*(x + 1e-12),")), "builds what is meant")
     assert "position at the start is" in found["builds what is meant"][1]
 
 
 def test_axes_that_are_not_principal():
     """An adapter that drops the products of inertia says so by its motion."""
-    found = bad(documented(('            return "only principal axes are mapped"', "            pass")))
+    found = bad(documented(('            return "only principal axes are mapped"', "            pass")), "tumbling askew")
     assert found["tumbling askew"] == ("failed", "products of inertia are left out: the body's own axes are not principal")
 
 
@@ -280,7 +283,7 @@ def test_restitution_that_is_right_at_one_value_only(change, checks):
     def changed(scene):
         return scene if scene.floor is None else floor(restitution=change(scene.floor.restitution))(scene)
 
-    assert checks <= set(bad(with_scene(changed)))
+    assert set(bad(with_scene(changed), "dull ball", "bouncing ball", "lively ball")) == checks
 
 
 def test_free_words_of_a_limit_excuse_nothing():
@@ -303,13 +306,13 @@ def test_free_words_of_a_limit_excuse_nothing():
             simulation.record = record
             return simulation
 
-    assert bad(Excusing())["bouncing ball"][0] == "failed"
+    assert bad(Excusing(), "bouncing ball")["bouncing ball"][0] == "failed"
     Excusing.told = (Limit("soft", {"restitution_error": 0.2, "bounce_height_error": 0.2}),)
     found = comparisons.run([load("drop-ball")], [Excusing()], [1e-3]).measurements.set_index("metric")
     assert found.loc["position_error", "verdict"] == "failed"
     assert found.loc["restitution_error", "verdict"] == "limited"
     Excusing.told = "never"
-    assert "limits is 'never'" in bad(Excusing())["bouncing ball"][1]
+    assert "limits is 'never'" in bad(Excusing(), "bouncing ball")["bouncing ball"][1]
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
@@ -323,3 +326,8 @@ def test_a_limit_explains_what_it_can_and_no_more(factor, monkeypatch):
     monkeypatch.setattr(mujoco_engine, "contact", lambda e, friction, *rest: contact(e, factor * friction, *rest))
     found = comparisons.run([scene], ["mujoco"], [1e-3]).frame.set_index("metric")
     assert found.loc["position_error", "verdict"] == "failed"
+
+
+def test_no_such_check():
+    with pytest.raises(UnknownName, match="bouncing ball"):
+        conform(engine("document"), checks=["bounce ball"])

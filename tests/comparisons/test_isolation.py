@@ -144,13 +144,13 @@ def test_processor_time_is_counted_anew_for_each_piece_of_work():
 
 
 def test_runs_of_good_and_bad_leave_nothing_behind():
-    """Fifty runs: no process, and no file where temporary files go; in an interpreter of its own, whose children can be counted."""
+    """Twenty-one runs: no process, and no file where temporary files go; in an interpreter of its own, whose children can be counted."""
     script = textwrap.dedent(f"""
         import os, sys, tempfile
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         import comparisons, test_isolation as t
         kinds = (t.segfault, t.leave, t.allocate, t.loop, t.shout, t.fail, t.interrupt)
-        for number in range(50):
+        for number in range(21):
             comparisons.run([t.BALL, t.SPIN], [t.breaking(kinds[number % len(kinds)]), "document"], [4e-3], limits=t.TIGHT)
         parents = {{p: open(f"/proc/{{p}}/stat").read().split(") ")[1].split()[1] for p in os.listdir("/proc") if p.isdigit()}}
         print([p for p, parent in parents.items() if parent == str(os.getpid())], os.listdir(tempfile.gettempdir()))

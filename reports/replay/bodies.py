@@ -1,0 +1,61 @@
+"""What a body looks like: flat faces around its vertices, or a ball."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.body import Body
+
+Array = NDArray[np.float64]
+
+IN_ONE_PLANE = 1e-9
+"""How far points of one face may be out of its plane, of the body's size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The surface of a body, in its own frame.
+
+    Attributes:
+        vertices: From the centre of mass [m], shape (n, 3); one, at the centre, of a ball.
+        faces: Of each face its vertices, by number, counterclockwise from outside; none of a ball.
+        radius: How far the surface stands out from the vertices [m].
+        is_flat: Whether the body is a plane figure, seen from both sides.
+    """
+
+    vertices: Array
+    faces: Sequence[Sequence[int]]
+    radius: float = 0.0
+    is_flat: bool = False
+
+
+def outline(body: Body) -> Outline:
+    """The convex hull of a body's vertices, or its ball."""
+    if body.rounding:
+        return Outline(body.vertices, [], body.rounding)
+    from scipy.spatial import ConvexHull
+
+    points = body.vertices
+    centre, (_, spread, axes) = points.mean(axis=0), np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    if spread[2] < IN_ONE_PLANE * body.size * np.sqrt(len(points)):
+        corners = ConvexHull((points - centre) @ axes[:2].T).vertices
+        return Outline(points[corners], [list(range(len(corners)))], is_flat=True)
+    hull = ConvexHull(points)
+    # Qhull cuts faces into triangles; those of one plane are one face.
+    planes: dict[tuple[float, ...], set[int]] = {}
+    for plane, corners in zip(hull.equations, hull.simplices, strict=True):
+        key = tuple(np.round(plane / [1.0, 1.0, 1.0, body.size], 9) + 0.0)
+        planes.setdefault(key, set()).update(int(corner) for corner in corners)
+    used = {corner: number for number, corner in enumerate(sorted(set().union(*planes.values())))}
+    faces = [[used[corner] for corner in _around(points, sorted(corners), np.array(plane[:3]))] for plane, corners in planes.items()]
+    return Outline(points[list(used)], faces)
+
+
+def _around(points: Array, corners: list[int], normal: Array) -> list[int]:
+    """Corners of a face in order, counterclockwise about its outward normal."""
+    arms = points[corners] - points[corners].mean(axis=0)
+    across = np.cross(normal, arms[0])
+    angles = np.arctan2(arms @ across, arms @ arms[0] * np.linalg.norm(normal))
+    return [corners[place] for place in np.argsort(angles)]

@@ -1,0 +1,123 @@
+"""A replay as a clip: an animated GIF, or a video."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.replay.bodies import Outline, outline
+from reports.replay.motions import Motion, Replay
+from scenarios import DropspinError
+from scenarios.rotations import rotate
+
+if TYPE_CHECKING:
+    from mpl_toolkits.mplot3d import Axes3D
+
+Array = NDArray[np.float64]
+
+FRAMES_A_SECOND = 25
+ROUND = 24
+"""Meridians of a ball."""
+GHOST = "#202428"
+
+
+def write_clip(replay: Replay, file: str | Path, speed: float, progress: Callable[[float], None] = lambda _: None) -> None:
+    """Write a clip of a scene, engines overlaid, the truth as a ghost.
+
+    Args:
+        replay: The scene.
+        file: Where to; `.gif`, or `.mp4`, which needs imageio-ffmpeg.
+        speed: Seconds of the scene in a second of the clip.
+        progress: Told the share that is drawn.
+
+    Raises:
+        DropspinError: The file's ending is another, imageio-ffmpeg is missing, or the file cannot be written.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    writer, settings = _writer(Path(file))
+    figure = Figure(figsize=(6.4, 4.8), dpi=100)
+    axes = figure.add_subplot(projection="3d", computed_zorder=False)
+    _frame(axes, replay)
+    shape = outline(replay.scene.body)
+    lasts = max(len(motion.frames) - 1 for motion in replay.motions) * replay.interval
+    times = np.arange(0.0, lasts + 1e-9, speed / FRAMES_A_SECOND)
+    title = figure.suptitle("")
+    handles = [axes.plot([], [], [], color=motion.colour or GHOST, label=motion.label)[0] for motion in replay.motions]
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9)
+    try:
+        with rc_context(settings), writer.saving(figure, str(file), 100):
+            for number, time in enumerate(times):
+                drawn = [artist for motion in replay.motions for artist in _drawn(axes, shape, motion, time / replay.interval)]
+                title.set_text(f"{replay.scene.name}, {time:.3f} s")
+                writer.grab_frame()
+                for artist in drawn:
+                    artist.remove()
+                progress((number + 1) / len(times))
+    except OSError as error:
+        raise DropspinError(f"{file}: cannot be written: {error.strerror or error}; choose another place.") from None
+
+
+def _writer(file: Path) -> tuple[Any, Any]:
+    """What writes a kind of file, and the settings it needs."""
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    if file.suffix == ".gif":
+        return PillowWriter(fps=FRAMES_A_SECOND), {}
+    if file.suffix != ".mp4":
+        raise DropspinError(f"{file}: a clip is a .gif or an .mp4; give the file one of these endings.")
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:
+        raise DropspinError(f"{file}: a video needs imageio-ffmpeg: pip install 'dropspin[video]'; or write a .gif.") from None
+    return FFMpegWriter(fps=FRAMES_A_SECOND), {"animation.ffmpeg_path": get_ffmpeg_exe()}
+
+
+def _frame(axes: "Axes3D", replay: Replay) -> None:
+    """Limits that hold all of every motion, with our y up; a floor."""
+    size = replay.scene.body.size
+    places = np.concatenate([motion.frames.position for motion in replay.motions])
+    low, high = places.min(axis=0) - size, places.max(axis=0) + size
+    x, y, z = zip(low, high, strict=True)
+    axes.set(xlim=x, ylim=(-z[1], -z[0]), zlim=y)
+    axes.set_aspect("equal")
+    axes.view_init(elev=12.0, azim=-60.0)
+    axes.set_axis_off()
+    if replay.scene.floor is not None:
+        across, along = np.meshgrid(np.linspace(*x, 9), np.linspace(-z[1], -z[0], 9))
+        axes.plot_wireframe(across, along, np.zeros_like(across), color=GHOST, alpha=0.2, linewidth=0.7)
+
+
+def _drawn(axes: "Axes3D", shape: Outline, motion: Motion, place: float) -> list[Any]:
+    """A body at a frame, or the nearest to what is between two."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    row = min(round(place), len(motion.frames) - 1)
+    position, orientation = motion.frames.position[row], motion.frames.orientation[row]
+    faces = [_upright(position + rotate(orientation, face)) for face in _faces(shape)]
+    look: dict[str, Any] = {"facecolor": motion.colour, "alpha": 0.55, "edgecolor": motion.colour}
+    if not motion.colour:
+        look = {"facecolor": "none", "edgecolor": GHOST, "linestyle": "--"}
+    trail = _upright(motion.frames.position[: row + 1])
+    [line] = axes.plot(*trail.T, color=motion.colour or GHOST, linewidth=0.8, alpha=0.6)
+    return [axes.add_collection3d(Poly3DCollection(faces, linewidth=0.7, **look)), line]
+
+
+def _faces(shape: Outline) -> list[Array]:
+    """Polygons of a surface, in the body's frame [m]."""
+    if not shape.radius:
+        return [shape.vertices[list(face)] for face in shape.faces]
+    around, down = np.linspace(0.0, 2.0 * np.pi, ROUND + 1), np.linspace(0.0, np.pi, ROUND // 2 + 1)
+    grid = shape.radius * np.stack(
+        [np.outer(np.sin(down), np.cos(around)), np.outer(np.cos(down), np.ones_like(around)), np.outer(np.sin(down), np.sin(around))],
+        axis=-1,
+    )
+    return [grid[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]] for i in range(0, len(down) - 1, 2) for j in range(0, len(around) - 1, 4)]
+
+
+def _upright(points: Array) -> Array:
+    """In matplotlib's axes, whose third is up."""
+    return points[:, [0, 2, 1]] * [1.0, -1.0, 1.0]

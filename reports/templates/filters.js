@@ -1,0 +1,34 @@
+// Filters of the report: what is marked with a scene or an engine that is not asked for is hidden. On paper all details are open.
+"use strict";
+(() => {
+  const form = document.getElementById("filters"), total = document.querySelectorAll("#scenes > section").length;
+  const cells = [...document.querySelectorAll("#matrix td[data-verdicts]")];
+
+  const apply = () => {
+    const engines = new Set([...form.querySelectorAll("[name=engine]:checked")].map((box) => box.value));
+    const part = form.elements.scene.value.trim().toLowerCase(), verdict = form.elements.verdict.value;
+    const found = new Set(cells
+      .filter((cell) => engines.has(cell.dataset.engine) && (!verdict || cell.dataset.verdicts.split(",").includes(verdict)))
+      .map((cell) => cell.parentElement.dataset.scene)
+      .filter((scene) => scene.toLowerCase().includes(part)));
+    for (const element of document.querySelectorAll("[data-scene], [data-engine]")) {
+      const { scene, engine } = element.dataset;
+      element.classList.toggle("left-out", (scene !== undefined && !found.has(scene)) || (engine !== undefined && !engines.has(engine)));
+    }
+    form.elements.shown.textContent = found.size === total ? `all ${total} scenes` : `${found.size} of ${total} scenes`;
+  };
+
+  let closed = [];
+  addEventListener("beforeprint", () => {
+    closed = [...document.querySelectorAll("details:not([open])")];
+    for (const details of closed) details.open = true;
+  });
+  addEventListener("afterprint", () => {
+    for (const details of closed) details.open = false;
+  });
+
+  form.hidden = false;
+  form.addEventListener("input", apply);
+  form.addEventListener("submit", (event) => event.preventDefault());
+  apply();
+})();

@@ -3,13 +3,13 @@ PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: report test test-browser test-slow faults bench examples lint clean
+.PHONY: report test test-browser test-slow faults bench examples docs lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
 
 test: $(VENV)/.installed-dev          ## set up, run the whole test suite
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 test-browser: $(VENV)/.installed-browser  ## the report and the replay in a real browser; needs Chromium
 	$(BIN)/python -m pytest tests/browser
@@ -26,6 +26,9 @@ bench: $(VENV)/.installed             ## speed beside the engines, as ratios: ou
 
 examples: $(VENV)/.installed         ## the pictures of docs/examples.md, each by its own lines
 	$(BIN)/python docs/examples/draw.py
+
+docs: $(VENV)/.installed-dev          ## the documentation, every link in it checked: out/site/index.html
+	$(BIN)/python -m sphinx -q -W --keep-going docs out/site
 
 lint: $(VENV)/.installed-dev          ## style, types, import contracts
 	$(BIN)/ruff check .

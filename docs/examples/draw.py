@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/examples.md: the page's own lines are run, block after block, and what they draw is the picture below them."""
+"""Draw the pictures of pages: a page's own lines are run, block after block, and what they draw is the picture below them."""
 
 import re
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGE = Path(__file__).parents[1] / "examples.md"
+PAGES = [Path(__file__).parents[1] / name for name in ("examples.md", "note.md")]
 BLOCK = re.compile(r"^```python\n(?P<lines>.*?)^```\n(?:\n!\[[^]]+\]\((?P<picture>[^)]+)\)$)?", re.DOTALL | re.MULTILINE)
 
 
@@ -32,8 +32,10 @@ def draw(page: Path) -> None:
     style |= {"font.size": 9.0, "savefig.bbox": "tight", "svg.hashsalt": "dropspin"}
     with rc_context(style):
         for path, figure in drawn(page):
+            path.parent.mkdir(exist_ok=True)
             figure.savefig(path, metadata={"Date": None})
 
 
 if __name__ == "__main__":
-    draw(PAGE)
+    for page in PAGES:
+        draw(page)

@@ -21,9 +21,9 @@ def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> 
 
 
 def plot_angular_momentum_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
-    """Draw |L| over time: each engine's median, and between which values eight of ten lie.
+    """Draw the length of the angular momentum L over time: each engine's median, and between which values eight of ten lie.
 
-    It is relative to r √(2 E M), E the scene's energy and r the body's size: to |L| if all of E were in the spin of a ring of that radius.
+    It is relative to r √(2 E M), E the scene's energy and r the body's size: to that if all of E were in the spin of a ring of that radius.
     So it means the same for starts with and without spin.
 
     Raises:
@@ -48,7 +48,7 @@ def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> No
 
 
 def keeps_angular_momentum(results: Results, scene_name: str) -> bool:
-    """Whether a run has kept |L| of a scene's ensemble."""
+    """Whether a run has kept the angular momentum of a scene's ensemble."""
     return any(outcome.angular_momentum is not None for outcome, _ in at_one_step(results, results.ensembles, scene_name, min))
 
 

@@ -413,7 +413,13 @@ angular_velocity = [1.0, 5.0, 0.5]
     assert "orientation error within 1e-09 rad: document[rotation=" in told
     assert "within 1e-30 rad: nothing gets there; the nearest is document[rotation=" in told
     assert "Left out: document, it does not converge: orientation error stays at" in told
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["short.svg", "tradeoff.csv", "tradeoff.json", "tradeoff.md"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "section.json",
+        "short.svg",
+        "tradeoff.csv",
+        "tradeoff.json",
+        "tradeoff.md",
+    ]
     rows = json.loads((tmp_path / "out" / "tradeoff.json").read_text())
     assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]"}
     assert all(row["cost_best"] <= row["cost"] for row in rows)

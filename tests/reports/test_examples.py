@@ -1,4 +1,4 @@
-"""The page of plots: its lines run as they stand, and draw."""
+"""Pages with plots: their lines run as they stand, and draw."""
 
 import importlib.util
 import re
@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = DOCS / "examples.md"
+PAGES = {"examples": 12, "note": 4}
+"""With how many pictures."""
 
 
 @pytest.fixture(scope="module")
@@ -20,13 +21,14 @@ def drawer():
     return program
 
 
-def test_every_block_runs_and_draws(drawer):
+@pytest.mark.parametrize("name", PAGES)
+def test_every_block_runs_and_draws(drawer, name):
     """As in a notebook, one after another; each picture's axes have labels, a legend and data that are numbers."""
     import matplotlib as mpl
 
     with mpl.rc_context({"backend": "agg"}):
         found = {}
-        for path, figure in drawer.drawn(PAGE):
+        for path, figure in drawer.drawn(DOCS / f"{name}.md"):
             [axes] = figure.axes
             lines = [line for line in axes.get_lines() if len(line.get_xdata())]
             assert len(lines) + len(axes.patches) >= 3, path
@@ -35,18 +37,20 @@ def test_every_block_runs_and_draws(drawer):
             assert len(axes.get_legend().get_texts()) >= 3
             assert axes.name == "3d" or (axes.get_xlabel() and axes.get_ylabel()), path
             found[path.name] = figure
-    assert len(found) == 12
+    assert len(found) == PAGES[name]
 
 
-def test_pictures_and_page_belong_together(drawer):
+@pytest.mark.parametrize("name", PAGES)
+def test_pictures_and_page_belong_together(drawer, name):
     """Each block but the imports is followed by its picture, which is there and small; no other picture is."""
-    blocks = list(drawer.BLOCK.finditer(PAGE.read_text(encoding="utf-8")))
-    assert len(blocks) == PAGE.read_text(encoding="utf-8").count("```python")
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    blocks = list(drawer.BLOCK.finditer(text))
+    assert len(blocks) == text.count("```python")
     assert not blocks[0]["picture"]
     assert all(block["picture"] for block in blocks[1:])
     assert all(block["lines"].count("\n") <= 3 for block in blocks[1:])
     pictures = {DOCS / block["picture"] for block in blocks[1:]}
-    assert set((DOCS / "examples").glob("*.svg")) == pictures
+    assert set((DOCS / name).glob("*.svg")) == pictures
     assert max(picture.stat().st_size for picture in pictures) < 150_000
 
 
@@ -55,4 +59,4 @@ def test_page_shows_every_plot():
     from reports import plots
 
     drawing = [name for name in plots.__all__ if name.startswith("plot_")]
-    assert set(drawing) == set(re.findall(r"plots\.(plot_\w+)\(", PAGE.read_text(encoding="utf-8")))
+    assert set(drawing) == set(re.findall(r"plots\.(plot_\w+)\(", (DOCS / "examples.md").read_text(encoding="utf-8")))

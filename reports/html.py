@@ -30,6 +30,7 @@ from reports.plots import bounce_figure, convergence_figure, ensemble_figure, fl
 from reports.plots.spins import wobbles_freely
 from reports.replay import as_data, replay_of
 from reports.section import Section
+from reports.svg import with_shared_styles
 from scenarios import Scenario, truth_for
 
 if TYPE_CHECKING:
@@ -71,12 +72,15 @@ def html_report(results: Results, plots: dict[str, str], sections: Sequence[Sect
         plots: SVG elements, by the names of `figures`.
         sections: What other studies have to tell.
     """
-    return page("report.html", **_context(results, plots), sections=sections)
+    styles, drawn = with_shared_styles(plots)
+    overview = _overview(results)
+    words = dict.fromkeys(word for by_engine in overview["chips"].values() for mine in by_engine.values() for word in mine)
+    return page("report.html", **overview, **_details(results, drawn), words=words, sections=sections, styles=Markup(styles))
 
 
 def markdown_report(results: Results) -> str:
     """The same in short, for a pull request."""
-    return page("report.md", **_context(results, {}))
+    return page("report.md", **_overview(results))
 
 
 def page(template: str, **content: Any) -> str:
@@ -105,25 +109,29 @@ def _markdown_code(text: str) -> str:
     return f"{fence}{room}{text}{room}{fence}"
 
 
-def _context(results: Results, plots: dict[str, str]) -> dict[str, Any]:
-    chips = _chips(results)
+def _overview(results: Results) -> dict[str, Any]:
     return {
         "verdict": verdict_sentence(results),
-        "held": counts(results).failed == 0 and counts(results).broken == 0,
         "findings": finding_sentences(results),
         "engines": results.engines,
+        "chips": _chips(results),
+        "failures": failing(results),
+        "provenance": results.provenance,
+    }
+
+
+def _details(results: Results, plots: dict[str, str]) -> dict[str, Any]:
+    return {
+        "held": counts(results).failed == 0 and counts(results).broken == 0,
         "colours": engine_colours(results.engines),
-        "chips": list(dict.fromkeys(chip for scene in chips.values() for mine in scene.values() for chip in mine)),
         "stuck": list(STUCK.values()),
         "negligible": NEGLIGIBLE,
         "leading": leading_errors(results),
         "costs": step_costs(results),
         "profiles": profile_comparisons(results),
-        "failures": failing(results),
-        "scenes": [_scene(results, number, name, plots) | {"chips": chips[name]} for number, name in enumerate(results.scenes)],
+        "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,
-        "provenance": results.provenance,
         "settings": first_settings(results.provenance),
     }
 

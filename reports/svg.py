@@ -29,10 +29,24 @@ def svg(figure: "Figure", identifier: str) -> str:
     text = re.sub(r'\bid="([^"]+)"', rf'id="{identifier}-\1"', text)
     text = re.sub(r'(url\(#|href="#)([^")]+)', rf"\1{identifier}-\2", text)
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL).strip()
+    wanted = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
+    text = re.sub(r' id="([^"]+)"', lambda found: found.group() if found[1] in wanted else "", text)
     # A hundredth of a point is more than can be seen.
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found.group()), text)
     panels = over_time(figure)
     return text.replace("<svg ", f'<svg data-over-time="{escape(json.dumps(panels))}" ', 1) if panels else text
+
+
+def with_shared_styles(drawings: dict[str, str]) -> tuple[str, dict[str, str]]:
+    """Rules of CSS, and SVG elements that have classes for styles: those of many plots are few, and half of their size."""
+    classes: dict[str, str] = {}
+
+    def shared(found: re.Match[str]) -> str:
+        name = classes.setdefault(found[1], f"p{len(classes)}")
+        return f' class="{name}"'
+
+    drawn = {name: re.sub(r' style="([^"]*)"', shared, text) for name, text in drawings.items()}
+    return "\n".join(f".{name} {{ {style} }}" for style, name in classes.items()), drawn
 
 
 def save_png(figure: "Figure", file: "Path") -> None:

@@ -53,5 +53,6 @@ def _sizes(scene: Scenario, motion: Trajectory, truth: Truth, metric: str) -> tu
         return np.empty(0), np.empty(0)
     told = np.concatenate(case.flights) if ERRORS[metric].in_flight else np.arange(len(sizes))
     is_told = np.isin(np.arange(len(sizes)), told) & np.isfinite(sizes)
-    shown = slice(1, None, stride(len(sizes)))
+    ranked, every = np.where(is_told, sizes, -1.0), stride(len(sizes))
+    shown = [first + int(np.argmax(ranked[first : first + every])) for first in range(1, len(sizes), every)]  # no peak is lost
     return case.compared.t[shown], np.where(is_told, sizes, np.nan)[shown]

@@ -41,7 +41,7 @@ REPORT: Any = {
 }
 TIME = "time [s]"
 """Label of every axis of time, by which a replay knows where to show its own."""
-MOST_POINTS = 800
+MOST_POINTS = 400
 ROUNDING = 1e-17
 """Where exact zeros are drawn on logarithmic axes."""
 

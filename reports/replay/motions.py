@@ -14,7 +14,7 @@ from scenarios.rotations import cross, dot
 
 Array = NDArray[np.float64]
 
-MOST_FRAMES = 400
+MOST_FRAMES = 300
 """Of a motion; between frames a page interpolates."""
 TRUTH = "truth"
 

@@ -38,6 +38,7 @@ def _motion(motion: Motion) -> dict[str, Any]:
     return {
         "label": motion.label,
         "colour": motion.colour,
+        "count": len(motion.frames),
         "isTruth": motion.label == TRUTH and not motion.colour,
         "position": _packed(motion.frames.position),
         "orientation": _packed(motion.frames.orientation),
@@ -47,9 +48,13 @@ def _motion(motion: Motion) -> dict[str, Any]:
     }
 
 
-def _packed(numbers: Array) -> dict[str, Any]:
-    """Numbers as integers of a common scale, little-endian, in base 64."""
-    scale = max(float(np.abs(numbers).max(initial=0.0)), np.finfo(float).tiny * MOST) / MOST
+def _packed(numbers: Array) -> list[Any]:
+    """Numbers, column by column: as integers of a scale, little-endian, in base 64; a column of one number as this number."""
+    return [float(column[0]) if np.ptp(column) == 0.0 else _column(column) for column in numbers.T] if len(numbers) else []
+
+
+def _column(numbers: Array) -> dict[str, Any]:
+    scale = max(float(np.abs(numbers).max()), np.finfo(float).tiny * MOST) / MOST
     return {"scale": scale, "data": base64.b64encode(np.rint(numbers / scale).astype("<i4").tobytes()).decode()}
 
 

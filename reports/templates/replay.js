@@ -34,14 +34,18 @@
   };
 
   // --- data ---
-  const unpacked = ({ scale, data }, columns) => {
-    const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
-    const all = Array.from(new Int32Array(bytes.buffer), (n) => n * scale);
-    return Array.from({ length: all.length / columns }, (_, i) => all.slice(i * columns, (i + 1) * columns));
+  const unpackedColumn = (column, count) => {
+    if (typeof column === "number") return Array(count).fill(column);
+    const bytes = Uint8Array.from(atob(column.data), (c) => c.charCodeAt(0));
+    return Array.from(new Int32Array(bytes.buffer), (n) => n * column.scale);
+  };
+  const unpacked = (columns, count) => {
+    const all = columns.map((column) => unpackedColumn(column, count));
+    return Array.from({ length: columns.length ? count : 0 }, (_, row) => all.map((column) => column[row]));
   };
   const readMotion = (raw, interval) => {
-    const position = unpacked(raw.position, 3), orientation = unpacked(raw.orientation, 4);
-    const impulses = unpacked(raw.impulses, 3), points = unpacked(raw.points, 3);
+    const position = unpacked(raw.position, raw.count), orientation = unpacked(raw.orientation, raw.count);
+    const impulses = unpacked(raw.impulses, raw.struck.length), points = unpacked(raw.points, raw.struck.length);
     const last = position.length - 1;
     return {
       label: raw.label, colour: raw.colour, isTruth: raw.isTruth, shown: true, position, orientation, last,

@@ -27,7 +27,7 @@ bench: $(VENV)/.installed             ## speed beside the engines, as ratios: ou
 examples: $(VENV)/.installed         ## the pictures of docs/examples.md, each by its own lines
 	$(BIN)/python docs/examples/draw.py
 
-docs: $(VENV)/.installed-dev          ## the documentation, every link in it checked: out/site/index.html
+docs: $(VENV)/.installed-dev          ## the documentation, links within it checked: out/site/index.html
 	$(BIN)/python -m sphinx -q -W --keep-going docs out/site
 
 lint: $(VENV)/.installed-dev          ## style, types, import contracts

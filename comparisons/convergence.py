@@ -47,7 +47,9 @@ TOO_FAR_FOR_CHANCE = 10.0
 GROWTH = 1.25
 """An error that is larger by this factor at the finest step, than at any coarser one or at the end of a rise, grows as the step shrinks."""
 PLATEAU = 0.1
-"""An error that changes by a smaller share over the steps does not depend on them."""
+"""An error that changes by a smaller share over the steps, and less from step to step, does not depend on them."""
+STILL = 0.01
+"""Nor does one that changes by less than this, however it does."""
 
 
 @dataclass(frozen=True)
@@ -202,6 +204,8 @@ def _without_a_power(h: Array, e: Array, small: Array, untold: tuple[tuple[float
     settles = abs(e[-2] - e[-1]) <= abs(e[-3] - e[-2]) + small[-2] + small[-1]
     if settles and spread <= PLATEAU * abs(limit) + small[-1] and abs(limit) > spread:
         return Convergence("model", math.nan, (), untold, limit, spread, "does not depend on the step")
+    if spread <= STILL * abs(limit):
+        return Convergence("model", math.nan, (), untold, limit, SAFETY * spread, "does not depend on the step")
     coarser = float(np.max(np.abs(e[:-1])))
     grows = bool((np.diff(np.abs(e[-3:])) > small[-1]).all()) and abs(limit) > GROWTH * abs(e[-3]) + small[-1]
     if grows or abs(limit) > GROWTH * coarser + small[-1]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -52,14 +53,18 @@ def restore(folder: Path, *, arrays: bool = True) -> Results:
         DropspinError: The folder holds no run, or one of another version.
     """
     try:
-        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise DropspinError(f"{folder}: is a run of another version of dropspin, which this one cannot read; run it again.")
-        frame = pd.read_parquet(folder / "results.parquet").astype(COLUMNS)
-        tolerances = pd.read_parquet(folder / "tolerances.parquet")["tolerance"].to_numpy()
-    except (OSError, ValueError, KeyError) as error:
-        said = " ".join(str(error).split())
-        raise DropspinError(f"{folder}: not the folder of a run ({said}); give the folder that dropspin run -o wrote.") from None
+        return _restored(folder, arrays)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, BadZipFile) as error:
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise DropspinError(f"{folder}: not the folder of a run, or damaged ({said}); give one that dropspin run -o wrote.") from None
+
+
+def _restored(folder: Path, arrays: bool) -> Results:
+    content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise DropspinError(f"{folder}: is a run of another version of dropspin, which this one cannot read; run it again.")
+    frame = pd.read_parquet(folder / "results.parquet").astype(COLUMNS)
+    tolerances = pd.read_parquet(folder / "tolerances.parquet")["tolerance"].to_numpy()
     files = {kind: content[kind] if arrays else {} for kind in ("trajectories", "ensembles")}
     trajectories = {
         key: Trajectory(**found | {"velocity_lag": float(found["velocity_lag"])})

@@ -127,7 +127,7 @@ def verdict_sentence(results: Results) -> str:
     if judged == 0:
         set_at_all = any(scene.expect for scene in results.scenes.values())
         none = "No expectation is for these engines at these steps" if set_at_all else "No expectations were set"
-        return f"{none}; everything was measured."
+        return f"{none}; {'everything' if len(results.measurements) else 'nothing'} was measured."
     kinds = [f"{judged - tally.of_studies} expectations of the scenes", f"{tally.of_studies} limits and orders"]
     both = " and ".join(kind for kind in kinds if not kind.startswith("0 "))
     return f"All {judged} checks hold: {both}."

@@ -74,7 +74,7 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
         unfinished = Path(tempfile.mkdtemp(prefix=f".{target.name[:100]}-unfinished-", dir=target.parent))
         unfinished.chmod(target.stat().st_mode if target.exists() else 0o777 & ~_umask())
     except OSError as error:
-        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o.") from None
+        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder.") from None
     try:
         yield unfinished
         _assert_replaceable(folder, target)
@@ -148,14 +148,16 @@ def _assert_replaceable(given: str | Path, target: Path) -> None:
     if not target.exists():
         return
     if not target.is_dir():
-        raise DropspinError(f"{given}: is a file; choose a folder with -o.")
+        raise DropspinError(f"{given}: is a file; choose a folder.")
     if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
-        raise DropspinError(f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it with -o.")
+        raise DropspinError(
+            f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it, or work from outside."
+        )
     known = _files_of_run(target)
     strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
     if strangers:
         raise DropspinError(
-            f"{given}: holds files that are no run of dropspin, {strangers[0]!r} for one; choose an empty or new folder with -o."
+            f"{given}: holds files that are no run of dropspin, {strangers[0]!r} for one; move them away, or choose an empty or new folder."
         )
 
 

@@ -30,7 +30,7 @@ from reports.plots import bounce_figure, convergence_figure, ensemble_figure, fl
 from reports.plots.spins import wobbles_freely
 from reports.replay import as_data, replay_of
 from reports.section import Section
-from reports.svg import with_shared_styles
+from reports.svg import with_ids_of, with_shared_styles
 from scenarios import Scenario, truth_for
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "written")}
-    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code}
+    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code, "ids_of": with_ids_of}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": numbers.MARKS}
     return environment
 
@@ -74,8 +74,15 @@ def html_report(results: Results, plots: dict[str, str], sections: Sequence[Sect
     """
     styles, drawn = with_shared_styles(plots)
     overview = _overview(results)
-    words = dict.fromkeys(word for by_engine in overview["chips"].values() for mine in by_engine.values() for word in mine)
-    return page("report.html", **overview, **_details(results, drawn), words=words, sections=sections, styles=Markup(styles))
+    verdicts = {
+        (scene, engine): [word for word in dict.fromkeys([*mine, *_verdicts(results, scene, engine)]) if word != "measured"]
+        for scene, by_engine in overview["chips"].items()
+        for engine, mine in by_engine.items()
+    }
+    words = sorted({word for mine in verdicts.values() for word in mine})
+    return page(
+        "report.html", **overview, **_details(results, drawn), verdicts=verdicts, words=words, sections=sections, styles=Markup(styles)
+    )
 
 
 def markdown_report(results: Results) -> str:
@@ -177,6 +184,11 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         # Our own SVG; its text is escaped by matplotlib.
         **{f"{kind}_plot": Markup(plots.get(f"{number:02d}-{kind}", "")) for kind in FIGURES},
     }
+
+
+def _verdicts(results: Results, scene: str, engine: str) -> list[str]:
+    frame = results.frame
+    return list(frame.loc[(frame["scene"] == scene) & (frame["engine"] == engine) & (frame["kind"] != "agreement"), "verdict"].unique())
 
 
 def modelled(scene: Scenario) -> list[str]:

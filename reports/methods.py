@@ -18,7 +18,7 @@ class Leading:
         unit: Of the errors.
         dt: The step [s].
         sizes: By engine: the size of the error; NaN where there is none.
-        least: The engines whose error is the least, or within 1 % of it.
+        least: The engines whose error is the least, or within 1 % of it; where one is as small as rounding, all that are.
     """
 
     scene: str
@@ -41,9 +41,11 @@ def leading_errors(results: Results) -> list[Leading]:
         if mine.empty:
             continue
         dt = float(mine["dt"].min())
-        values = mine[mine["dt"] == dt].set_index("engine")["value"].abs()
+        finest = mine[mine["dt"] == dt].set_index("engine")
+        values = finest["value"].abs()
         sizes = {engine: float(values.get(engine, math.nan)) for engine in results.engines}
-        least = [engine for engine, size in sizes.items() if size <= 1.01 * values.min()]
+        rounded = set(finest.index[finest["cause"] == "rounding"])
+        least = [engine for engine, size in sizes.items() if (engine in rounded if rounded else size <= 1.01 * values.min())]
         found.append(Leading(name, metric, METRICS[metric].unit, dt, sizes, least))
     return found
 

@@ -4,7 +4,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
 
 from reports.svg import svg
 from scenarios import DropspinError
@@ -62,16 +64,44 @@ class Section:
         (folder / f"{stem}.md").write_text(f"{told}\n", encoding="utf-8")
 
 
+class _Prose(BaseModel):
+    kind: Literal["heading", "text"]
+    content: str
+
+
+class _List(BaseModel):
+    kind: Literal["list"]
+    items: list[str]
+
+
+class _Table(BaseModel):
+    kind: Literal["table"]
+    rows: Annotated[list[dict[str, str]], Field(min_length=1)]
+
+
+class _Picture(BaseModel):
+    kind: Literal["picture"]
+    name: str
+    svg: str
+
+
+class _File(BaseModel):
+    title: str
+    parts: list[Annotated[_Prose | _List | _Table | _Picture, Field(discriminator="kind")]]
+
+
 def read_section(folder: str) -> Section:
     """What a study has left in its folder.
 
     Raises:
-        DropspinError: There is none.
+        DropspinError: There is none, or it is damaged.
     """
     try:
-        return Section(**json.loads((Path(folder) / FILE).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        raise DropspinError(f"{folder}: holds no study; give a folder that dropspin tradeoff or dropspin limits wrote.") from None
+        return Section(**_File.model_validate_json((Path(folder) / FILE).read_bytes()).model_dump())
+    except (OSError, ValueError):
+        raise DropspinError(
+            f"{folder}: holds no study, or a damaged one; give a folder that dropspin tradeoff or dropspin limits wrote."
+        ) from None
 
 
 def _markdown(part: Part) -> str:

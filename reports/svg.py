@@ -49,6 +49,11 @@ def with_shared_styles(drawings: dict[str, str]) -> tuple[str, dict[str, str]]:
     return "\n".join(f".{name} {{ {style} }}" for style, name in classes.items()), drawn
 
 
+def with_ids_of(svg_element: str, place: str) -> str:
+    """An SVG element whose ids start with a place's: two studies may have drawn pictures of one name."""
+    return re.sub(r'(\bid="|url\(#|href="#)', rf"\1{place}-", svg_element)
+
+
 def save_png(figure: "Figure", file: "Path") -> None:
     """Save a figure as PNG, on white."""
     figure.savefig(file, dpi=200, facecolor="white", metadata={"Software": None})

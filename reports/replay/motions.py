@@ -1,6 +1,7 @@
 """What a replay shows of a scene: a body's poses in every engine and in truth, and what the floor does to it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,16 @@ from comparisons.comparison import Comparison, exactly
 from reports.colours import engine_colours
 from scenarios import DropspinError, Scenario, Trajectory, truth_for
 from scenarios.mechanics import angular_momentum
-from scenarios.rotations import cross, dot
+from scenarios.rotations import about, conjugate, cross, dot, multiply
 
 Array = NDArray[np.float64]
 
 MOST_FRAMES = 300
-"""Of a motion; between frames a page interpolates."""
+"""Of a motion, if its steps can be divided so; between frames a page interpolates."""
+IN_SIGHT = 10.0
+"""How many times as far as the motion that goes least far others are followed by the view."""
+MOST_TURNS = 1e6
+"""From frame to frame; what an engine says that blows up is no number of turns."""
 TRUTH = "truth"
 
 
@@ -39,6 +44,33 @@ class Motion:
     impulses: Array
     points: Array
 
+    @cached_property
+    @np.errstate(over="ignore")  # an engine may say 1e300
+    def turns(self) -> NDArray[np.intp]:
+        """Whole turns that come to the shorter way from a frame's attitude to the next one's, as angular velocity says; shape (k - 1,)."""
+        axes, angles = self._ways
+        spins = 0.5 * (self.frames.angular_velocity[1:] + self.frames.angular_velocity[:-1])
+        turns = (dot(spins, axes) * np.diff(self.frames.t) - angles) / (2.0 * np.pi)
+        return np.rint(np.clip(turns, -MOST_TURNS, MOST_TURNS)).astype(np.intp)
+
+    def pose(self, place: float) -> tuple[Array, Array]:
+        """Position [m] and orientation at a frame, or between two: on a straight line, turning evenly."""
+        row = min(int(place + 1e-9), len(self.frames) - 1)
+        share, x, q = place - row, self.frames.position, self.frames.orientation
+        if share < 1e-6 or row == len(self.frames) - 1:
+            return x[row], q[row]
+        axes, angles = self._ways
+        angle = angles[row] + 2.0 * np.pi * self.turns[row]
+        return (1.0 - share) * x[row] + share * x[row + 1], multiply(about(axes[row], share * angle), q[row])
+
+    @cached_property
+    def _ways(self) -> tuple[Array, Array]:
+        """Axis and angle of the shorter way from each attitude to the next."""
+        way = multiply(self.frames.orientation[1:], conjugate(self.frames.orientation[:-1]))
+        way = np.where(way[:, 3:] < 0.0, -way, way)
+        sines = np.linalg.norm(way[:, :3], axis=1)
+        return way[:, :3] / np.maximum(sines, np.finfo(float).tiny)[:, None], 2.0 * np.arctan2(sines, way[:, 3])
+
 
 @dataclass(frozen=True, eq=False)
 class Replay:
@@ -56,7 +88,22 @@ class Replay:
     interval: float
     motions: list[Motion]
 
+    @cached_property
+    def sight(self) -> float:
+        """How far from the start bodies stay in the view [m]: one that flies off must not make the others too small to be seen."""
+        ways = [self._way(motion.frames.position).max() for motion in self.motions]
+        return IN_SIGHT * max(float(min(ways)), self.scene.body.size)
 
+    def in_sight(self, places: Array) -> NDArray[np.bool_]:
+        """Which of some places, shape (k, 3), the view holds."""
+        return self._way(places) <= self.sight
+
+    @np.errstate(over="ignore")  # an engine may say 1e300
+    def _way(self, places: Array) -> Array:
+        return np.linalg.norm(places - self.scene.start.position, axis=1)
+
+
+@np.errstate(over="ignore")  # an engine may say 1e300
 def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Replay | None:
     """The motions of a scene, at a step or at the coarsest, where engines differ most; None if no engine has moved.
 
@@ -72,7 +119,7 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
     if dt is not None and dt not in steps:
         raise DropspinError(f"{scene_name} has no step {dt:g}; this run has {', '.join(f'{step:g}' for step in steps)}.")
     chosen = steps[0] if dt is None else dt
-    every = max(1, -(-scene.steps(chosen) // MOST_FRAMES))
+    every = _stride(scene.steps(chosen))
     colours = engine_colours(results.engines)
     moved = {engine: results.trajectories.get((scene_name, engine, chosen)) for engine in results.engines}
     motions = [_motion(scene, engine, colours[engine], motion[::every]) for engine, motion in moved.items() if motion is not None]
@@ -81,6 +128,12 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
         times = chosen * every * np.arange(scene.steps(chosen) // every + 1, dtype=np.float64)
         motions.append(_motion(scene, TRUTH, "", exactly(truth, times)))
     return Replay(scene, chosen, chosen * every, [motion for motion in motions if len(motion.frames) > 1])
+
+
+def _stride(steps: int) -> int:
+    """Steps from frame to frame: such that the last state is a frame too, unless that leaves less than a quarter of the frames allowed."""
+    least = max(1, -(-steps // MOST_FRAMES))
+    return next((every for every in range(least, 2 * least + 1) if steps % every == 0), least)
 
 
 def _motion(scene: Scenario, label: str, colour: str, motion: Trajectory) -> Motion:

@@ -15,7 +15,7 @@
       const { scene, engine } = element.dataset;
       element.classList.toggle("left-out", (scene !== undefined && !found.has(scene)) || (engine !== undefined && !engines.has(engine)));
     }
-    form.elements.shown.textContent = found.size === total ? `all ${total} scenes` : `${found.size} of ${total} scenes`;
+    form.elements.shown.textContent = found.size === total && total > 1 ? `all ${total} scenes` : `${found.size} of ${total} scene${total > 1 ? "s" : ""}`;
   };
 
   let closed = [];

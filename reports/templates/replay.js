@@ -18,26 +18,23 @@
     const t = times(cross(q, v), 2);
     return plus(plus(v, t, q[3]), cross(q, t));
   };
-  const slerp = (a, b, s) => {
-    let c = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-    const sign = c < 0 ? -1 : 1;
-    c = Math.min(1, c * sign);
-    const angle = Math.acos(c);
-    const [p, r] = angle < 1e-6 ? [1 - s, s] : [Math.sin((1 - s) * angle) / Math.sin(angle), Math.sin(s * angle) / Math.sin(angle)];
-    const q = a.map((n, i) => p * n + r * sign * b[i]);
-    return q.map((n) => n / Math.hypot(...q));
+  const multiply = (a, b) => [...plus(plus(times(b, a[3]), a, b[3]), cross(a, b)), a[3] * b[3] - dot(a, b)];
+  // The shorter way from one attitude to another.
+  const way = (a, b) => {
+    const q = multiply(b, [-a[0], -a[1], -a[2], a[3]]), v = q[3] < 0 ? times(q, -1) : q.slice(0, 3);
+    return { axis: times(v, 1 / (size(v) || 1)), angle: 2 * Math.atan2(size(v), Math.abs(q[3])) };
   };
-  // By how much one attitude is turned from another.
-  const angleBetween = (a, b) => {
-    const v = plus(plus(times([b[0], b[1], b[2]], a[3]), [a[0], a[1], a[2]], -b[3]), cross(a, b), -1);
-    return 2 * Math.atan2(size(v), Math.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]));
+  // A share of the way, and of whole turns that come to it.
+  const turned = (a, b, share, turns) => {
+    const { axis, angle } = way(a, b), half = share * (angle / 2 + Math.PI * turns);
+    return multiply([...times(axis, Math.sin(half)), Math.cos(half)], a);
   };
 
   // --- data ---
   const unpackedColumn = (column, count) => {
     if (typeof column === "number") return Array(count).fill(column);
     const bytes = Uint8Array.from(atob(column.data), (c) => c.charCodeAt(0));
-    return Array.from(new Int32Array(bytes.buffer), (n) => n * column.scale);
+    return "scale" in column ? Array.from(new Int32Array(bytes.buffer), (n) => n * column.scale) : Array.from(new Float64Array(bytes.buffer));
   };
   const unpacked = (columns, count) => {
     const all = columns.map((column) => unpackedColumn(column, count));
@@ -49,13 +46,14 @@
     const last = position.length - 1;
     return {
       label: raw.label, colour: raw.colour, isTruth: raw.isTruth, shown: true, position, orientation, last,
+      hasEnded: (time) => time > last * interval + 1e-9,
       strikes: raw.struck.map((frame, i) => ({ time: frame * interval, impulse: impulses[i], point: points[i] })),
       at(time) {
         const place = Math.max(0, Math.min(time / interval, last)), row = Math.min(Math.floor(place + 1e-9), last), s = place - row;
         if (s < 1e-6 || row === last) return { position: position[row], orientation: orientation[row] };
         return {
           position: plus(times(position[row], 1 - s), position[row + 1], s),
-          orientation: slerp(orientation[row], orientation[row + 1], s),
+          orientation: turned(orientation[row], orientation[row + 1], s, raw.turns[row] ?? 0),
         };
       },
     };
@@ -77,7 +75,7 @@
     option.selected = value === chosen;
     return option;
   });
-  const rounded = (n) => (n === 0 ? "0" : Math.abs(n) >= 0.1 && Math.abs(n) < 1000 ? n.toFixed(3) : n.toExponential(1));
+  const rounded = (n) => (n === 0 ? "0" : Math.abs(n) >= 0.0995 && Math.abs(n) < 1000 ? n.toFixed(3) : n.toExponential(1));
   const shade = (colour, light) => {
     const parts = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
     return `rgb(${parts.map((n) => Math.round(light < 1 ? n * light : n + (255 - n) * (light - 1))).join(" ")})`;
@@ -90,6 +88,7 @@
       this.interval = data.interval;
       this.hasFloor = data.hasFloor;
       this.size = data.size;
+      this.sight = data.sight;
       this.scene = data.scene;
       this.motions = data.motions.map((raw) => readMotion(raw, data.interval));
       this.truth = this.motions.find((motion) => motion.isTruth);
@@ -139,8 +138,13 @@
         this.canvas,
         made("p", { class: "controls" }, this.button, step(-1, "◂", "one frame back"), step(1, "▸", "one frame on"), this.slider, this.clock,
           labelled("speed", this.speed), labelled("engines", this.layout), labelled("follow", this.follow)),
-        made("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": `${this.scene}: where the bodies are` }, table),
+        this.watched(made("div", { class: "scroll", role: "region", "aria-label": `${this.scene}: where the bodies are` }, table)),
       );
+    }
+
+    watched(box) {
+      stopWhereItScrolls.observe(box);
+      return box;
     }
 
     row(motion) {
@@ -165,6 +169,7 @@
           svg.append(line);
           this.lines.push({ line, panel });
         }
+        svg.classList.add("clickable");
         svg.addEventListener("click", (event) => {
           const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
           const panel = panels.find((one) => point.x >= one.left && point.x <= one.right && point.y >= one.top && point.y <= one.bottom);
@@ -220,15 +225,15 @@
     frame() {
       this.azimuth = 0.5;
       this.elevation = 0.22;
-      const axes = this.axes(), points = this.motions.flatMap((motion) => motion.position);
+      const axes = this.axes(), start = this.motions[0].position[0];
+      const points = this.motions.flatMap((motion) => motion.position).filter((point) => size(plus(point, start, -1)) <= this.sight);
       const along = axes.map((axis) => points.map((point) => dot(axis, point)));
       const low = along.map((all) => all.reduce((a, b) => Math.min(a, b)) - this.size);
       const high = along.map((all) => all.reduce((a, b) => Math.max(a, b)) + this.size);
-      const [wide, tall, deep] = low.map((least, i) => high[i] - least);
+      this.extent = low.map((least, i) => high[i] - least);
       this.target = axes.reduce((sum, axis, i) => plus(sum, axis, (low[i] + high[i]) / 2), [0, 0, 0]);
-      this.reach = Math.max(wide, tall, deep) / 2;
-      const { clientWidth: width, clientHeight: height } = this.canvas, focal = FOCAL * Math.min(width, height);
-      this.distance = deep / 2 + MARGIN * focal * Math.max(wide / width, tall / height);
+      this.reach = Math.max(...this.extent) / 2;
+      this.apart = 1;
       this.follow.checked = this.reach > 25 * this.size;
     }
 
@@ -250,7 +255,7 @@
     }
 
     zoom(factor) {
-      this.distance = Math.max(1.2 * this.size, Math.min(20 * this.reach + this.size, this.distance * factor));
+      this.apart = Math.max(0.02, Math.min(10, this.apart * factor));
       this.draw();
     }
 
@@ -273,7 +278,8 @@
       const pen = this.canvas.getContext("2d");
       pen.scale(ratio, ratio);
       this.ink = getComputedStyle(this.canvas).color;
-      const visible = this.engines.filter((motion) => motion.shown), ghost = this.truth?.shown ? this.truth : null;
+      const isThere = (motion) => motion.shown && !motion.hasEnded(this.time);
+      const visible = this.engines.filter(isThere), ghost = this.truth && isThere(this.truth) ? this.truth : null;
       const views = this.layout.value === "beside" && visible.length > 1 ? visible.map((motion) => [motion]) : [visible];
       const columns = Math.min(views.length, Math.max(1, Math.round(Math.sqrt(views.length * width / height))));
       const rows = Math.ceil(views.length / columns);
@@ -297,9 +303,10 @@
     drawView(pen, box, motions, ghost) {
       const leading = motions[0] ?? ghost;
       const target = this.follow.checked && leading ? leading.at(this.time).position : this.target;
-      const distance = this.distance * (this.follow.checked ? Math.min(1, 4 * this.size / this.reach) : 1);
-      const [right, up, back] = this.axes();
-      const eye = plus(target, back, distance), focal = FOCAL * Math.min(box.width, box.height);
+      const [right, up, back] = this.axes(), [wide, tall, deep] = this.extent;
+      const focal = FOCAL * Math.min(box.width, box.height), whole = deep / 2 + MARGIN * focal * Math.max(wide / box.width, tall / box.height);
+      const distance = this.apart * whole * (this.follow.checked ? Math.min(1, 4 * this.size / this.reach) : 1);
+      const eye = plus(target, back, distance);
       const seen = (p) => {
         const arm = plus(p, eye, -1), depth = -dot(arm, back);
         const scale = focal / Math.max(depth, 1e-3 * distance);
@@ -504,13 +511,14 @@
         if (this.truth) {
           const isKnown = !motion.isTruth && frame <= this.truth.last && frame <= motion.last;
           told.push(isKnown ? size(plus(motion.position[frame], this.truth.position[frame], -1)) : null);
-          told.push(isKnown ? angleBetween(motion.orientation[frame], this.truth.orientation[frame]) : null);
+          told.push(isKnown ? way(motion.orientation[frame], this.truth.orientation[frame]).angle : null);
         }
         if (this.hasFloor) {
           const strike = this.lastStrike(motion);
           told.push(strike ? size(strike.impulse) : null);
         }
-        told.forEach((value, k) => { this.rows[i].cells[k].textContent = value === null ? "–" : rounded(value); });
+        const ended = motion.hasEnded(this.time) ? `ended at ${(motion.last * this.interval).toFixed(3)} s` : null;
+        told.forEach((value, k) => { this.rows[i].cells[k].textContent = ended && k === 0 ? ended : ended || value === null ? "–" : rounded(value); });
       });
       for (const { line, panel } of this.lines ?? []) {
         const x = panel.left + (this.time - panel.from) / (panel.to - panel.from) * (panel.right - panel.left);
@@ -529,6 +537,6 @@
     };
     home.hidden = false;
     if ("open" in home.dataset) start();
-    else home.append(made("button", { type: "button", onclick: start }, "Replay in 3D"));
+    else home.append(made("button", { type: "button", onclick: () => { start(); home.viewer.button.focus(); } }, "Replay in 3D"));
   }
 })();

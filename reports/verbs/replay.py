@@ -36,15 +36,21 @@ def replay(
     from reports.terminal import share_bar
     from scenarios import DropspinError
 
+    clips = {"--mp4": mp4, "--gif": gif}
+    for option, file in clips.items():
+        if file is not None and Path(file).suffix.lower() != f".{option[2:]}":
+            raise click.UsageError(f"{option} {file}: give the file the ending .{option[2:]}.")
+    asked = [file for file in clips.values() if file is not None]
+    if asked and output is not None:
+        raise click.UsageError(f"-o {output} is for the page, which is not written beside a clip; leave it out.")
     results = restore(Path(run))
     found = [replay_of(results, name, dt) for name in scenes or results.scenes]
     shown = [one for one in found if one is not None]
     if not shown:
         raise DropspinError(f"{run}: no engine has moved in these scenes; see report.html for why.")
-    clips = [file for file in (gif, mp4) if file is not None]
-    if clips and len(shown) > 1:
+    if asked and len(shown) > 1:
         raise click.UsageError(f"a clip shows one scene; name it: {', '.join(one.scene.name for one in shown)}.")
-    for file in clips:
+    for file in asked:
         with share_bar(file) as progress:
 
             def drawn(share: float) -> None:
@@ -53,7 +59,7 @@ def replay(
 
             write_clip(shown[0], file, speed, drawn)
         click.echo(f"Written: {file}")
-    if clips:
+    if asked:
         return
     plots: dict[str, str] = {}
     for one in shown:

@@ -1,5 +1,6 @@
 """`dropspin report`."""
 
+import shutil
 from pathlib import Path
 
 import click
@@ -10,10 +11,18 @@ import click
 @click.option("--add", "studies", multiple=True, metavar="FOLDER", help="Add what dropspin tradeoff or limits found; repeat for more.")
 @click.option("--png", is_flag=True, help="Write the plots as PNG too.")
 def report(run: str, studies: tuple[str, ...], png: bool) -> None:
-    """Write the reports of a run again: with what other studies found, with plots as PNG, or after dropspin itself has changed."""
+    """Write the reports of a run again: with what other studies found, with plots as PNG, or after dropspin itself has changed.
+
+    Studies and PNGs are those that are asked for this time. A replay in the folder stays.
+    """
     from comparisons.store import restore
-    from reports.folder import write
+    from reports.folder import fill, run_folder
     from reports.section import read_section
 
-    sections = [read_section(folder) for folder in studies]
-    click.echo(f"Report: {write(restore(Path(run)), run, sections, png)}")
+    sections = [read_section(folder) for folder in dict.fromkeys(studies)]
+    results = restore(Path(run))
+    with run_folder(run) as unfinished:
+        fill(results, unfinished, sections, png)
+        if (Path(run) / "replay.html").exists():
+            shutil.copy2(Path(run) / "replay.html", unfinished)
+    click.echo(f"Report: {Path(run) / 'report.html'}")

@@ -23,10 +23,14 @@ from reports.folder import write
 from reports.html import FIGURES
 from reports.replay.motions import TRUTH
 from reports.section import Section
+from scenarios.rotations import about, angle_between_orientations, multiply
 
 ENGINES = ["document", "mujoco", "pybullet"]
 PAGES = ("report.html", "replay.html")
 CORNER = "document.querySelector('[data-scene=drop-box-corner] [data-replay]')"
+STOPS_THAT_DO_NOT_SCROLL = """all => all
+    .filter(one => one.checkVisibility() && (one.scrollWidth > one.clientWidth) !== (one.tabIndex === 0))
+    .map(one => one.ariaLabel)"""
 COUNT_PAINTED = """canvas => {
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
     return data.filter((value, place) => place % 4 === 3 && value > 200).length;
@@ -54,7 +58,8 @@ def folder(results, tmp_path_factory):
     figure = Figure()
     figure.gca().plot([1, 2], [3, 4])
     study.add_picture("a-picture", figure)
-    made = write(results, tmp_path_factory.mktemp("out") / "run", [study]).parent
+    # Two studies of one scene name their pictures alike.
+    made = write(results, tmp_path_factory.mktemp("out") / "run", [study, Section("Where engines break", study.parts)]).parent
     assert CliRunner().invoke(dropspin, ["replay", str(made), "--no-open"]).exit_code == 0
     return made
 
@@ -134,18 +139,40 @@ def coarsest_trajectories(folder, scene):
     return dt, {of["engine"]: folder / name for name, of in files.items() if (of["scene"], of["dt"]) == (scene, dt)}
 
 
-def test_between_frames_it_turns_evenly(opened, results):
-    """Half way between two frames: half of the angle, by the quaternions' own algebra."""
+def poses(page, scene, engine, places):
+    """A body's orientations at places between frames, shape (n, 4), and the time between frames."""
+    found = page.tab.evaluate(
+        """([scene, engine, places]) => {
+            const viewer = document.querySelector(`[data-scene=${scene}] [data-replay]`).viewer;
+            const found = places.map(place => (viewer.seek(place * viewer.interval), viewer.poses()[engine].orientation));
+            return { interval: viewer.interval, found };
+        }""",
+        [scene, engine, list(places)],
+    )
+    return np.array(found["found"]), found["interval"]
+
+
+def test_between_frames_it_turns_evenly(opened):
+    """Half way between two frames: half of the angle, by the quaternions' own algebra, whatever the signs that an engine gives them."""
     page = opened("report.html")
     page.start_replays()
-    poses = page.tab.evaluate(
-        """() => {
-            const viewer = document.querySelector("[data-scene=spin-asymmetric] [data-replay]").viewer;
-            return [10, 10.5, 11].map(frame => (viewer.seek(frame * viewer.interval), viewer.poses().mujoco.orientation));
-        }"""
-    )
-    first, middle, last = (np.array(pose) for pose in poses)
-    np.testing.assert_allclose(middle, (first + last) / np.linalg.norm(first + last), atol=1e-12)
+    first, middle, last = (poses(page, "spin-asymmetric", "pybullet", part + np.arange(100.0))[0] for part in (0.0, 0.5, 1.0))
+    signs = np.sign(np.sum(first * last, axis=1, keepdims=True))
+    assert signs.min() == -1.0
+    expected = first + signs * last
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    np.testing.assert_allclose(np.abs(np.sum(middle * expected, axis=1)), 1.0, atol=1e-12)
+
+
+def test_between_frames_it_turns_as_fast_as_it_spins(opened, results):
+    """500 rad/s, 18 rad from frame to frame: a quarter of the way on it is where the closed form has it, to 1e-6 rad; measured 2e-8."""
+    page = opened("report.html")
+    page.start_replays()
+    (before, after), interval = poses(page, "spin-principal-500", TRUTH, [7.0, 7.25])
+    spin = np.array(results.scenes["spin-principal-500"].start.angular_velocity)
+    assert np.linalg.norm(spin) * interval > 2.0 * np.pi
+    expected = multiply(about(spin / np.linalg.norm(spin), np.array(0.25 * interval * np.linalg.norm(spin))), before)
+    assert angle_between_orientations(after, expected) < 1e-6
 
 
 def test_it_plays_and_plots_follow(opened):
@@ -259,15 +286,27 @@ def test_without_javascript(opened, results):
     assert tab.locator("svg:visible").count() > 10
 
 
-def test_on_paper_all_is_open(opened):
-    """Details are opened for printing, and closed again."""
-    tab = opened("report.html").tab
+def test_on_paper_all_is_open_and_whole(opened):
+    """Details are opened for printing, and closed again; nothing is wider than a sheet, A4 across."""
+    tab = opened("report.html", viewport={"width": 1047, "height": 718}).tab
     closed = tab.locator("details:not([open])").count()
     assert closed > 10
+    tab.emulate_media(media="print")
     tab.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert tab.locator("details:not([open])").count() == 0
+    assert (
+        tab.locator(".scroll").evaluate_all("all => all.filter(one => one.scrollWidth > one.clientWidth).map(one => one.ariaLabel)") == []
+    )
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 1047
     tab.evaluate("dispatchEvent(new Event('afterprint'))")
     assert tab.locator("details:not([open])").count() == closed
+
+
+def test_by_keyboard(opened):
+    """Who starts a replay goes on with its controls."""
+    page = opened("report.html")
+    page.tab.locator("[data-scene=drop-box-corner]").get_by_role("button", name="Replay in 3D").press("Enter")
+    assert page.tab.evaluate("document.activeElement.textContent") == "Play"
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -301,14 +340,12 @@ def test_valid(folder, name):
 @pytest.mark.parametrize("name", PAGES)
 @pytest.mark.parametrize("width", [400, 800, 1600])
 def test_nothing_is_cut_off(opened, name, width):
-    """The page is no wider than the window: what is wider scrolls in its own box, and can be reached by keyboard."""
+    """The page is no wider than the window: what is wider scrolls in its own box, and is a stop for the keyboard then."""
     page = opened(name, viewport={"width": width, "height": 900})
     page.start_replays()
     assert page.tab.evaluate("document.documentElement.scrollWidth") == width
-    wide = page.tab.locator(".scroll").evaluate_all(
-        "all => all.filter(one => one.scrollWidth > one.clientWidth && one.tabIndex !== 0).length"
-    )
-    assert wide == 0
+    wrong = page.tab.locator(".scroll").evaluate_all(STOPS_THAT_DO_NOT_SCROLL)
+    assert wrong == []
 
 
 def test_small(folder):

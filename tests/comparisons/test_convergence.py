@@ -168,6 +168,14 @@ def test_what_cannot_be_told_is_unresolved(errors, h):
     assert apart(errors, np.asarray(h)).cause == "unresolved"
 
 
+def test_an_error_that_hardly_changes_stays():
+    """A quarter, and 1e-5 of it that comes and goes as no power of the step: no step cures it."""
+    found = apart([-0.25018, -0.25019, -0.25020], floor=1e-9)
+    assert found.cause == "model"
+    assert found.limit == -0.2502
+    assert 2e-5 < found.uncertainty < 1e-4
+
+
 def test_any_order_of_the_steps():
     """Runs may name their steps as they like."""
     shuffled = [1, 2, 0]

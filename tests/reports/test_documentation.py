@@ -2,11 +2,17 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
+import click
 import pytest
+
+from reports.cli import dropspin
+from scenarios import load
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "reference_impl" / "README.md"]
@@ -68,6 +74,34 @@ def test_calibrating(tmp_path):
 @pytest.mark.slow
 def test_choosing_a_step(tmp_path):
     assert list(follow("choose-a-step.md", tmp_path)) == [0, 0]
+
+
+def test_python_in_the_readme_and_of_the_replay(tmp_path, monkeypatch):
+    """As they stand, one after the other."""
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for page in (ROOT / "README.md", ROOT / "docs" / "replay.md"):
+        [block] = re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+        exec(compile(block, page.name, "exec"), names)
+    assert (tmp_path / "out/corner/report.html").exists()
+    assert (tmp_path / "corner.gif").exists()
+
+
+def test_the_readmes_scene():
+    [scene] = re.findall(r"^```toml\n(.*?)^```$", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    assert load(tomllib.loads(scene) | {"name": "mine"}).expect[0].metric == "bounce_height_error"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_are_known(page):
+    """Whatever a page says to type has verbs and options that there are."""
+    text = page.read_text(encoding="utf-8")
+    typed = [line for block in BLOCK.finditer(text) if block["kind"] == "sh" for line in block["content"].splitlines()]
+    typed += re.findall("^    (.+)$", text, re.MULTILINE)
+    for line in [found[1] for line in typed if (found := re.match("dropspin (.+)", line))]:
+        verb, *arguments = shlex.split(line, comments=True)
+        command = dropspin.commands[verb]
+        command.make_parser(click.Context(command)).parse_args(arguments)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

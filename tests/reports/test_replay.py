@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import shutil
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,13 +15,13 @@ from PIL import Image
 import comparisons
 import reports
 import scenarios
-from reports.cli import dropspin
-from reports.replay import as_data, replay_of, replay_page
+from reports.cli import dropspin, main
+from reports.replay import as_data, replay_of, replay_page, write_clip
 from reports.replay.bodies import outline
-from reports.replay.motions import MOST_FRAMES, floor_impulses
+from reports.replay.motions import MOST_FRAMES, _stride, floor_impulses
 from scenarios import DropspinError, Trajectory, truth_for
 from scenarios.mechanics import angular_momentum
-from scenarios.rotations import rotate
+from scenarios.rotations import about, angle_between_orientations, multiply, rotate
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def unpacked(columns, count):
     whole = [
         np.full(count, column)
         if isinstance(column, float)
-        else np.frombuffer(base64.b64decode(column["data"]), dtype="<i4") * column["scale"]
+        else np.frombuffer(base64.b64decode(column["data"]), dtype="<i4" if "scale" in column else "<f8") * column.get("scale", 1.0)
         for column in columns
     ]
     return np.column_stack(whole)
@@ -70,6 +71,44 @@ def test_the_ghost_is_the_truth(results):
     assert ghost.label == "truth"
     assert len(ghost.frames) == len(replay.motions[0].frames)
     np.testing.assert_allclose(ghost.frames.orientation, exact.orientation, atol=1e-15)
+
+
+def test_between_frames_it_turns_as_it_spins():
+    """500 rad/s, 18 rad from frame to frame: a quarter of the way on, attitude is that of a quarter of the time, by the closed form."""
+    scene = scenarios.load("spin-principal-500")
+    results = comparisons.run([scene], ["mujoco"], [4e-3])
+    replay = replay_of(results, scene.name)
+    assert 500.0 * replay.interval > np.pi
+    for motion in replay.motions:
+        for frame in (0, 7, len(motion.frames) - 2):
+            q = motion.pose(frame + 0.25)[1]
+            expected = multiply(
+                about(np.array(scene.start.angular_velocity) / 500.0, 125.0 * replay.interval), motion.frames.orientation[frame]
+            )
+            assert angle_between_orientations(q, expected) < (1e-9 if motion.label == "truth" else 0.05)
+
+
+def test_the_last_state_is_a_frame():
+    """Whatever the number of steps, if it can be divided."""
+    for steps in (150, 375, 2500, 1750, 10_000):
+        every = _stride(steps)
+        assert steps % every == 0
+        assert MOST_FRAMES / 4 <= steps / every <= MOST_FRAMES or steps < MOST_FRAMES
+    assert 631 / _stride(631) <= MOST_FRAMES  # a prime
+
+
+def test_one_that_flies_off_hides_no_one(results):
+    """Its places are given whole, others' as exactly as ever; the view stays with those that are there."""
+    key = ("drop-ball", "document", 4e-3)
+    motion = results.trajectories[key]
+    away = np.where(motion.t > 0.3, 2.0 ** np.minimum(10.0 * (motion.t - 0.3) / 4e-3, 900.0), 0.0)
+    flown = replace(motion, position=motion.position + away[:, None] * [1.0, 0.0, 0.0])
+    replay = replay_of(replace(results, trajectories={**results.trajectories, key: flown}), "drop-ball")
+    assert 1.0 < replay.sight < 30.0
+    shown = next(one for one in as_data(replay)["motions"] if one["label"] == "document")
+    kept = flown.position[:: round(replay.interval / 4e-3)][: shown["count"]]
+    np.testing.assert_array_equal(unpacked(shown["position"], shown["count"])[:, 0], kept[:, 0])
+    np.testing.assert_allclose(unpacked(shown["position"], shown["count"])[:, 1], kept[:, 1], atol=1e-9)
 
 
 def test_an_impulse_is_the_truths(results):
@@ -199,13 +238,96 @@ def test_a_video(folder, tmp_path):
     [
         (["no-such-scene"], "it has drop-box-corner, spin-asymmetric, drop-ball"),
         (["drop-ball", "--dt", "0.5"], "this run has 0.004, 0.002"),
-        (["drop-ball", "--gif", "clip.avi"], ".gif or an .mp4"),
+        (["drop-ball", "--gif", "clip.avi"], "--gif clip.avi: give the file the ending .gif"),
+        (["drop-ball", "--mp4", "clip.gif"], "--mp4 clip.gif: give the file the ending .mp4"),
+        (["drop-ball", "--gif", "clip.gif", "--speed", "nan"], "more than 5,000 frames; choose one of at least 0.0075"),
+        (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "more than 5,000 frames"),
+        (["drop-ball", "--gif", "absent/clip.gif"], "absent/clip.gif: cannot be written"),
+        (["drop-ball", "--gif", "clip.gif", "-o", "page.html"], "-o page.html is for the page"),
         (["--gif", "clip.gif"], "name it: drop-box-corner"),
         (["drop-ball", "--dt", "-1"], "--dt"),
     ],
 )
-def test_bad_requests(folder, arguments, said):
+def test_bad_requests(folder, arguments, said, monkeypatch, capsys):
     """One message, exit code 2."""
-    done = called(folder, *arguments)
-    assert done.exit_code == 2 or isinstance(done.exception, DropspinError)
-    assert said in done.output + str(done.exception)
+    told(monkeypatch, capsys, ["replay", str(folder), *arguments, "--no-open"], said)
+
+
+def told(monkeypatch, capsys, arguments, said):
+    """What the command says of bad input, as its caller sees it."""
+    monkeypatch.setattr("sys.argv", ["dropspin", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_a_clip_that_is_interrupted_leaves_the_old_one(folder, results, tmp_path):
+    """Nothing of the new one is there."""
+    file = tmp_path / "clip.gif"
+    file.write_bytes(b"old")
+
+    def stop(share):
+        if share > 0.3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_clip(replay_of(results, "drop-ball"), file, 2.0, stop)
+    assert file.read_bytes() == b"old"
+    assert [one.name for one in tmp_path.iterdir()] == ["clip.gif"]
+
+
+def test_a_video_without_a_program(folder, results, tmp_path, monkeypatch):
+    """It is the program that is missing, not the file."""
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/no/such/ffmpeg")
+    with pytest.raises(DropspinError, match="no ffmpeg that can be run at '/no/such/ffmpeg'"):
+        write_clip(replay_of(results, "drop-ball"), tmp_path / "clip.mp4", 1.0)
+
+
+def test_a_report_again_keeps_the_replay(folder, tmp_path):
+    made = tmp_path / "run"
+    shutil.copytree(folder, made)
+    assert called(made).exit_code == 0
+    before = (made / "replay.html").read_bytes()
+    assert CliRunner().invoke(dropspin, ["report", str(made)]).exit_code == 0
+    assert (made / "replay.html").read_bytes() == before
+
+
+def without(name):
+    """Damage of run.json: an entry is gone."""
+
+    def damage(folder):
+        content = json.loads((folder / "run.json").read_text())
+        del content[name]
+        (folder / "run.json").write_text(json.dumps(content))
+
+    return damage
+
+
+def junk(folder):
+    next(folder.glob("trajectories/*.npz")).write_bytes(b"junk")
+
+
+@pytest.mark.parametrize("damage", [*map(without, ("engines", "provenance", "trajectories", "origins", "scenes")), junk])
+def test_a_damaged_run(folder, tmp_path, damage, monkeypatch, capsys):
+    made = tmp_path / "run"
+    shutil.copytree(folder, made)
+    damage(made)
+    for verb in ("report", "replay"):
+        told(monkeypatch, capsys, [verb, made], "not the folder of a run, or damaged")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        '{"title": "a", "parts": 5}',
+        '{"title": "a", "parts": [{"kind": "bogus"}]}',
+        "[]",
+        '{"title": "a", "parts": [{"kind": "table", "rows": []}]}',
+    ],
+)
+def test_a_damaged_study(folder, tmp_path, content, monkeypatch, capsys):
+    (tmp_path / "section.json").write_text(content)
+    told(monkeypatch, capsys, ["report", folder, "--add", tmp_path], "holds no study, or a damaged one")

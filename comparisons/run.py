@@ -141,7 +141,7 @@ def measure(scene: Scenario, motion: Trajectory) -> dict[str, float]:
     """Every metric that the scene has, of one motion; NaN where the step is too coarse for it."""
     truth = truth_for(scene)
     case = Comparison.with_truth(scene, motion, truth)
-    return {metric.name: _value_or_nan(metric, case) for metric in metrics_for(scene, truth)}
+    return {metric.name: _value_or_nan(metric, [case]) for metric in metrics_for(scene, truth)}
 
 
 def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Phase], exact: Sequence[Trajectory | None]) -> list[Row]:
@@ -155,10 +155,13 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
     if bad is not None:
         reason = f"the state is not finite at t = {bad.t[bad.first_bad_row]:g} s"
         return [shared | {"verdict": "diverged", "reason": reason}]
-    beside = zip(phases, attempt.phases, exact, strict=True)
-    cases = [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in beside]
-    attempt.cases = cases
-    nudged = [Comparison.with_truth(scene, motion, truth, exact[0]) for motion in attempt.nudged]
+
+    def beside_truth(motions: Sequence[Trajectory]) -> list[Comparison]:
+        beside = zip(phases, motions, exact, strict=True)
+        return [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in beside]
+
+    attempt.cases = cases = beside_truth(attempt.phases)
+    nudged = [beside_truth(motions) for motions in attempt.nudged]
     rows = [shared | {"verdict": "limited", "reason": limit.said} for limit in attempt.limits]
     for metric in metrics_for(scene, truth):
         row = shared | {"metric": metric.name, "unit": metric.unit, "kind": metric.kind}
@@ -166,8 +169,8 @@ def _truth_rows(written: Phase, dt: float, attempt: Attempt, phases: Sequence[Ph
             row["truth"] = truth.name
         measured = _measured(scene, dt, attempt.label, metric, cases)
         average = measured["average"]
-        moves = [abs(_value_or_nan(metric, case) - average.value) for case in nudged]
-        luck = FEW_DRAWS * float(np.max(moves)) if nudged else average.jump
+        moves = float(np.max([abs(_value_or_nan(metric, moved) - average.value) for moved in nudged], initial=0.0))
+        luck = FEW_DRAWS * moves if len(cases) == 1 else average.jump + moves
         measured["tolerance"] = tolerance(scene, metric.unit, attempt.precision, steps, luck)
         rows.append(row | excused({"metric": metric.name} | measured, attempt.limits))
     if truth is None:
@@ -195,9 +198,9 @@ def _measured(scene: Scenario, dt: float, label: str, metric: Metric, cases: lis
     return measurement | {"average": average}
 
 
-def _value_or_nan(metric: Metric, case: Comparison) -> float:
+def _value_or_nan(metric: Metric, cases: Sequence[Comparison]) -> float:
     try:
-        return metric.average([case]).value
+        return metric.average(cases).value
     except Unresolved:
         return float("nan")
 

@@ -81,7 +81,8 @@ class Contestant:
 class Attempt:
     """What came of one engine on one scene at one step; of what it claims, its discretisation, order, precision and errors by metric.
 
-    `nudged` are its motions from starts that a few ulp tell from the scene's, where there is one start only: what rounding may come to.
+    `nudged` are its motions from starts that a few ulp tell from those of `phases`, set by set, where there is one only or the body touches
+    the floor: what rounding may come to.
     `cases` are its motions from each start beside the truth, which whoever judges them puts there.
     """
 
@@ -90,7 +91,7 @@ class Attempt:
     reason: str = ""
     motion: Trajectory | None = None
     phases: list[Trajectory] = field(default_factory=list)
-    nudged: list[Trajectory] = field(default_factory=list)
+    nudged: list[list[Trajectory]] = field(default_factory=list)
     cases: list[Comparison] = field(default_factory=list)
     limits: Sequence[Limit] = ()
     settings: dict[str, Any] = field(default_factory=dict)
@@ -131,11 +132,8 @@ def attempt_by(contestant: Contestant, scene: Scenario, dt: float, starts: Seque
             return attempt
         attempt.discretisation, attempt.order, attempt.precision = engine.discretisation(scene), engine.order_in(scene), engine.precision
         attempt.motion, attempt.limits = _motion(scene, engine, dt)
-        if len(starts) == 1:
-            attempt.phases = [attempt.motion]
-            attempt.nudged = [_motion(start, engine, dt)[0] for start in nudged(scene, engine.precision)]
-        else:
-            attempt.phases = [_motion(start, engine, dt)[0] for start in starts]
+        attempt.phases = [attempt.motion] if len(starts) == 1 else [_motion(start, engine, dt)[0] for start in starts]
+        attempt.nudged = [[_motion(start, engine, dt)[0] for start in moved] for moved in nudged(scene, starts, engine.precision)]
         attempt.outcome = None if scene.ensemble is None else outcome_of(engine, scene, dt)
         # What is predicted of a bounce is a mean over start phases.
         attempt.predicted = predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}

@@ -1,7 +1,7 @@
 """How far a figure may move before it says that something has changed: a tolerance for each, from how it was measured.
 
-    metrics    rounding over so many steps, and what luck may do: one of the start phases falling into the neighbouring step,
-               or, where there is one start only, what starts that are moved by some ulp make of the figure
+    metrics    rounding over so many steps, and what luck may do: one of the start phases falling into the neighbouring step, and,
+               where the body starts on the floor, or there is one start only, what starts that are moved by some ulp make of it
     orders     what becomes of them when the errors that they were found from move by their tolerances
     limits     the same, and no less than their own uncertainty
     means      of ensembles: the confidence interval of the difference between two draws
@@ -10,6 +10,7 @@ No tolerance is a share of the figure: an engine that is exact to 1e-12 is held 
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,9 @@ NEGLIGIBLE = 3e-8
 ULPS_A_STEP = 16.0
 NUDGE = 16.0
 """By how many ulp of the engine's precision each number of a start is moved, up or down, to see what becomes of rounding."""
-NUDGES = 4
+_FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
+SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
+"""Which of them up, which down: two ways, and their opposites."""
 FEW_DRAWS = 10.0
 """What a few nudges have moved a figure by tells what others would by its order of magnitude only."""
 TRUTH = 1e-12
@@ -45,16 +48,24 @@ def tolerance(scene: Scenario, unit: str, precision: type, steps: int, luck: flo
     return luck + _scale(scene, unit) * (residue + TRUTH + rounded)
 
 
-def nudged(scene: Scenario, precision: type) -> list[Scenario]:
-    """The scene from starts that a few ulp tell from its own.
+def nudged(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
+    """A scene's starts, moved by a few ulp, set by set; none where there are many starts and none touches the floor.
 
-    A body that touches the floor stays at its height: a few ulp of single precision would put it somewhere else.
+    A body that touches the floor stays at its height, but for ulps of double precision: those of single would put it somewhere else.
+    Whether it touches is then rounding's to say, for all starts alike; so for each set there is one that goes the other way.
     """
+    if len(starts) == 1:
+        return [[_moved(scene, signs, precision)] for signs in SIGNS]
+    if scene.floor is None or scene.starts_above_floor:
+        return []
+    return [[_moved(start, signs, precision) for start in starts] for signs in SIGNS[:2]]
+
+
+def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:
     start, sizes = scene.initial_state, np.full(13, NUDGE * float(np.finfo(precision).eps))
     if scene.floor is not None and not scene.starts_above_floor:
         sizes[:7] = NUDGE * float(np.finfo(float).eps)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (NUDGES, 13))
-    return [scene.starting_at(start * (1.0 + sizes * some)) for some in signs]
+    return scene.starting_at(start * (1.0 + sizes * signs))
 
 
 def _scale(scene: Scenario, unit: str) -> float:

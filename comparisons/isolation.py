@@ -130,7 +130,7 @@ class Cells:
     def renew(self, contestant: Contestant) -> None:
         """Give an engine a new process for its next piece of work."""
         pool = self._pools.pop(contestant.label)
-        pool.stop()  # type: ignore[no-untyped-call]
+        pool.stop()  # type: ignore[no-untyped-call]  # pebble's has no types
         pool.join()
 
     def _told(self, exit_code: int | None) -> tuple[str, str]:
@@ -153,7 +153,7 @@ class Cells:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.abandon()
         for pool in self._pools.values():
-            pool.stop()  # type: ignore[no-untyped-call]
+            pool.stop()  # type: ignore[no-untyped-call]  # pebble's has no types
         for pool in self._pools.values():
             pool.join()
 

@@ -34,13 +34,11 @@ def counts(results: Results) -> Counts:
     return Counts(int(passed.sum()), int(failed.sum()), int(of_studies.sum()), int(verdicts.isin(BREAKDOWNS).sum()))
 
 
-def worst_verdicts(results: Results) -> dict[tuple[str, str], str]:
-    """For each scene and engine, the verdict that counts."""
-    own = results.frame[results.frame["kind"] != "agreement"]
-    worst: dict[tuple[str, str], str] = {}
-    for scene, engine, verdict in zip(own["scene"], own["engine"], own["verdict"], strict=True):
-        worst[scene, engine] = min(verdict, worst.get((scene, engine), verdict), key=SEVERITY.index)
-    return worst
+def verdicts(results: Results) -> dict[tuple[str, str], list[str]]:
+    """For each scene and engine its verdicts, the one that counts first."""
+    own = results.frame.loc[results.frame["kind"] != "agreement", ["scene", "engine", "verdict"]].drop_duplicates()
+    by_engine = own.groupby(["scene", "engine"])["verdict"]
+    return {(str(scene), str(engine)): sorted(mine, key=SEVERITY.index) for (scene, engine), mine in by_engine}
 
 
 def lasting_errors(results: Results, cause: str) -> dict[str, list[str]]:

@@ -22,14 +22,13 @@ OURS = frozenset(
 )
 
 
-def write(results: Results, folder: str | Path, sections: Sequence[Section] = (), png: bool = False) -> Path:
+def write(results: Results, folder: str | Path, sections: Sequence[Section] = ()) -> Path:
     """Write a run: its data, the reports and the plots. An earlier run in the same folder is replaced.
 
     Args:
         results: The run.
         folder: Where to; made if it does not exist.
         sections: What other studies have to tell, for the report.
-        png: Whether plots are wanted as PNG too.
 
     Returns:
         The path of report.html.
@@ -38,7 +37,7 @@ def write(results: Results, folder: str | Path, sections: Sequence[Section] = ()
         DropspinError: The folder holds something that is not a run, or cannot be written.
     """
     with run_folder(folder) as unfinished:
-        fill(results, unfinished, sections, png)
+        fill(results, unfinished, sections)
     return Path(folder) / "report.html"
 
 

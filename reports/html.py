@@ -23,7 +23,7 @@ from reports.findings import (
     lasting_errors,
     profile_comparisons,
     verdict_sentence,
-    worst_verdicts,
+    verdicts,
 )
 from reports.methods import leading_errors, step_costs
 from reports.plots import bounce_figure, convergence_figure, ensemble_figure, flight_figure, time_figure
@@ -74,15 +74,14 @@ def html_report(results: Results, plots: dict[str, str], sections: Sequence[Sect
     """
     styles, drawn = with_shared_styles(plots)
     overview = _overview(results)
-    verdicts = {
-        (scene, engine): [word for word in dict.fromkeys([*mine, *_verdicts(results, scene, engine)]) if word != "measured"]
+    found = verdicts(results)
+    kinds = {
+        (scene, engine): {*mine, *found.get((scene, engine), ())} - {"measured"}
         for scene, by_engine in overview["chips"].items()
         for engine, mine in by_engine.items()
     }
-    words = sorted({word for mine in verdicts.values() for word in mine})
-    return page(
-        "report.html", **overview, **_details(results, drawn), verdicts=verdicts, words=words, sections=sections, styles=Markup(styles)
-    )
+    words = sorted({word for mine in kinds.values() for word in mine})
+    return page("report.html", **overview, **_details(results, drawn), kinds=kinds, words=words, sections=sections, styles=Markup(styles))
 
 
 def markdown_report(results: Results) -> str:
@@ -145,10 +144,10 @@ def _details(results: Results, plots: dict[str, str]) -> dict[str, Any]:
 
 def _chips(results: Results) -> dict[str, dict[str, list[str]]]:
     """By scene and engine: the verdict that counts, and why an error stays, if one does."""
-    worst, stuck = worst_verdicts(results), {words: lasting_errors(results, cause) for cause, words in STUCK.items()}
+    found, stuck = verdicts(results), {words: lasting_errors(results, cause) for cause, words in STUCK.items()}
     return {
         scene: {
-            engine: [worst.get((scene, engine), "missing"), *(words for words, where in stuck.items() if scene in where[engine])]
+            engine: [found.get((scene, engine), ["missing"])[0], *(words for words, where in stuck.items() if scene in where[engine])]
             for engine in results.engines
         }
         for scene in results.scenes
@@ -184,11 +183,6 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         # Our own SVG; its text is escaped by matplotlib.
         **{f"{kind}_plot": Markup(plots.get(f"{number:02d}-{kind}", "")) for kind in FIGURES},
     }
-
-
-def _verdicts(results: Results, scene: str, engine: str) -> list[str]:
-    frame = results.frame
-    return list(frame.loc[(frame["scene"] == scene) & (frame["engine"] == engine) & (frame["kind"] != "agreement"), "verdict"].unique())
 
 
 def modelled(scene: Scenario) -> list[str]:

@@ -26,8 +26,7 @@ def svg(figure: "Figure", identifier: str) -> str:
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = text.replace(INK, "currentColor").replace(FAINT, "currentColor")
-    text = re.sub(r'\bid="([^"]+)"', rf'id="{identifier}-\1"', text)
-    text = re.sub(r'(url\(#|href="#)([^")]+)', rf"\1{identifier}-\2", text)
+    text = with_ids_of(text, identifier)
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL).strip()
     wanted = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
     text = re.sub(r' id="([^"]+)"', lambda found: found.group() if found[1] in wanted else "", text)

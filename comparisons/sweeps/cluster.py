@@ -40,7 +40,7 @@ def connected(scheduler: str) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(scheduler, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
+        client = Client(scheduler, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]  # distributed's has no types
     except (OSError, ValueError) as error:
         raise DropspinError(f"--scheduler {scheduler}: no scheduler answers ({error}); start one with: dask scheduler.") from None
     with client, client.as_current():
@@ -77,7 +77,7 @@ def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Folde
         if not flying:
             return
         try:
-            landed = wait(list(flying), timeout=TICK, return_when="FIRST_COMPLETED").done  # type: ignore[no-untyped-call]
+            landed = wait(list(flying), timeout=TICK, return_when="FIRST_COMPLETED").done  # type: ignore[no-untyped-call]  # distributed's has no types
         except TimeoutError:
             landed = set()
         done = 0

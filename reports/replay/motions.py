@@ -91,15 +91,15 @@ class Replay:
     @cached_property
     def sight(self) -> float:
         """How far from the start bodies stay in the view [m]: one that flies off must not make the others too small to be seen."""
-        ways = [self._way(motion.frames.position).max() for motion in self.motions]
+        ways = [self._from_start(motion.frames.position).max() for motion in self.motions]
         return IN_SIGHT * max(float(min(ways)), self.scene.body.size)
 
     def in_sight(self, places: Array) -> NDArray[np.bool_]:
         """Which of some places, shape (k, 3), the view holds."""
-        return self._way(places) <= self.sight
+        return self._from_start(places) <= self.sight
 
     @np.errstate(over="ignore")  # an engine may say 1e300
-    def _way(self, places: Array) -> Array:
+    def _from_start(self, places: Array) -> Array:
         return np.linalg.norm(places - self.scene.start.position, axis=1)
 
 

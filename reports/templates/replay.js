@@ -134,17 +134,14 @@
       const heads = ["shown", "height [m]", ...(this.truth ? ["from the truth [m]", "turned from it [rad]"] : []), ...(this.hasFloor ? ["last impulse [N s]"] : [])];
       const table = made("table", {}, made("thead", {}, made("tr", {}, ...heads.map((text) => made("th", { scope: "col" }, text)))),
         made("tbody", {}, ...this.rows.map((row) => row.element)));
+      const box = made("div", { class: "scroll", role: "region", "aria-label": `${this.scene}: where the bodies are` }, table);
+      stopWhereItScrolls.observe(box);
       this.home.replaceChildren(
         this.canvas,
         made("p", { class: "controls" }, this.button, step(-1, "◂", "one frame back"), step(1, "▸", "one frame on"), this.slider, this.clock,
           labelled("speed", this.speed), labelled("engines", this.layout), labelled("follow", this.follow)),
-        this.watched(made("div", { class: "scroll", role: "region", "aria-label": `${this.scene}: where the bodies are` }, table)),
+        box,
       );
-    }
-
-    watched(box) {
-      stopWhereItScrolls.observe(box);
-      return box;
     }
 
     row(motion) {

@@ -114,7 +114,7 @@ def test_urdf_is_the_body(shape, tmp_path):
     np.testing.assert_allclose(moments[0], moments[1], rtol=1e-12)
 
 
-@pytest.mark.parametrize("e", [0.3, 0.95])
+@pytest.mark.parametrize("e", [0.3, pytest.param(0.5, marks=pytest.mark.slow), pytest.param(0.8, marks=pytest.mark.slow), 0.95])
 def test_the_damper_belongs_to_its_step(e):
     """v+ = v (1 - b h): at another step h than dt, e becomes (1 + e) h/dt - 1; no less than 0, and 1 at the largest stable step."""
     found = calibrate(engine("mujoco"), e, 2e-3)

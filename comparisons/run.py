@@ -54,7 +54,8 @@ def run(
     """
     contestants, truths = prepared(scenes, engines, dts)
     labels = [contestant.label for contestant in contestants]
-    stamp = provenance({"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts)})
+    asked = {"scenes": [scene.name for scene in scenes], "engines": labels, "dts": list(dts), "time_limit": limits.processor_time}
+    stamp = provenance(asked)
     stamp["names"] = {one.label: name.strip() for one, name in zip(contestants, engines, strict=True) if isinstance(name, str)}
     stamp["adapters"] = {contestant.label: adapter_code(contestant.engine) for contestant in contestants if contestant.engine is not None}
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if _is_the_same(part.provenance, stamp)}

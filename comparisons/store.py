@@ -16,8 +16,8 @@ from comparisons.results import COLUMNS, Results, TrajectoryKey
 from scenarios import DropspinError, Trajectory, load
 
 ARRAYS = ("t", "position", "orientation", "velocity", "angular_velocity", "velocity_lag")
-FORMAT = 2
-"""Of the folder; 1 had no tolerances."""
+FORMAT = 3
+"""Of the folder; 1 had no tolerances, 2 no time limit."""
 OUTCOME = tuple(field.name for field in fields(Outcome))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from comparisons import Results
+from comparisons import Limits, Results
 from comparisons.studies import STUDIES
 from comparisons.verdicts import FAILURES
 from reports.numbers import bound, step, subject, word, written
@@ -24,7 +24,7 @@ class Failing:
         where: The step, in words.
         what: What is wrong, with value, bound and reason.
         more: How many other rows, at other steps, fail likewise.
-        again: The command that does it again.
+        again: The command, or the call, that does it again.
         broke_down: Whether the engine crashed, hung, diverged, or is missing.
         accepted: Whether it is an accepted figure that fails.
     """
@@ -89,11 +89,15 @@ def what_fails(row: Row) -> str:
 
 
 def again(results: Results, row: Row, baseline: str | None = None) -> str:
-    """The command that measures a row again."""
-    scene = results.scenes[row["scene"]]
-    every = sorted(results.provenance["asked"]["dts"], reverse=True)
-    steps = every if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
-    named = [word for dt in steps for word in ("--dt", repr(float(dt)))]
-    held = [] if baseline is None or row["kind"] != "baseline" else ["--baseline", baseline]
-    engine = results.provenance["names"].get(row["engine"], row["engine"])  # my_module:MyEngine has a name of its own in results
-    return shlex.join(["dropspin", "run", scene.origin or scene.name, "-e", engine, *named, *held, "-o", "out/again"])
+    """The command that measures a row again, or the call if its scene or its engine was given as an object."""
+    scene, asked = results.scenes[row["scene"]], results.provenance["asked"]
+    steps = sorted(asked["dts"], reverse=True) if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
+    engine = results.provenance["names"].get(row["engine"])  # my_module:MyEngine has a name of its own in results
+    if not scene.origin or engine is None:
+        held = f"scenarios.load({scene.origin!r})" if scene.origin else f"<scene {scene.name!r}>"
+        named = f"<engine {row['engine']!r}>" if engine is None else repr(engine)
+        return f"comparisons.run([{held}], [{named}], {[float(dt) for dt in steps]})"
+    options = [word for dt in steps for word in ("--dt", repr(float(dt)))]
+    options += [] if asked["time_limit"] == Limits().processor_time else ["--time-limit", f"{asked['time_limit']:g}"]
+    options += [] if baseline is None or row["kind"] != "baseline" else ["--baseline", baseline]
+    return shlex.join(["dropspin", "run", scene.origin, "-e", engine, *options, "-o", "out/again"])

@@ -140,7 +140,7 @@ def _since_then(checked: Checked, baseline: Baseline) -> list[str]:
     moved = checked.changes[checked.changes["change"].isin(["worse", "moved", "gone"])]
     differ = [
         f"{name} {then} → {now[name]}"
-        for by in sorted(set(moved["by"].dropna().astype(int)))
+        for by in moved["by"].dropna().unique()
         for name, then in baseline.acceptances[by].versions.items()
         if name in now and now[name] != then
     ]

@@ -40,7 +40,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
     """
     if isinstance(scene, Mapping):
         name = scene.get("name", "scene")
-        return _validate(str(name), f"scene {name!r}", {key: value for key, value in scene.items() if key != "name"})
+        return _validate(str(name), "", {key: value for key, value in scene.items() if key != "name"})
     path = _find(scene)
     try:
         str(path).encode()
@@ -94,11 +94,12 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = LARGES
         raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
 
 
-def _validate(name: str, where: str, content: dict[str, Any]) -> Scenario:
+def _validate(name: str, origin: str, content: dict[str, Any]) -> Scenario:
+    where = origin or f"scene {name!r}"
     for key in INTERNAL & content.keys():
         raise SceneError(f"{where}: {key}: got {_shown(content[key])}; a scene's name is its file's, the key is not allowed.")
     try:
-        return Scenario.model_validate({"name": name, "origin": where, **content})
+        return Scenario.model_validate({"name": name, "origin": origin, **content})
     except ValidationError as error:
         problems = error.errors(include_url=False)
         # A key that takes a word or something else is reported once for each; the word is beside the point for a number.

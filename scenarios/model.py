@@ -109,7 +109,8 @@ class Expectation(Table):
 class Scenario(Table):
     """One scene.
 
-    `name` is the file's, without its ending, and `origin` what was asked for to load it; everything else is the file's content (units: SI).
+    `name` is the file's, without its ending, and `origin` what was asked for to load it, empty if it was given as a mapping; everything
+    else is the file's content (units: SI).
     """
 
     name: str

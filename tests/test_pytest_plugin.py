@@ -205,16 +205,16 @@ def test_a_test_that_fails(repository):
 
 BASELINE = """
 format = 1
-[accepted.1]
+[accepted.a0b1c2d]
 date = 2026-01-31
 reason = "as it was"
 versions = {{}}
 [scenes]
 spin-principal = "{digest}"
 [figures.spin-principal.mine."0.004"]
-angular_momentum_error = {{value = 1e-4, tolerance = 1e-9, by = 1}}
+angular_momentum_error = {{value = 1e-4, tolerance = 1e-9, by = "a0b1c2d"}}
 [figures.spin-principal.faulty."0.004"]
-angular_momentum_error = {{value = 1e-4, tolerance = 1e-6, by = 1}}
+angular_momentum_error = {{value = 1e-4, tolerance = 1e-6, by = "a0b1c2d"}}
 """
 
 

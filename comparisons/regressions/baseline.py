@@ -20,7 +20,7 @@ from tomlkit.items import InlineTable
 
 from comparisons.ensembles import ENSEMBLE_METRICS
 from comparisons.metrics import METRICS
-from comparisons.provenance import versions_behind
+from comparisons.provenance import digest, versions_behind
 from comparisons.regressions.figures import KEY, asked_for, changes, figures
 from comparisons.results import Results
 from comparisons.validating import validated
@@ -34,6 +34,8 @@ FORMAT = 1
 LARGEST_FILE = 50_000_000  # bytes
 DIGITS_BELOW = 3
 """A value is written to a two-hundredth of its tolerance, and no shorter than this."""
+KEY_LENGTH = 7
+"""Digits of the hash that names an acceptance."""
 HEADER = (
     "Figures of rigid-body engines, measured by dropspin, accepted by somebody; one line each.",
     "value ± tolerance, in the unit of the metric; by: which acceptance it is from.",
@@ -50,13 +52,18 @@ class Acceptance(Table):
     reason: Annotated[str, Field(min_length=1)]
     versions: dict[str, str]
 
+    @property
+    def key(self) -> str:
+        """What its figures name it by: a hash of all of it, so that two branches that each accept something do not give it one name."""
+        return digest(self.model_dump())[:KEY_LENGTH]
+
 
 class _Line(Table):
     """A figure in the file."""
 
     value: Annotated[float, Field(allow_inf_nan=False)]
     tolerance: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-    by: Annotated[int, Field(ge=1)]
+    by: str
     known_failure: bool = False
 
 
@@ -64,12 +71,12 @@ class _File(Table):
     """The whole file, but for the figures' lines."""
 
     format: Literal[1]
-    accepted: dict[Annotated[int, Field(ge=1)], Acceptance]
+    accepted: dict[str, Acceptance]
     scenes: dict[str, str]
     figures: dict[str, dict[str, dict[str, dict[str, Any]]]]
 
 
-COLUMNS = {**dict.fromkeys(KEY, "str"), "value": "float64", "tolerance": "float64", "unit": "str", "by": "int64", "known_failure": "bool"}
+COLUMNS = {**dict.fromkeys(KEY, "str"), "value": "float64", "tolerance": "float64", "unit": "str", "by": "str", "known_failure": "bool"}
 
 
 def _table(lines: list[dict[str, Any]]) -> pd.DataFrame:
@@ -81,13 +88,13 @@ class Baseline:
     """Accepted figures.
 
     Attributes:
-        acceptances: By number.
+        acceptances: By key.
         scenes: Of each scene the digest of what is simulated.
-        figures: As `regressions.figures` has them, with `by`, the number of the acceptance, and `known_failure`: whether a check that
+        figures: As `regressions.figures` has them, with `by`, the key of the acceptance, and `known_failure`: whether a check that
             the figure fails is not to fail the run, as long as the figure is not worse.
     """
 
-    acceptances: Mapping[int, Acceptance] = field(default_factory=dict)
+    acceptances: Mapping[str, Acceptance] = field(default_factory=dict)
     scenes: Mapping[str, str] = field(default_factory=dict)
     figures: pd.DataFrame = field(default_factory=lambda: _table([]))
 
@@ -112,7 +119,7 @@ def load_baseline(path: str | Path) -> Baseline:
                     metric, kind = _metric_and_kind(here, name)
                     line = validated(_Line, here, content)
                     if line.by not in written.accepted:
-                        raise DropspinError(f"{here}: by: got {line.by}; accepted are {', '.join(map(str, written.accepted)) or 'none'}.")
+                        raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(written.accepted) or 'none'}.")
                     key = {"scene": scene, "engine": engine, "steps": step, "metric": metric, "kind": kind}
                     unit = "1" if kind == "order" else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
                     lines.append(key | line.model_dump() | {"unit": unit})
@@ -146,15 +153,15 @@ def accept(
     if known_failures:
         failing = pd.MultiIndex.from_frame(mine.loc[mine["known_failure"], KEY])
         kept = kept.assign(known_failure=pd.MultiIndex.from_frame(kept[KEY]).isin(failing))
-    number = max(earlier.acceptances, default=0) + 1
+    acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(results.provenance))
     moved = mine.merge(kept[KEY], on=KEY, how="left", indicator=True)
-    moved = moved[moved["_merge"] == "left_only"].assign(by=number)
+    moved = moved[moved["_merge"] == "left_only"].assign(by=acceptance.key)
     outside = earlier.figures.drop(old.index)
     outdated = outside["scene"].map(lambda name: earlier.scenes[name] != scenes.get(name, earlier.scenes[name])).astype(bool)
     everything = pd.concat([outside[~outdated], kept, moved], ignore_index=True)[list(COLUMNS)]
-    acceptances = {**earlier.acceptances, number: Acceptance(date=date, reason=reason, versions=versions_behind(results.provenance))}
     used = set(everything["by"])
-    return Baseline({n: one for n, one in acceptances.items() if n in used}, {**earlier.scenes, **scenes}, everything), found
+    acceptances = {key: one for key, one in {acceptance.key: acceptance, **earlier.acceptances}.items() if key in used}
+    return Baseline(acceptances, {**earlier.scenes, **scenes}, everything), found
 
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:
@@ -182,8 +189,8 @@ def _text(baseline: Baseline) -> str:
         document.add(tomlkit.comment(line))
     document["format"] = FORMAT
     document["accepted"] = {
-        str(number): {"date": one.date, "reason": one.reason, "versions": _inline(one.versions)}
-        for number, one in sorted(baseline.acceptances.items())
+        key: {"date": one.date, "reason": one.reason, "versions": _inline(one.versions)}
+        for key, one in sorted(baseline.acceptances.items(), key=lambda item: (item[1].date, item[0]))
     }
     held = baseline.figures
     document["scenes"] = {name: digest for name, digest in sorted(baseline.scenes.items()) if name in set(held["scene"])}
@@ -199,7 +206,7 @@ def _text(baseline: Baseline) -> str:
 def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
     value, tolerance = float(row["value"]), float(f"{row['tolerance']:.2g}")
     digits = DIGITS_BELOW if value == 0.0 else max(DIGITS_BELOW, DIGITS_BELOW + math.ceil(math.log10(abs(value) / tolerance)))
-    line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": int(row["by"])}
+    line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": row["by"]}
     return line | ({"known_failure": True} if row["known_failure"] else {})
 
 

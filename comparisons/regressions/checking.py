@@ -73,7 +73,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
 
 
 def _row(found: dict[Any, Any], baseline: Baseline) -> Row:
-    by = baseline.acceptances[int(found["by"])]
+    by = baseline.acceptances[found["by"]]
     away = "" if found["change"] == "same" else f"; {found['change']} by {found['in_tolerances']:,.3g} times its tolerance"
     reason = f"accepted {found['before']:.6g} ± {found['tolerance']:.2g} on {by.date}, {by.reason}{away}"
     bounds = {name: found[name] if np.isfinite(found[name]) else np.nan for name in ("lower", "upper")}

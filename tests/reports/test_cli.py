@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -13,6 +14,8 @@ import pytest
 
 import comparisons
 import scenarios
+from comparisons.engines.mujoco_engine import MuJoCo
+from reports.failing import failing
 
 DROPSPIN = Path(sys.executable).with_name("dropspin")
 SCENE = """
@@ -289,10 +292,27 @@ def test_nothing_judged_is_not_nothing_expected(tmp_path):
 
 
 def test_command_that_does_it_again(tmp_path):
-    """With the path as it was given, quoted, and all digits of the step."""
+    """With the path as it was given, quoted, all digits of the step, and the time limit if it is not the usual one."""
     (tmp_path / "my scene.toml").write_text(SCENE + '[[expect]]\nmetric = "penetration"\nbelow = 1e-9\nreason = "stiff"\n')
-    done = dropspin("run", "my scene.toml", "-e", "mujoco", "--dt", "0.00123456789", cwd=tmp_path)
-    assert "dropspin run 'my scene.toml' -e mujoco --dt 0.00123456789" in done.stdout.replace("\n", " ")
+    command = ("run", "my scene.toml", "-e", "mujoco", "--dt", "0.00123456789")
+    assert f"Again: dropspin {shlex.join(command)} -o out/again" in dropspin(*command, cwd=tmp_path).stdout.replace("\n", " ")
+    done = dropspin(*command, "--time-limit", "17", cwd=tmp_path)
+    assert f"Again: dropspin {shlex.join(command)} --time-limit 17 -o out/again" in done.stdout.replace("\n", " ")
+
+
+def test_call_that_does_it_again():
+    """Of a scene or an engine that was given as an object: no command knows it."""
+    ball = scenarios.load("drop-ball")
+    content = ball.model_dump(exclude_none=True, exclude={"origin", "expect"})
+    given = scenarios.load(content | {"expect": [{"metric": "penetration", "below": 1e-9, "reason": "stiff"}]})
+    by_name = ball.model_copy(update={"expect": given.expect})
+    for scene, engine, call in (
+        (given, MuJoCo(), "[<scene 'drop-ball'>], [<engine 'mujoco'>], [0.004]"),
+        (given, "mujoco", "[<scene 'drop-ball'>], ['mujoco'], [0.004]"),
+        (by_name, MuJoCo(), "[scenarios.load('drop-ball')], [<engine 'mujoco'>], [0.004]"),
+    ):
+        [found] = failing(comparisons.run([scene], [engine], [4e-3]))
+        assert found.again == f"comparisons.run({call})"
 
 
 ADAPTER = (Path(__file__).parents[2] / "docs" / "bring-your-engine.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]

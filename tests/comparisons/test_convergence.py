@@ -102,9 +102,20 @@ def test_an_order_that_changes_from_step_to_step_is_not_asymptotic():
 
 
 def test_a_plateau_is_the_model():
-    """An error that no step changes."""
-    found = apart([0.7531, 0.7530, 0.7530])
-    assert (found.cause, found.limit) == ("model", pytest.approx(0.753, abs=1e-4))
+    """An error that no step changes, or that settles, by no power of the step; not one that goes on jumping about."""
+    for errors in ([0.7531, 0.7530, 0.7530], [0.25, 0.26, 0.2545]):
+        found = apart(errors, floor=1e-9)
+        assert (found.cause, found.limit, found.reason) == ("model", errors[-1], "does not depend on the step")
+    assert found.uncertainty == pytest.approx(0.01, rel=1e-6)
+    assert apart([0.2545, 0.25, 0.26]).cause == "unresolved"
+
+
+def test_a_count_is_no_power_of_the_step():
+    """Though it halves with it."""
+    found = take_apart(H, np.array([4.0, 2.0, 1.0]), np.zeros(3), np.full(3, 1e-12), jumps=True)
+    assert (found.cause, found.reason) == ("discretisation", "shrinks, but as no power of the step")
+    assert math.isnan(found.order)
+    assert take_apart(H, np.zeros(3), np.zeros(3), np.full(3, 1e-12), jumps=True).cause == "rounding"
 
 
 def test_an_error_that_grows_as_the_step_shrinks_is_the_model():
@@ -142,9 +153,9 @@ def test_a_coarse_step_outside_the_asymptotic_range_is_left_out():
 def test_what_start_phases_do_not_resolve_is_no_model_error():
     """Noise of the size of the error: nothing is claimed but that it is small."""
     found = apart([5e-5, -2e-5, 1.5e-5], noise=1e-4)
-    assert found.cause == "discretisation"
+    assert (found.cause, found.reason) == ("discretisation", "smaller at every step than the start phases resolve")
     assert math.isnan(found.order)
-    assert abs(found.limit) <= found.uncertainty
+    assert found.uncertainty == pytest.approx(1e-4)
 
 
 def test_noise_widens_the_limit():

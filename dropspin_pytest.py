@@ -307,9 +307,12 @@ class Metrics(pytest.Collector):
     def collect(self) -> "list[Metric]":
         """One test for each metric of each engine, of those that are asked for by node id, or of all."""
         runs = self.config.stash[RUNS]
+        engines = [one["engine"] for one in runs.plan["engines"]]
+        ids = [(metric, engine, f"{metric}[{engine}]") for metric, engine in product(self.planned["metrics"], engines)]
+        # The id is given whole: in one that pytest 9.2 puts together the brackets are a part of the name, and --lf does not find it.
         items = [
-            Metric.from_parent(self, name=f"{metric}[{one['engine']}]", metric=metric, engine=one["engine"])
-            for metric, one in product(self.planned["metrics"], runs.plan["engines"])
+            Metric.from_parent(self, name=name, nodeid=f"{self.nodeid}::{name}", metric=metric, engine=engine)
+            for metric, engine, name in ids
         ]
         return [item for item in items if not runs.selected or any(_selects(one, item.nodeid) for one in runs.selected)]
 
@@ -391,13 +394,18 @@ def _several(given: Any) -> Any:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Call a marked test for each scene and engine."""
-    mark = metafunc.definition.get_closest_marker(NAME)
-    if mark is None or "dropspin_result" not in metafunc.fixturenames:
+    if "dropspin_result" not in metafunc.fixturenames:
+        if any(mark.name == NAME and mark.args for mark in metafunc.definition.own_markers):
+            pytest.fail(f"{metafunc.function.__name__} is marked with scenes, but does not take dropspin_result", pytrace=False)
         return
-    scenes, engine, dt = _dropspin(*mark.args, **mark.kwargs)
-    engines = _several(engine) or metafunc.config.stash[RUNS].engines or [None]
-    cases = {"-".join(filter(None, [_title(scene), one])): (scene, _several(one), _several(dt)) for scene, one in product(scenes, engines)}
-    metafunc.parametrize("dropspin_result", list(cases.values()), ids=list(cases), indirect=True)
+    ids, cases = [], []
+    for mark in metafunc.definition.iter_markers(NAME):
+        scenes, engine, dt = _dropspin(*mark.args, **mark.kwargs)
+        for scene, one in product(scenes, _several(engine) or metafunc.config.stash[RUNS].engines or [None]):
+            ids.append("-".join(filter(None, [_title(scene), one])))
+            cases.append((scene, _several(one), _several(dt)))
+    if cases:
+        metafunc.parametrize("dropspin_result", cases, ids=ids, indirect=True)
 
 
 @pytest.fixture(scope="session")
@@ -468,4 +476,6 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         ends = f"{passed:>{widths[2]}}  {failed:>{widths[3]}}  {told}"
         terminalreporter.write_line(f"{engine:<{widths[0]}}  {scene:<{widths[1]}}  {ends}")
     runs = config.stash[RUNS]
+    if runs.baseline and not any(row["kind"] == "baseline" for found in judged.values() for row in found.values()):
+        terminalreporter.write_line(f"No figure of these runs has been accepted in {runs.baseline}: nothing was held against it.")
     terminalreporter.write_line(f"Reports and figures: {os.path.relpath(runs.folder, runs.root)}/*")

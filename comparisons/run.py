@@ -90,8 +90,8 @@ def prepared(
 
 
 def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
-    """Whether two runs had the same engines, steps, versions, code and machine."""
-    asked = all(earlier["asked"][what] == stamp["asked"][what] for what in ("engines", "dts"))
+    """Whether two runs had the same engines, steps, time limit, versions, code and machine."""
+    asked = all(earlier["asked"][what] == stamp["asked"][what] for what in ("engines", "dts", "time_limit"))
     return asked and all(earlier[what] == stamp[what] for what in ("versions", "python", "cpu", "code", "adapters"))
 
 

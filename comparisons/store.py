@@ -18,6 +18,23 @@ from scenarios import DropspinError, Trajectory, load
 ARRAYS = ("t", "position", "orientation", "velocity", "angular_velocity", "velocity_lag")
 FORMAT = 3
 """Of the folder; 1 had no tolerances, 2 no time limit."""
+STAMPED = {
+    "asked",
+    "started",
+    "versions",
+    "wheels",
+    "python",
+    "platform",
+    "cpu",
+    "cores",
+    "commit",
+    "code",
+    "names",
+    "adapters",
+    "settings",
+}
+ASKED = {"scenes", "engines", "dts", "time_limit"}
+"""What a run's provenance tells, and what of it the run was asked for."""
 OUTCOME = tuple(field.name for field in fields(Outcome))
 
 
@@ -65,6 +82,11 @@ def _restored(folder: Path, arrays: bool) -> Results:
         raise DropspinError(f"{folder}: is a run of another version of dropspin, which this one cannot read; run it again.")
     frame = pd.read_parquet(folder / "results.parquet").astype(COLUMNS)
     tolerances = pd.read_parquet(folder / "tolerances.parquet")["tolerance"].to_numpy()
+    lacking = STAMPED - content["provenance"].keys() | ASKED - content["provenance"]["asked"].keys()
+    if lacking:
+        raise ValueError(f"its provenance lacks {', '.join(sorted(lacking))}")
+    if len(frame) != len(tolerances) or not set(frame["scene"]) <= content["scenes"].keys():
+        raise ValueError("its tables are not of one run")
     files = {kind: content[kind] if arrays else {} for kind in ("trajectories", "ensembles")}
     trajectories = {
         key: Trajectory(**found | {"velocity_lag": float(found["velocity_lag"])})

@@ -12,8 +12,8 @@ from comparisons import Results
 from comparisons.provenance import versions_behind
 from comparisons.regressions.baseline import Baseline
 from comparisons.regressions.checking import ANOTHER_SCENE, KNOWN, Checked
-from comparisons.regressions.figures import regressed
-from comparisons.verdicts import FAILURES
+from comparisons.regressions.figures import figures, regressed
+from comparisons.verdicts import BREAKDOWNS, FAILURES
 from reports.failing import Failing
 from reports.findings import counts as counts_of
 from reports.findings import verdict_sentence
@@ -22,6 +22,7 @@ from reports.html import page
 AT_MOST = 12
 """How many of what failed are told one by one where people read; JUnit and JSON have them all."""
 IN_SUMMARY = 100
+JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 ANNOTATIONS = 10
 """As many as GitHub shows of one step."""
 
@@ -41,14 +42,18 @@ class Held(NamedTuple):
 
 def sentences(checked: Checked, held: Held | None) -> list[str]:
     """What came of a check, the verdict last."""
-    told = verdict_sentence(_without_baseline(checked.results))
+    own = _without_baseline(checked.results)
+    known = own.frame["reason"].str.startswith(KNOWN).sum()
+    told = "" if known and not own.frame["verdict"].isin(JUDGED).any() else verdict_sentence(own)
     if held is None:
         return [told]
     found = checked.changes
     rows = checked.results.frame[(checked.results.frame["kind"] == "baseline") & (checked.results.frame["verdict"] == "failed")]
     listed = [_of_engine(str(engine), some, found) for engine, some in rows.groupby("engine", sort=False)]
     if len(rows):
-        listed += [*_since_then(checked, held.baseline), f"If that is as it should be from now on: {held.to_accept}"]
+        listed += _since_then(checked, held.baseline)
+    if _can_be_accepted(checked.results, rows):
+        listed.append(f"If that is as it should be from now on: {held.to_accept}")
     better, new = (found[found["change"] == change] for change in ("better", "new"))
     if len(better):
         listed.append(f"{_count(better, 'figure')} better than accepted; to hold engines to that from now on: {held.to_accept}")
@@ -57,17 +62,16 @@ def sentences(checked: Checked, held: Held | None) -> list[str]:
     if len(checked.not_run):
         where = checked.not_run.drop_duplicates(["scene", "engine"])
         listed.append(f"{len(checked.not_run):,} accepted figures were not run, of {len(where)} pairs of a scene and an engine.")
-    known = checked.results.frame["reason"].str.startswith(KNOWN).sum()
     if known:
-        listed.append(f"{known:,} checks fail as they were known to when they were accepted.")
+        listed.append("1 check fails as it was known to." if known == 1 else f"{known:,} checks fail as they were known to.")
     failed = len(regressed(found))
     judged = int(found["change"].isin(["same", "better"]).sum()) + failed
     other = rows.loc[rows["reason"].str.startswith(ANOTHER_SCENE), "scene"].nunique()
     if other:
         listed.append(f"{other} {'scene simulates' if other == 1 else 'scenes simulate'} something else than when figures were accepted.")
     if failed or other:
-        return [*listed, f"{failed:,} of {judged:,} accepted figures fail. {told}"]
-    return [*listed, f"{told} All {judged:,} accepted figures hold."]
+        return [*listed, f"{failed:,} of {judged:,} accepted figures fail. {told}".rstrip()]
+    return [*listed, f"{told} All {judged:,} accepted figures hold.".lstrip()]
 
 
 def summary(checked: Checked, held: Held | None, found: Sequence[Failing]) -> str:
@@ -98,9 +102,10 @@ def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bo
             f"{tally.failed:,} checks of this run fail, and will fail dropspin check, whatever is accepted; "
             "--known-failures accepts them as known."
         )
-    unknown = int((results.frame["verdict"].isin(FAILURES) & results.frame["value"].isna()).sum())
+    unknown = tally.failed - int(figures(results)["verdict"].isin(FAILURES).sum())
     if unknown and known_failures:
-        listed.append(f"{unknown:,} checks fail without a figure, which cannot be accepted as known.")
+        checks = "1 check fails" if unknown == 1 else f"{unknown:,} checks fail"
+        listed.append(f"{checks} without a figure that can be held, and cannot be accepted as known.")
     if tally.broken:
         listed.append(f"{tally.broken:,} runs of an engine broke down; what was accepted of them before stays.")
     return listed
@@ -132,6 +137,13 @@ def _of_engine(engine: str, rows: pd.DataFrame, found: pd.DataFrame) -> str:
         where = measured.loc[measured["metric"] == metric, "scene"].unique()
         most = f"; most of all {metric.replace('_', ' ')} in {', '.join(where[:3])}{' …' if len(where) > 3 else ''}"
     return f"{engine}: accepted figures fail in {scenes} of {total} scenes{most}."
+
+
+def _can_be_accepted(results: Results, rows: pd.DataFrame) -> bool:
+    """Whether accepting the run would move any figure that fails: not those of engines that broke down, or are missing."""
+    broken = results.frame.loc[results.frame["verdict"].isin(BREAKDOWNS | {"missing"}), ["scene", "engine"]]
+    lost = pd.MultiIndex.from_frame(rows[["scene", "engine"]]).isin(pd.MultiIndex.from_frame(broken))
+    return bool((~lost | (rows["metric"] != "")).any())
 
 
 def _since_then(checked: Checked, baseline: Baseline) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from comparisons.regressions.history import History, Move
 from comparisons.store import restore
+from reports.html import page
 from reports.numbers import subject, written
 from reports.plots import history_figure
 from reports.written import write_table
@@ -67,15 +68,14 @@ def write(found: History, folder: Path) -> None:
     """`history.csv` and `history.json` with every figure of every run, `history.md`, and a plot for each scene."""
     figures = found.figures.drop(columns="verdict").assign(run=[found.names[number] for number in found.figures["run"]])
     table = figures.merge(found.stamps, on="run")
-    told = table.astype(object).where(table.notna(), None)  # JSON knows no NaN
-    records = [{str(key): value for key, value in row.items()} for row in told.to_dict("records")]
+    known = table.astype(object).where(table.notna(), None)  # JSON knows no NaN
+    records = [{str(key): value for key, value in row.items()} for row in known.to_dict("records")]
     write_table(folder, "history", [str(name) for name in table], records)
     scenes = list(dict.fromkeys(found.figures["scene"]))
     for scene in scenes:
         history_figure(found, scene).savefig(folder / f"{scene}.svg")
-    listed = "\n".join(f"- {sentence}" for sentence in sentences(found))
-    pictures = "\n\n".join(f"## {scene}\n\n![{scene}]({scene}.svg)" for scene in scenes)
-    (folder / "history.md").write_text(f"# Figures over {len(found.names)} runs\n\n{listed}\n\n{pictures}\n", encoding="utf-8")
+    told = page("history.md", runs=len(found.names), sentences=sentences(found), scenes=scenes)
+    (folder / "history.md").write_text(told, encoding="utf-8")
 
 
 def _of_move(found: History, move: Move) -> list[dict[str, str]]:

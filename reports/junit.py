@@ -26,7 +26,7 @@ def junit_xml(results: Results, baseline: str | None = None) -> bytes:
     document = JUnitXml("dropspin")
     frame = results.frame.assign(broke_down=results.breakdowns)
     for engine in results.engines:
-        suite = TestSuite(engine)
+        suite = TestSuite(_printable(engine))
         suite.timestamp = datetime.fromisoformat(results.provenance["started"]).strftime("%Y-%m-%dT%H:%M:%S")
         for name, found in versions_behind(results.provenance).items():
             suite.add_property(name, found)
@@ -43,7 +43,8 @@ def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -
     what = subject(row["metric"], row["kind"], row["truth"]) or "runs"
     at = "" if math.isnan(row["dt"]) else f" at {step(row['dt'])} s"
     took = row["time_per_step"] * row["steps"]
-    case = TestCase(f"{accepted}{what}{at}", classname=f"{row['engine']}.{row['scene']}", time=0.0 if math.isnan(took) else round(took, 6))
+    of = _printable(f"{row['engine']}.{row['scene']}")
+    case = TestCase(f"{accepted}{what}{at}", classname=of, time=0.0 if math.isnan(took) else round(took, 6))
     said = _printable(what_fails(row))
     does_it_again = _printable(f"{said}\nAgain: {again(results, row, baseline)}")
     verdict = row["verdict"]

@@ -81,7 +81,7 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = LARGES
             content = file.read(largest + 1)
         if len(content) > largest:
             raise SceneError(f"{given}: more than {largest:,} bytes; no {what} is that long.")
-        return tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8-sig"))
     except IsADirectoryError:
         raise SceneError(f"{given}: is a directory; a {what} is one TOML file.") from None
     except OSError as error:

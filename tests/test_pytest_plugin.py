@@ -204,17 +204,11 @@ def test_a_test_that_fails(repository):
 
 
 BASELINE = """
-format = 1
-[accepted.a0b1c2d]
-date = 2026-01-31
-reason = "as it was"
-versions = {{}}
-[scenes]
-spin-principal = "{digest}"
-[figures.spin-principal.mine."0.004"]
-angular_momentum_error = {{value = 1e-4, tolerance = 1e-9, by = "a0b1c2d"}}
-[figures.spin-principal.faulty."0.004"]
-angular_momentum_error = {{value = 1e-4, tolerance = 1e-6, by = "a0b1c2d"}}
+format = 2
+accepted.a0b1c2d = {{date = 2026-01-31, reason = "as it was", versions = {{}}}}
+scenes.spin-principal = "{digest}"
+figures.spin-principal.mine."0.004".angular_momentum_error = {{value = 1e-4, tolerance = 1e-9, by = "a0b1c2d"}}
+figures.spin-principal.faulty."0.004".angular_momentum_error = {{value = 1e-4, tolerance = 1e-6, by = "a0b1c2d"}}
 """
 
 
@@ -235,6 +229,53 @@ def test_accepted_figures(repository):
             "Accept: dropspin accept .pytest_cache/d/dropspin/spin-principal-* --baseline base.toml --known-failures --reason *",
         ]
     )
+
+
+def test_what_is_not_accepted_yet_does_not_fail(repository):
+    """A scene that the baseline knows nothing of is judged by what it expects; that nothing was held against it is told."""
+    (repository.path / "base.toml").write_text(BASELINE.format(digest=scenarios.load("spin-principal").digest))
+    repository.makepyfile(
+        test_own="""
+        def test_new(dropspin_check):
+            dropspin_check("needle.toml", dt=0.004)
+    """
+    )
+    done = repository.runpytest_subprocess("--dropspin-baseline", "base.toml", *asked("Mine"))
+    done.assert_outcomes(passed=1)
+    done.stdout.fnmatch_lines(["No figure of these runs has been accepted in base.toml: nothing was held against it."])
+
+
+def test_what_failed_last(repository):
+    """By --lf, as any test's."""
+    repository.runpytest_subprocess(*SCENE, *asked("Mine", "Faulty")).assert_outcomes(passed=3, failed=2, skipped=12)
+    repository.runpytest_subprocess("--lf", *SCENE, *asked("Mine", "Faulty")).assert_outcomes(failed=2, deselected=15)
+
+
+def test_markers_lose_no_scene(repository):
+    """Of the same name, on top of each other; one that does nothing is an error."""
+    scene = {"body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}}
+    repository.makepyfile(
+        test_own=f"""
+        import pytest
+
+        @pytest.mark.dropspin("a/needle.toml", "b/needle.toml", dt=0.004)
+        @pytest.mark.dropspin({scene | {"duration": 1.0}}, {scene | {"duration": 2.0}})
+        def test_each(dropspin_result):
+            pass
+        """,
+        test_idle="""
+        import pytest
+
+        @pytest.mark.dropspin("spin-prinzipal")
+        def test_idle():
+            pass
+        """,
+    )
+    collected = repository.runpytest_subprocess("--collect-only", "-q", "test_own.py", *asked("Mine")).outlines
+    assert len({line for line in collected if "::" in line}) == 4
+    idle = repository.runpytest_subprocess("test_idle.py")
+    assert idle.ret == pytest.ExitCode.INTERRUPTED
+    idle.stdout.fnmatch_lines(["test_idle is marked with scenes, but does not take dropspin_result"])
 
 
 def test_workers_share_a_run(repository):

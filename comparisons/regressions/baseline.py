@@ -1,14 +1,14 @@
 """Accepted figures: a text file, one line a figure, that says since when, why, and of which versions each was accepted.
 
 A figure that has not moved beyond its tolerance stays as it was accepted, so that the difference between two baselines shows what was
-moved on purpose, and nothing else.
+moved on purpose, and nothing else. Each line says all that it is about, so that lines of two branches can stand in one file.
 """
 
 import datetime
 import math
 import os
 import tempfile
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 import pandas as pd
 import tomlkit
 from pydantic import Field
-from tomlkit.items import InlineTable
+from tomlkit.items import InlineTable, Item
 
 from comparisons.ensembles import ENSEMBLE_METRICS
 from comparisons.metrics import METRICS
@@ -30,14 +30,15 @@ from scenarios.body import Table
 from scenarios.errors import did_you_mean
 from scenarios.loading import read_toml
 
-FORMAT = 1
+FORMAT = 2
+"""1 had its figures in tables, whose headings a merge may part from them."""
 LARGEST_FILE = 50_000_000  # bytes
 DIGITS_BELOW = 3
 """A value is written to a two-hundredth of its tolerance, and no shorter than this."""
 KEY_LENGTH = 7
 """Digits of the hash that names an acceptance."""
 HEADER = (
-    "Figures of rigid-body engines, measured by dropspin, accepted by somebody; one line each.",
+    "Figures of rigid-body engines, measured by dropspin, accepted by somebody; one line each: scene, engine, step [s], metric.",
     "value ± tolerance, in the unit of the metric; by: which acceptance it is from.",
     "`dropspin check RUN --baseline FILE` holds a run against them, `dropspin accept RUN` moves them.",
 )
@@ -70,10 +71,11 @@ class _Line(Table):
 class _File(Table):
     """The whole file, but for the figures' lines."""
 
-    format: Literal[1]
-    accepted: dict[str, Acceptance]
-    scenes: dict[str, str]
-    figures: dict[str, dict[str, dict[str, dict[str, Any]]]]
+    format: Literal[2]
+    accepted: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    engines: dict[str, str] = Field(default_factory=dict)
+    scenes: dict[str, str] = Field(default_factory=dict)
+    figures: dict[str, dict[str, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
 
 
 COLUMNS = {**dict.fromkeys(KEY, "str"), "value": "float64", "tolerance": "float64", "unit": "str", "by": "str", "known_failure": "bool"}
@@ -89,12 +91,14 @@ class Baseline:
 
     Attributes:
         acceptances: By key.
+        engines: What to name an engine by to run it, where that is not its label: `my_module:MyEngine`.
         scenes: Of each scene the digest of what is simulated.
         figures: As `regressions.figures` has them, with `by`, the key of the acceptance, and `known_failure`: whether a check that
             the figure fails is not to fail the run, as long as the figure is not worse.
     """
 
     acceptances: Mapping[str, Acceptance] = field(default_factory=dict)
+    engines: Mapping[str, str] = field(default_factory=dict)
     scenes: Mapping[str, str] = field(default_factory=dict)
     figures: pd.DataFrame = field(default_factory=lambda: _table([]))
 
@@ -107,6 +111,7 @@ def load_baseline(path: str | Path) -> Baseline:
     """
     where = str(path)
     written = validated(_File, where, read_toml(Path(path), where, "baseline", LARGEST_FILE))
+    acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     lines = []
     for scene, engines in written.figures.items():
         if scene not in written.scenes:
@@ -118,12 +123,12 @@ def load_baseline(path: str | Path) -> Baseline:
                     here = f"{where}: figures of {scene}, {engine}, {step}: {name}"
                     metric, kind = _metric_and_kind(here, name)
                     line = validated(_Line, here, content)
-                    if line.by not in written.accepted:
-                        raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(written.accepted) or 'none'}.")
+                    if line.by not in acceptances:
+                        raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
                     key = {"scene": scene, "engine": engine, "steps": step, "metric": metric, "kind": kind}
                     unit = "1" if kind == "order" else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
                     lines.append(key | line.model_dump() | {"unit": unit})
-    return Baseline(written.accepted, written.scenes, _table(lines))
+    return Baseline(acceptances, written.engines, written.scenes, _table(lines))
 
 
 def accept(
@@ -150,9 +155,10 @@ def accept(
     broken = results.frame.loc[results.frame["verdict"].isin(BREAKDOWNS | {"missing"}), ["scene", "engine"]].drop_duplicates()
     lost = found[found["change"] == "gone"].merge(broken, on=["scene", "engine"])
     kept = old[same_scene].merge(pd.concat([found[found["change"] == "same"], lost])[KEY], on=KEY)
+    found = found.drop(found.reset_index().merge(lost[KEY], on=KEY)["index"]).reset_index(drop=True)
     if known_failures:
-        failing = pd.MultiIndex.from_frame(mine.loc[mine["known_failure"], KEY])
-        kept = kept.assign(known_failure=pd.MultiIndex.from_frame(kept[KEY]).isin(failing))
+        flags = kept[KEY].merge(mine[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
+        kept = kept.assign(known_failure=flags.where(flags.notna(), kept["known_failure"].to_numpy()).astype(bool).to_numpy())
     acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(results.provenance))
     moved = mine.merge(kept[KEY], on=KEY, how="left", indicator=True)
     moved = moved[moved["_merge"] == "left_only"].assign(by=acceptance.key)
@@ -161,7 +167,8 @@ def accept(
     everything = pd.concat([outside[~outdated], kept, moved], ignore_index=True)[list(COLUMNS)]
     used = set(everything["by"])
     acceptances = {key: one for key, one in {acceptance.key: acceptance, **earlier.acceptances}.items() if key in used}
-    return Baseline(acceptances, {**earlier.scenes, **scenes}, everything), found
+    names = {label: name for label, name in results.provenance["names"].items() if name != label}
+    return Baseline(acceptances, {**earlier.engines, **names}, {**earlier.scenes, **scenes}, everything), found
 
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:
@@ -183,24 +190,36 @@ def write_baseline(baseline: Baseline, path: str | Path) -> None:
 
 
 def _text(baseline: Baseline) -> str:
-    """The file's content; scenes, engines and figures in an order that does not depend on how they came about."""
-    document = tomlkit.document()
-    for line in HEADER:
-        document.add(tomlkit.comment(line))
-    document["format"] = FORMAT
-    document["accepted"] = {
-        key: {"date": one.date, "reason": one.reason, "versions": _inline(one.versions)}
-        for key, one in sorted(baseline.acceptances.items(), key=lambda item: (item[1].date, item[0]))
-    }
-    held = baseline.figures
-    document["scenes"] = {name: digest for name, digest in sorted(baseline.scenes.items()) if name in set(held["scene"])}
-    tables: dict[str, dict[str, dict[str, dict[str, Any]]]] = {}
-    for row in held.sort_values(KEY).to_dict("records"):
-        ending = next((ending for ending, kind in STUDIES.items() if kind == row["kind"]), "")
-        lines = tables.setdefault(row["scene"], {}).setdefault(row["engine"], {}).setdefault(row["steps"], {})
-        lines[row["metric"] + ending] = _inline(_line(row))
-    document["figures"] = tables
-    return tomlkit.dumps(document)
+    """The file's content; its lines in an order that does not depend on how they came about, and none that needs another to be read."""
+    held = baseline.figures.sort_values(KEY)
+    engines, scenes = set(held["engine"]), set(held["scene"])
+    lines = [*(f"# {line}" for line in HEADER), "", f"format = {FORMAT}", ""]
+    for key, one in sorted(baseline.acceptances.items(), key=lambda item: (item[1].date, item[0])):
+        content = {"date": one.date, "reason": one.reason, "versions": _inline(one.versions)}
+        lines.append(_assigned(["accepted", key], _inline(content)))
+    lines.append("")
+    for table, named, used in (("engines", baseline.engines, engines), ("scenes", baseline.scenes, scenes)):
+        lines += [_assigned([table, name], tomlkit.string(told)) for name, told in sorted(named.items()) if name in used]
+    for _, rows in held.groupby(["scene", "engine", "steps"], sort=False):
+        lines.append("")
+        for row in rows.to_dict("records"):
+            lines.append(_assigned(["figures", row["scene"], row["engine"], row["steps"], _name(row)], _inline(_line(row))))
+    return "\n".join(lines) + "\n"
+
+
+def _assigned(path: Sequence[str], content: Item) -> str:
+    return f"{tomlkit.key(path).as_string()} = {content.as_string()}"
+
+
+def _inline(content: Mapping[str, Any]) -> InlineTable:
+    table = tomlkit.inline_table()
+    table.update(content)
+    return table
+
+
+def _name(row: Mapping[Hashable, Any]) -> str:
+    """What a figure is called in the file."""
+    return row["metric"] + next((ending for ending, kind in STUDIES.items() if kind == row["kind"]), "")
 
 
 def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
@@ -208,12 +227,6 @@ def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
     digits = DIGITS_BELOW if value == 0.0 else max(DIGITS_BELOW, DIGITS_BELOW + math.ceil(math.log10(abs(value) / tolerance)))
     line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": row["by"]}
     return line | ({"known_failure": True} if row["known_failure"] else {})
-
-
-def _inline(content: Mapping[str, Any]) -> InlineTable:
-    table = tomlkit.inline_table()
-    table.update(content)
-    return table
 
 
 def _assert_steps(where: str, steps: str) -> None:

@@ -57,6 +57,8 @@ def compare(old: Results, new: Results) -> Changes:
     other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
     before, after = figures(old), figures(new)
     found = changes(*(held[~held["scene"].isin(other)] for held in (asked_for(before, new), asked_for(after, old))))
+    if found.empty and other:
+        raise DropspinError(f"the runs have no figure in common: {', '.join(other)}: another scene now, of the same name.")
     if found.empty:
         raise DropspinError("the runs have no figure in common: no scene, engine and step that both were asked for.")
     found = most_changed_first(found)

@@ -83,10 +83,11 @@ def _moves(results: Sequence[Results], figures_of: Sequence[pd.DataFrame]) -> li
         digests = {name: scene.digest for name, scene in one.scenes.items()}
         other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
         scenes |= digests
+        held = {engine: rows[~rows["scene"].isin(other)] for engine, rows in held.items()}
         measured = {str(engine): rows for engine, rows in figures_of[run].groupby("engine", sort=False)}
         moved = {}
         for engine, now in measured.items():
-            before = held[engine][~held[engine]["scene"].isin(other)]
+            before = held[engine]
             change = changes(before, now)
             moved[engine] = most_changed_first(change[change["change"].isin(["worse", "moved", "better"])])
             stays = change[change["change"].isin(["same", "gone"])]

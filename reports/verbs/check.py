@@ -90,6 +90,7 @@ def accept(runs: tuple[str, ...], reason: str, baseline: str, known_failures: bo
     from comparisons.store import restore
     from reports.gate import accepted_sentences
     from reports.terminal import json_rows
+    from scenarios import DropspinError
 
     if not reason.strip():
         raise click.UsageError("--reason is empty; say why these are the figures from now on.")
@@ -102,6 +103,8 @@ def accept(runs: tuple[str, ...], reason: str, baseline: str, known_failures: bo
         held, found = accepted_with(results, held, reason.strip(), datetime.date.today(), known_failures=known_failures)
         changes.append(found)
         told += accepted_sentences(results, found, known_failures)
+    if held.figures.empty:
+        raise DropspinError(f"{', '.join(runs)}: nothing to accept: no engine measured a figure; {baseline} is not written.")
     write_baseline(held, baseline)
     if json_output:
         click.echo(json_rows(pd.concat(changes)))

@@ -11,6 +11,9 @@ from reports.interrupts import stop_if_interrupted
 from reports.verbs.options import as_json, baseline_option, time_limit_option
 
 if TYPE_CHECKING:
+    from comparisons import Results
+    from comparisons.regressions.checking import Checked
+    from reports.gate import Held
     from scenarios import Scenario
 
 CORE_ENGINES = ("document", "mujoco", "pybullet")
@@ -69,7 +72,6 @@ def run(
     import reports
     import scenarios
     from comparisons.regressions.baseline import load_baseline
-    from comparisons.regressions.checking import check
     from reports import look
     from reports.failing import failing
     from reports.folder import Measured, fill, run_folder
@@ -98,7 +100,6 @@ def run(
                 results = comparisons.run(loaded, chosen, steps, told, limits, measured.keep, measured.parts())
             stop_if_interrupted()
             results = replace(results, provenance={**results.provenance, "named": sorted({name.strip() for name in engines})})
-            checked = check(results, None if held is None else held.baseline)
             if not json_output:
                 reports.print_table(results)
             with status("writing the report"):
@@ -107,6 +108,7 @@ def run(
         kept = len(measured)
         raise KeyboardInterrupt(f"{kept} of {len(loaded)} scenes are kept, --resume goes on" if kept else "nothing was written") from None
     measured.clear()
+    checked = _checked(results, held, json_output)
     if json_output:
         click.echo(json_rows(checked.results.frame))
     else:
@@ -114,6 +116,21 @@ def run(
             tell(checked, held, [one for one in failing(checked.results, baseline) if one.accepted])
         click.echo(f"Report: {os.path.join(output, 'report.html')}")
     return checked.results.exit_code()
+
+
+def _checked(results: "Results", held: "Held | None", json_output: bool) -> "Checked":
+    """What of a run that has been written holds; with nothing to hold it against its rows are told all the same."""
+    from comparisons.regressions.checking import NothingAccepted, check
+    from reports.terminal import json_rows
+    from scenarios import DropspinError
+
+    try:
+        return check(results, None if held is None else held.baseline)
+    except NothingAccepted as error:
+        assert held is not None
+        if json_output:
+            click.echo(json_rows(results.frame))
+        raise DropspinError(f"{held.path}: {error} The run is written: {held.run}.") from None
 
 
 def _print_plan(plan: dict[str, Any], json_output: bool) -> int:

@@ -250,7 +250,11 @@ def test_accepted_figures_are_a_text_that_says_it_all(accepted, tmp_path):
     assert acceptance["reason"] == "as it should be"
     assert acceptance["versions"]["candidate"] == "1.0"
     assert {"dropspin", "numpy", "mujoco", "python"} <= set(acceptance["versions"])
-    assert re.search(r'^restitution_error = \{value = [-0-9.e]+, tolerance = [0-9.e-]+, by = "[0-9a-f]{7}"\}$', text, re.MULTILINE)
+    assert re.search(
+        r'^figures\.drop-ball\.candidate\."0\.004"\.restitution_error = \{value = [-0-9.e]+, tolerance = [0-9.e-]+, by = "[0-9a-f]{7}"\}$',
+        text,
+        re.MULTILINE,
+    )
     again = load_baseline(tmp_path / "accepted.toml")
     both = accepted.figures.merge(again.figures, on=KEY, how="outer", suffixes=("", "_read"))
     assert len(both) == len(accepted.figures) == len(again.figures)
@@ -259,6 +263,14 @@ def test_accepted_figures_are_a_text_that_says_it_all(accepted, tmp_path):
     assert (both["unit"] == both["unit_read"]).all()
     write_baseline(again, tmp_path / "again.toml")
     assert (tmp_path / "again.toml").read_text() == text
+
+
+def test_editors_of_other_systems(accepted, tmp_path):
+    """A byte order mark, and lines that end as on Windows."""
+    write_baseline(accepted, tmp_path / "accepted.toml")
+    text = (tmp_path / "accepted.toml").read_text()
+    (tmp_path / "edited.toml").write_bytes(("\ufeff" + text.replace("\n", "\r\n")).encode())
+    pd.testing.assert_frame_equal(load_baseline(tmp_path / "edited.toml").figures, load_baseline(tmp_path / "accepted.toml").figures)
 
 
 def test_only_what_has_moved_is_accepted_anew(before, accepted):
@@ -279,19 +291,33 @@ def test_only_what_has_moved_is_accepted_anew(before, accepted):
     assert [one.reason for one in back.acceptances.values()].count("a mistake") == 1
 
 
-def test_two_branches_may_each_accept_something(accepted, tmp_path):
-    """Where git finds both at one place, both sides stay: each figure keeps the reason that it was accepted for."""
-    balls, flights = SCENES[:2], SCENES[3:]
-    ours = accept(comparisons.run(balls, [TooLively()]), accepted, "livelier on purpose", TODAY)[0]
-    theirs = accept(comparisons.run(flights, [Euler()]), accepted, "cheaper on purpose", TODAY)[0]
-    for baseline, name in ((accepted, "base"), (ours, "ours"), (theirs, "theirs")):
+def with_reasons(baseline):
+    return [(row, baseline.acceptances[row["by"]].reason) for row in baseline.figures.to_dict("records")]
+
+
+@pytest.mark.parametrize("numpy", ["1.0", "2.0", "3.0"])
+def test_two_branches_may_each_accept_something(numpy, tmp_path):
+    """Scenes, engines and moves; whatever git finds at one place, both sides stay, and each figure has its own reason."""
+
+    def run(scenes, *engines):
+        found = comparisons.run(scenes, engines, [4e-3])
+        return replace(found, provenance={**found.provenance, "versions": {**found.provenance["versions"], "numpy": numpy}})
+
+    ball, backspin, _, fall, tumble = SCENES
+    base = accept(run([ball, fall], Candidate()), Baseline(), "base", TODAY)[0]
+    ours = accept(run([ball, backspin], TooLively()), base, "livelier", TODAY)[0]
+    theirs = accept(run([fall, tumble], Euler(), "mujoco"), base, "cheaper", TODAY)[0]
+    for baseline, name in ((base, "base"), (ours, "ours"), (theirs, "theirs")):
         write_baseline(baseline, tmp_path / name)
-    subprocess.run(["git", "merge-file", "--union", "ours", "base", "theirs"], cwd=tmp_path, check=True)
-    merged = load_baseline(tmp_path / "ours")
-    why = merged.figures["by"].map(lambda by: merged.acceptances[by].reason)
-    for reason, scenes in (("livelier on purpose", balls), ("cheaper on purpose", flights)):
-        assert set(merged.figures.loc[why == reason, "scene"]) == {scene.name for scene in scenes}
-    assert set(why[merged.figures["engine"] == "mujoco"]) == {"as it should be"}  # which neither ran
+    reasons = {}
+    for one in (base, ours, theirs):  # what neither has moved is the base's in all three
+        reasons |= {tuple(row[name] for name in KEY): by for row, by in with_reasons(one) if by != "base" or one is base}
+    for mine, other in (("ours", "theirs"), ("theirs", "ours")):
+        both = subprocess.run(["git", "merge-file", "-p", "--union", mine, "base", other], cwd=tmp_path, capture_output=True, check=True)
+        (tmp_path / "merged").write_bytes(both.stdout)
+        merged = load_baseline(tmp_path / "merged")
+        assert {tuple(row[name] for name in KEY): by for row, by in with_reasons(merged)} == reasons
+    assert set(reasons.values()) == {"base", "livelier", "cheaper"}
 
 
 def test_accepting_the_same_again_changes_nothing(before, accepted):
@@ -366,6 +392,38 @@ def test_figures_that_are_gone_fail(accepted):
     assert checked.results.exit_code() == 3
 
 
+def named(results, **names):
+    return replace(results, provenance={**results.provenance, "names": names, "named": list(names.values())})
+
+
+class Renamed(TooLively):
+    """Calls itself otherwise."""
+
+    name = "renamed"
+
+
+def test_an_engine_is_known_by_what_it_is_asked_for_by(tmp_path, monkeypatch):
+    """One that cannot be imported any more has lost its figures, and one that calls itself otherwise has not got rid of them."""
+    ball = SCENES[:1]
+    base = accept(named(comparisons.run(ball, [Candidate()], [4e-3]), candidate="m:C"), Baseline(), "first", TODAY)[0]
+    assert base.engines == {"candidate": "m:C"}
+    [row] = (
+        failing(check(named(comparisons.run(ball, [Renamed()], [4e-3]), renamed="m:C"), base))
+        .query("metric == 'restitution_error'")
+        .to_dict("records")
+    )
+    assert row["engine"] == "renamed"
+    (tmp_path / "lost_engine.py").write_text("import no_such_library")
+    monkeypatch.syspath_prepend(tmp_path)
+    missing = comparisons.run(ball, ["lost_engine:C"], [4e-3])
+    lost = check(missing, replace(base, engines={"candidate": "lost_engine:C"}))
+    assert failing(lost)["reason"].str.match("^[0-9]+ accepted figures are gone, missing: ").all()
+    assert lost.not_run.empty
+    with pytest.raises(DropspinError, match="none of the"):
+        check(missing, base)
+    assert check(named(missing, **{"lost_engine:C": "lost_engine:C"}), base).results.exit_code() == 3
+
+
 def test_what_was_not_run_is_neither_passed_nor_failed(accepted):
     """But counted."""
     checked = check(comparisons.run(SCENES[:1], ["mujoco"]), accepted)
@@ -389,25 +447,50 @@ def test_known_failures_do_not_fail_until_they_get_worse():
     assert row["reason"] == "accepted as a known failure; none is that stiff"
     worse = replace(found, frame=found.frame.assign(value=found.frame["value"].where(found.frame["metric"] != "penetration", 0.5)))
     assert check(worse, known).results.exit_code() == 1
+    crashed, lost = accept(comparisons.run([scene], [Broken()]), known, "a bad day", TODAY, known_failures=True)
+    assert lost.empty
+    assert check(found, crashed).results.exit_code() == 0
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda text: text.replace("format = 1", "format = 2"), "format: got 2"),
+        (lambda text: text.replace("format = 2", "format = 1"), "format: got 1"),
         (lambda text: re.sub(r'by = "\w+"', 'by = "7"', text, count=1), "by: got '7'; accepted are "),
-        (lambda text: text.replace("restitution_error =", "restitution_eror =", 1), "Did you mean 'restitution_error'?"),
+        (lambda text: text.replace(".restitution_error =", ".restitution_eror =", 1), "Did you mean 'restitution_error'?"),
         (lambda text: text.replace("tolerance = ", "tolerance = -", 1), "tolerance: got -"),
         (lambda text: text.replace("value = ", "valeu = ", 1), "missing; it has no default"),
         (lambda text: re.sub(r"value = [^,]+,", "value = nan,", text, count=1), "value: got nan"),
         (lambda text: text.replace('"0.004"', '"4e-3"', 1), "write it as '0.004'"),
         (lambda text: text.replace('"0.004"', '"fast"', 1), "'fast' is no step"),
-        (lambda text: text.replace("[scenes]", "[scene]"), "missing"),
+        (
+            lambda text: text.replace("scenes.drop-ball =", "scene.drop-ball ="),
+            "scene: unknown key. Allowed: format, accepted, engines, scenes",
+        ),
+        (lambda text: re.sub("^scenes.drop-ball.*$", "", text, flags=re.MULTILINE), "scenes: 'drop-ball' has figures, but no digest"),
+        (lambda text: text.replace(", versions = ", ", version = ", 1), "accepted.6fb36c5: versions: missing"),
+        (lambda text: text + text.splitlines()[-1], "accepted.toml: not TOML: Cannot overwrite a value"),
         (lambda text: text[: len(text) // 2], "accepted.toml: "),
-        (lambda text: text.replace("[figures.", "[figures", 1), "accepted.toml: "),
+        (lambda text: text.replace("figures.", "figures..", 1), "accepted.toml: "),
         (lambda text: "", "missing"),
     ],
-    ids=["format", "acceptance", "metric", "tolerance", "key", "nan", "step", "no step", "scenes", "cut", "brackets", "empty"],
+    ids=[
+        "format",
+        "acceptance",
+        "metric",
+        "tolerance",
+        "key",
+        "nan",
+        "step",
+        "no step",
+        "scene",
+        "digest",
+        "versions",
+        "twice",
+        "cut",
+        "dots",
+        "empty",
+    ],
 )
 def test_bad_baselines_are_refused(accepted, change, message, tmp_path):
     """With the file, the place in it, what was given, and what is allowed."""
@@ -526,6 +609,21 @@ def test_history_finds_the_run_in_which_figures_moved(before):
     assert set(move.figures["scene"]) >= TURNING
     with pytest.raises(DropspinError, match="takes two runs"):
         history({"a": before})
+
+
+def test_a_scene_that_was_changed_while_an_engine_was_away_moves_nothing():
+    """The figures of what it was before are no one's any more."""
+    scene = scenarios.load("fall-spin")
+    longer = scene.model_copy(update={"duration": 1.1 * scene.duration})
+    runs = [
+        comparisons.run([one], engines, [4e-3])
+        for one, engines in ((scene, [Candidate(), "mujoco"]), (longer, ["mujoco"]), (longer, [Candidate(), "mujoco"]))
+    ]
+    assert not history(
+        {str(day): replace(one, provenance={**one.provenance, "started": f"2026-01-0{day}"}) for day, one in enumerate(runs, 1)}
+    ).moves
+    with pytest.raises(DropspinError, match="fall-spin: another scene now, of the same name"):
+        compare(runs[0], runs[1])
 
 
 def test_engines_that_are_exact_are_held_to_rounding():

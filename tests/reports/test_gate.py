@@ -1,5 +1,6 @@
 """The gate on the command line: check, accept, compare and history, what they write for CI servers, and the examples for two of these."""
 
+import datetime
 import json
 import os
 import re
@@ -10,9 +11,15 @@ import tarfile
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import xmlschema
 import yaml
+
+import comparisons
+import scenarios
+from reports.gate import Held, accepted_sentences, sentences
+from reports.junit import junit_xml
 
 ROOT = Path(__file__).parents[2]
 DROPSPIN = Path(sys.executable).with_name("dropspin")
@@ -112,7 +119,8 @@ def test_check(release, repository, schema, tmp_path):
         assert "Since they were accepted: my-engine good → failing." in told
         assert "most of all restitution error in drop-ball" in told
     if release == "crashing":
-        assert "crashed. the process ended with signal 6" in told or "crashed." in told
+        assert f"drop-ball · {LABEL} · 0.004 s: crashed. its process was ended by SIGABRT" in told
+        assert "If that is as it should be" not in told
 
 
 def test_the_command_that_does_it_again(repository, tmp_path):
@@ -136,6 +144,73 @@ def test_a_run_can_be_held_against_accepted_figures_at_once(repository, tmp_path
         done = dropspin(*RUN, "--baseline", "dropspin-baseline.toml", "-o", str(tmp_path / release), cwd=repository, RELEASE=release)
         assert done.returncode == code
         assert said in " ".join(done.stdout.split())
+
+
+def test_a_run_of_what_was_never_accepted_is_kept(repository, tmp_path):
+    """Bad input, but nothing is lost: it can be accepted."""
+    command = ("run", "fall-spin", "-e", ENGINE, "--dt", "0.004", "--baseline", "dropspin-baseline.toml", "-o", str(tmp_path / "new"))
+    done = dropspin(*command, "--json", cwd=repository)
+    assert done.returncode == 2
+    assert "dropspin-baseline.toml: none of the" in done.stderr
+    assert f"The run is written: {tmp_path / 'new'}." in done.stderr
+    assert {row["scene"] for row in json.loads(done.stdout)} == {"fall-spin"}
+    (tmp_path / "b.toml").write_text((repository / "dropspin-baseline.toml").read_text())
+    accepted = dropspin("accept", str(tmp_path / "new"), "--baseline", str(tmp_path / "b.toml"), "--reason", "new", cwd=repository)
+    assert accepted.returncode == 0
+    assert dropspin("check", str(tmp_path / "new"), "--baseline", str(tmp_path / "b.toml"), cwd=repository).returncode == 0
+
+
+def test_a_crash_is_nothing_to_accept(repository, tmp_path):
+    """What was accepted before stays, to the last byte; where there is nothing else, nothing is written."""
+    (tmp_path / "b.toml").write_text((repository / "dropspin-baseline.toml").read_text())
+    done = dropspin("accept", "out/crashing", "--baseline", str(tmp_path / "b.toml"), "--reason", "x", cwd=repository)
+    assert done.returncode == 0
+    assert "gone" not in done.stdout
+    assert "what was accepted of them before stays" in done.stdout
+    assert (tmp_path / "b.toml").read_text() == (repository / "dropspin-baseline.toml").read_text()
+    dropspin("run", "drop-ball", "-e", ENGINE, "-o", str(tmp_path / "dead"), cwd=repository, RELEASE="crashing")
+    done = dropspin("accept", str(tmp_path / "dead"), "--baseline", str(tmp_path / "none.toml"), "--reason", "x", cwd=repository)
+    assert done.returncode == 2
+    assert "nothing to accept: no engine measured a figure" in done.stderr
+    assert not (tmp_path / "none.toml").exists()
+
+
+def test_an_engine_that_cannot_be_imported_any_more(repository, schema, tmp_path):
+    """Has lost what was accepted of it, and CI is told in every form."""
+    (tmp_path / "my_engine.py").write_text("import no_such_library")
+    done = dropspin(*RUN, "-o", "out", cwd=tmp_path)
+    assert done.returncode == 3
+    shutil.copy(repository / "dropspin-baseline.toml", tmp_path)
+    files = ("--junit", "junit.xml", "--summary", "summary.md")
+    done = dropspin("check", "out", "--baseline", "dropspin-baseline.toml", *files, cwd=tmp_path)
+    assert done.returncode == 3
+    assert "accepted figures are gone, missing: " in " ".join(done.stdout.split())
+    schema.validate(tmp_path / "junit.xml")
+    assert (tmp_path / "summary.md").read_text().startswith("## dropspin: ✗")
+
+
+def expecting(metric):
+    harsh = {"metric": metric, "below": 1e-12, "reason": "none is that exact"}
+    return scenarios.load(scenarios.load("drop-ball").model_dump(exclude={"expect"}, exclude_none=True) | {"expect": [harsh]})
+
+
+@pytest.mark.parametrize(
+    ("metric", "accepted", "told"),
+    [
+        ("penetration", [], ["1 check fails as it was known to.", "All 11 accepted figures hold."]),
+        (
+            "energy_error_raw",
+            ["1 check fails without a figure that can be held, and cannot be accepted as known."],
+            ["1 of 1 checks fail. All 11 accepted figures hold."],
+        ),
+    ],
+)
+def test_known_failures_are_told(metric, accepted, told):
+    """Neither as if nothing were expected, nor as if what cannot be held could be."""
+    found = comparisons.run([expecting(metric)], ["mujoco"], [4e-3])
+    base, change = comparisons.accept(found, comparisons.Baseline(), "known", datetime.date(2026, 3, 1), known_failures=True)
+    assert accepted_sentences(found, change, known_failures=True)[1:] == accepted
+    assert sentences(comparisons.check(found, base), Held(base, "b.toml", "out")) == told
 
 
 def test_annotations_are_for_github(repository):
@@ -173,6 +248,7 @@ def test_history(repository, tmp_path):
     assert names == {"history.csv", "history.json", "history.md", "drop-ball.svg", "spin-principal.svg"}
     rows = json.loads((tmp_path / "history/history.json").read_text())
     assert {row["run"] for row in rows} == {"good", "failing", "crashing"}
+    assert "![drop-ball](drop-ball.svg)" in (tmp_path / "history/history.md").read_text().splitlines()
 
 
 @pytest.mark.parametrize(
@@ -238,6 +314,41 @@ def test_folders_that_are_no_runs(file, content, message, repository, tmp_path):
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def without_names(run):
+    content = json.loads((run / "run.json").read_text())
+    del content["provenance"]["names"], content["provenance"]["asked"]["dts"]
+    (run / "run.json").write_text(json.dumps(content))
+
+
+def shorter(run):
+    pd.read_parquet(run / "tolerances.parquet").iloc[1:].to_parquet(run / "tolerances.parquet", index=False)
+
+
+def of_another(run):
+    frame = pd.read_parquet(run / "results.parquet")
+    frame.assign(scene="fall-spin").to_parquet(run / "results.parquet", index=False)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [(without_names, "lacks dts, names"), (shorter, "not of one run"), (of_another, "not of one run")],
+)
+def test_runs_that_are_not_whole(damage, message, repository, tmp_path):
+    """Each file can be read, and they do not belong together: one line that says so."""
+    shutil.copytree(repository / "out/good", tmp_path / "run")
+    damage(tmp_path / "run")
+    done = dropspin("check", "run", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert message in done.stderr
+
+
+def test_names_that_xml_cannot_write(schema, tmp_path):
+    """A scene may be called anything that a file may."""
+    named = expecting("penetration").model_copy(update={"name": "ctl\x01\x0c"})
+    (tmp_path / "junit.xml").write_bytes(junit_xml(comparisons.run([named], ["mujoco"], [4e-3])))
+    schema.validate(tmp_path / "junit.xml")
 
 
 def scripts():

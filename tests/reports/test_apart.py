@@ -63,6 +63,41 @@ def test_no_split_without_a_limit_that_is_known():
         assert "All" not in found.words
 
 
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (Made(4e-2), "Too few of these steps tell it."),
+        (Made(3.14), "Too few of these steps tell it."),
+        (Made(1.0, unit="rad"), "Too few of these steps tell it."),
+        (Made(4e-2, limit=(4e-2, 1e-2, "unresolved")), "Cannot be taken apart: follows no power of the step; take finer steps."),
+        (Made(3.14, limit=(3.14, 1e-2, "unresolved")), "Cannot be taken apart: follows no power of the step; take finer steps."),
+    ],
+)
+def test_why_it_cannot_be_told(made, words):
+    found, split = parts(made)
+    assert all(map(math.isnan, [*split, found.uncertainty]))
+    assert found.words == words
+
+
+def test_of_rounding():
+    found, split = parts(Made(4e-2, limit=(4e-2, 5e-2, "rounding")))
+    assert split == (0.0, 0.0, 0.0)
+    assert found.words == "As small as rounding makes it."
+
+
+def test_a_limit_that_is_less_sure():
+    """With an order the rest is the step's; without one, only if the limit is known well."""
+    told, split = parts(Made(4e-2, limit=(3e-2, 5e-3, "model"), order=1.0))
+    assert split[0] == pytest.approx(1e-2)
+    assert told.words.endswith("the rest is the step's, at order 1.00.")
+    untold, split = parts(Made(4e-2, limit=(3e-2, 5e-3, "model")))
+    assert (math.isnan(split[0]), split[1]) == (True, 3e-2)
+    assert untold.words.endswith("what of it is the step's cannot be told.")
+    flat, split = parts(Made(4e-2, limit=(3e-2, 1e-4, "model")))
+    assert split[0] == pytest.approx(1e-2)
+    assert flat.words.endswith("the rest is the step's.")
+
+
 def test_flat_is_all_the_models():
     found, split = parts(Made(4e-2, limit=(4e-2, 1e-4, "model")))
     assert split == (0.0, 4e-2, 0.0)

@@ -193,6 +193,7 @@ def test_twenty_repeats_on_a_loaded_machine_fail_nothing():
     finally:
         for burner in burners:
             burner.kill()
+            burner.wait()
 
 
 @given(

@@ -234,15 +234,16 @@ def test_resume_runs_again_what_was_asked_differently(tmp_path):
     def count(scene, engine, dt):
         ran.append(dt)
 
-    def runs_again(scene, engines, dts):
+    def runs_again(scene, engines, dts, **limits):
         kept = []
-        comparisons.run([scene], engines, dts, count, keep=kept.append, done=[part])
+        comparisons.run([scene], engines, dts, count, keep=kept.append, done=[part], **limits)
         return len(kept) == 1
 
     assert not runs_again(scene, ["document"], [4e-3])
     assert runs_again(scene, ["document"], [2e-3])
     assert runs_again(scene, ["mujoco"], [4e-3])
     assert runs_again(scene.model_copy(update={"duration": 0.5}), ["document"], [4e-3])
+    assert runs_again(scene, ["document"], [4e-3], limits=comparisons.Limits(processor_time=600.0))
 
 
 def test_an_interrupt_that_is_swallowed_still_stops_the_run(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from comparisons import Results
 from comparisons.provenance import versions_behind
 from comparisons.regressions.baseline import Baseline
 from comparisons.regressions.checking import ANOTHER_SCENE, KNOWN, Checked
-from comparisons.regressions.figures import figures, regressed
+from comparisons.regressions.figures import figures, of_engines_that_broke_down, regressed
 from comparisons.verdicts import BREAKDOWNS, FAILURES
 from reports.failing import Failing
 from reports.findings import counts as counts_of
@@ -52,7 +52,7 @@ def sentences(checked: Checked, held: Held | None) -> list[str]:
     listed = [_of_engine(str(engine), some, found) for engine, some in rows.groupby("engine", sort=False)]
     if len(rows):
         listed += _since_then(checked, held.baseline)
-    if _can_be_accepted(checked.results, rows):
+    if not (of_engines_that_broke_down(rows, checked.results) & (rows["metric"] == "")).all():
         listed.append(f"If that is as it should be from now on: {held.to_accept}")
     better, new = (found[found["change"] == change] for change in ("better", "new"))
     if len(better):
@@ -71,7 +71,7 @@ def sentences(checked: Checked, held: Held | None) -> list[str]:
         listed.append(f"{other} {'scene simulates' if other == 1 else 'scenes simulate'} something else than when figures were accepted.")
     if failed or other:
         return [*listed, f"{failed:,} of {judged:,} accepted figures fail. {told}".rstrip()]
-    return [*listed, f"{told} All {judged:,} accepted figures hold.".lstrip()]
+    return [*listed, f"{told} All {judged:,} accepted figures hold.".lstrip() if judged else told]
 
 
 def summary(checked: Checked, held: Held | None, found: Sequence[Failing]) -> str:
@@ -137,13 +137,6 @@ def _of_engine(engine: str, rows: pd.DataFrame, found: pd.DataFrame) -> str:
         where = measured.loc[measured["metric"] == metric, "scene"].unique()
         most = f"; most of all {metric.replace('_', ' ')} in {', '.join(where[:3])}{' …' if len(where) > 3 else ''}"
     return f"{engine}: accepted figures fail in {scenes} of {total} scenes{most}."
-
-
-def _can_be_accepted(results: Results, rows: pd.DataFrame) -> bool:
-    """Whether accepting the run would move any figure that fails: not those of engines that broke down, or are missing."""
-    broken = results.frame.loc[results.frame["verdict"].isin(BREAKDOWNS | {"missing"}), ["scene", "engine"]]
-    lost = pd.MultiIndex.from_frame(rows[["scene", "engine"]]).isin(pd.MultiIndex.from_frame(broken))
-    return bool((~lost | (rows["metric"] != "")).any())
 
 
 def _since_then(checked: Checked, baseline: Baseline) -> list[str]:

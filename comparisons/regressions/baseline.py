@@ -21,10 +21,9 @@ from tomlkit.items import InlineTable, Item
 from comparisons.ensembles import ENSEMBLE_METRICS
 from comparisons.metrics import METRICS
 from comparisons.provenance import digest, versions_behind
-from comparisons.regressions.figures import KEY, asked_for, changes, figures
+from comparisons.regressions.figures import KEY, asked_for, changes, figures, of_engines_that_broke_down
 from comparisons.results import Results
 from comparisons.validating import validated
-from comparisons.verdicts import BREAKDOWNS
 from scenarios import DropspinError
 from scenarios.body import Table
 from scenarios.errors import did_you_mean
@@ -134,7 +133,7 @@ def load_baseline(path: str | Path) -> Baseline:
 def accept(
     results: Results, earlier: Baseline, reason: str, date: datetime.date, *, known_failures: bool = False
 ) -> tuple[Baseline, pd.DataFrame]:
-    """The baseline that a run's figures make of an earlier one, and how they differ from what was accepted, as `changes` has it.
+    """The baseline that a run's figures make of an earlier one, and how it differs from that, as `changes` has it.
 
     Figures of scenes, engines and steps that the run is not of stay; so do figures that have not moved beyond their tolerance, and those of
     engines that broke down in a scene, or are missing: that is nothing to accept. Of a scene that simulates something else now, all go.
@@ -152,10 +151,8 @@ def accept(
     scenes = {name: scene.digest for name, scene in results.scenes.items()}
     same_scene = old["scene"].map(lambda name: earlier.scenes[name] == scenes[name]).astype(bool)
     found = changes(old[same_scene], mine)
-    broken = results.frame.loc[results.frame["verdict"].isin(BREAKDOWNS | {"missing"}), ["scene", "engine"]].drop_duplicates()
-    lost = found[found["change"] == "gone"].merge(broken, on=["scene", "engine"])
-    kept = old[same_scene].merge(pd.concat([found[found["change"] == "same"], lost])[KEY], on=KEY)
-    found = found.drop(found.reset_index().merge(lost[KEY], on=KEY)["index"]).reset_index(drop=True)
+    lost = (found["change"] == "gone") & of_engines_that_broke_down(found, results)
+    kept = old[same_scene].merge(found.loc[(found["change"] == "same") | lost, KEY], on=KEY)
     if known_failures:
         flags = kept[KEY].merge(mine[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
         kept = kept.assign(known_failure=flags.where(flags.notna(), kept["known_failure"].to_numpy()).astype(bool).to_numpy())
@@ -168,7 +165,7 @@ def accept(
     used = set(everything["by"])
     acceptances = {key: one for key, one in {acceptance.key: acceptance, **earlier.acceptances}.items() if key in used}
     names = {label: name for label, name in results.provenance["names"].items() if name != label}
-    return Baseline(acceptances, {**earlier.engines, **names}, {**earlier.scenes, **scenes}, everything), found
+    return Baseline(acceptances, {**earlier.engines, **names}, {**earlier.scenes, **scenes}, everything), found[~lost]
 
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:

@@ -56,10 +56,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     if baseline is None:
         nothing = figures(results).iloc[:0]
         return Checked(results, changes(nothing, nothing), nothing)
-    # An engine that cannot be imported, or calls itself otherwise now, is known by what it was asked for by.
-    called = {name: label for label, name in results.provenance["names"].items()}
-    labels = {old: called[name] for old, name in baseline.engines.items() if old not in results.engines and name in called}
-    accepted = asked_for(baseline.figures.assign(engine=baseline.figures["engine"].replace(labels)), results)
+    accepted = asked_for(_by_their_names_now(baseline, results), results)
     if accepted.empty and not results.breakdowns.any():
         raise NothingAccepted(
             f"none of the {len(baseline.figures):,} accepted figures is of this run's scenes, engines and steps; "
@@ -78,6 +75,15 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     frame = pd.concat([_known(results, found), judged], ignore_index=True)
     tolerances = np.concatenate([results.tolerances, np.full(len(judged), np.nan)])
     return Checked(replace(results, frame=frame, tolerances=tolerances), found, baseline.figures.drop(accepted.index))
+
+
+def _by_their_names_now(baseline: Baseline, results: Results) -> pd.DataFrame:
+    """The accepted figures; an engine that cannot be imported, or calls itself otherwise now, is known by what it was asked for by."""
+    called = {name: label for label, name in results.provenance["names"].items()}
+    there = {*results.engines}
+    known = {old: called[name] for old, name in baseline.engines.items() if old not in there and name in called}
+    renamed = {old: now for old, now in known.items() if now not in set(baseline.figures["engine"])}
+    return baseline.figures.assign(engine=baseline.figures["engine"].replace(renamed))
 
 
 def _row(found: dict[Any, Any], baseline: Baseline) -> Row:

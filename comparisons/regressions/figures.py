@@ -8,6 +8,7 @@ import pandas as pd
 
 from comparisons.results import Results
 from comparisons.studies import ARTEFACTS, JUMPING, STUDIES
+from comparisons.verdicts import BREAKDOWNS
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
 """What tells figures apart; `steps` is the time step in words, of orders and limits all the steps that they were found from."""
@@ -44,6 +45,13 @@ def asked_for(held: pd.DataFrame, results: Results) -> pd.DataFrame:
     """Those of some figures that are of scenes, engines and steps that a run was asked for."""
     steps = {_every(results), *map(repr, _dts(results))}
     return held[held["scene"].isin(list(results.scenes)) & held["engine"].isin(results.engines) & held["steps"].isin(steps)]
+
+
+def of_engines_that_broke_down(rows: pd.DataFrame, results: Results) -> "pd.Series[bool]":
+    """Which of some rows are of engines that broke down in the scene, or are missing: what they have not measured is nobody's wish."""
+    pairs = ["scene", "engine"]
+    broken = results.frame.loc[results.frame["verdict"].isin(BREAKDOWNS | {"missing"}), pairs]
+    return pd.Series(pd.MultiIndex.from_frame(rows[pairs]).isin(pd.MultiIndex.from_frame(broken)), rows.index)
 
 
 def _every(results: Results) -> str:

@@ -79,10 +79,9 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
 
 def _by_their_names_now(baseline: Baseline, results: Results) -> pd.DataFrame:
     """The accepted figures; an engine that cannot be imported, or calls itself otherwise now, is known by what it was asked for by."""
-    called = {name: label for label, name in results.provenance["names"].items()}
-    there = {*results.engines}
-    known = {old: called[name] for old, name in baseline.engines.items() if old not in there and name in called}
-    renamed = {old: now for old, now in known.items() if now not in set(baseline.figures["engine"])}
+    held = set(baseline.figures["engine"])
+    called = {name: label for label, name in results.provenance["names"].items() if label not in held}
+    renamed = {old: called[name] for old, name in baseline.engines.items() if old not in results.engines and name in called}
     return baseline.figures.assign(engine=baseline.figures["engine"].replace(renamed))
 
 

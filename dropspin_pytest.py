@@ -173,7 +173,7 @@ class Runs:
         """The installed command, in the root directory; pytest's `pythonpath` holds for the user's engines too."""
         paths = [*map(str, self.config.getini("pythonpath")), *filter(None, [os.environ.get("PYTHONPATH")])]
         environment = os.environ | {"PYTHONIOENCODING": "utf-8", "PYTHONPATH": os.pathsep.join(paths)}
-        command = [sys.executable, "-P", "-m", "dropspin_command", *arguments]
+        command = [sys.executable, "-P", "-m", "dropspin", *arguments]
         return subprocess.run(
             command, cwd=self.root, env=environment, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", check=False
         )
@@ -275,7 +275,7 @@ def _told(row: Row) -> str:
     """A row in a line: what it is of, its value, its bound, and the ratio of the two."""
     if not row["metric"]:
         return f"{row['verdict']}: {row['reason']}"
-    of = row["truth"] if row["kind"] == "baseline" else {"order": "order", "model_error": "limit"}.get(row["kind"], "")
+    of = row["truth"] if row["kind"] == "baseline" else {"order": "order", "asymptotic_error": "limit"}.get(row["kind"], "")
     at = "" if row["dt"] is None else f" at {row['dt']:g} s"
     what = f"{of}{' of' if of not in ('', 'accepted') else ''} {row['metric']}{at}".strip()
     value, lower, upper, bound = row["value"], row["lower"], row["upper"], _bound(row)

@@ -21,7 +21,7 @@ import scenarios
 from comparisons.engines.document import Document, DocumentSimulation, reference_body, reference_world
 from comparisons.engines.mujoco_engine import MuJoCo, MuJoCoSimulation
 from comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
-from comparisons.simulating import attempt_by
+from comparisons.running.recording import run_engine
 from comparisons.sweeps import load_sweep, run_sweep
 
 JOBS = 10_000
@@ -56,7 +56,7 @@ def watch(owner: type, name: str, part: str) -> None:
 class Here:
     """In the place of processes of their own."""
 
-    def __init__(self, limits: comparisons.Limits) -> None:
+    def __init__(self, limits: comparisons.ResourceLimits) -> None:
         pass
 
     def __enter__(self) -> "Here":
@@ -65,9 +65,9 @@ class Here:
     def __exit__(self, *error: object) -> None:
         pass
 
-    def attempt(self, contestant: Any, scene: Any, dt: float, phases: Any) -> Any:
+    def attempt(self, entry: Any, scene: Any, dt: float, phases: Any) -> Any:
         """What an engine's process would do."""
-        return attempt_by(contestant, scene, dt, [phase.scene for phase in phases])
+        return run_engine(entry, scene, dt, [phase.scene for phase in phases])
 
 
 def run_cost() -> None:
@@ -77,7 +77,7 @@ def run_cost() -> None:
     for engine in (Document, MuJoCo, PyBullet):
         watch(engine, "prepare", "building")
     watch(Document, "record_ensemble", "stepping and recording")
-    import_module("comparisons.run").Cells = Here
+    import_module("comparisons.running.run").EngineProcesses = Here
     core = [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags]
     comparisons.run(core[:1], ["document"])  # compiled
     spent.clear()

@@ -1,6 +1,6 @@
 """How fast the note's method runs beside MuJoCo and PyBullet: `make bench`.
 
-All contestants step the same box in one process, in turn, round after round; what is printed are ratios of the best and of the median
+All entries step the same box in one process, in turn, round after round; what is printed are ratios of the best and of the median
 times, because absolute times on a shared machine are noise. Not compared are the models: the engines solve four contact points with
 friction cones for articulated systems, the note one impulse.
 """
@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 import reference_impl
 import scenarios
-from comparisons import engine
-from comparisons.provenance import processor, versions
+from comparisons.engines.registry import engine
+from comparisons.results.provenance import processor, versions
 from reference_impl import lanes
 from reference_impl.methods import ROTATIONS
 from reference_impl.simulate import usable_cores
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 ROUNDS = 15
 WINDOW = 0.02
-"""Seconds that each contestant runs in a round, over and over: long beside what a processor takes to settle after the one before."""
+"""Seconds that each entry runs in a round, over and over: long beside what a processor takes to settle after the one before."""
 STEPS = 5000
 DT = 1e-3
 BODIES = 1024
@@ -71,11 +71,11 @@ class Run:
     close: Callable[[], None] = lambda: None
 
 
-Contestant = Callable[[], Run]
+EngineEntry = Callable[[], Run]
 """Builds a run anew; building is not timed."""
 
 
-def alone(label: str, name: str, recording: bool) -> Contestant:
+def alone(label: str, name: str, recording: bool) -> EngineEntry:
     """An engine on one body, stepping alone or recording every step."""
     chosen = engine(label)
 
@@ -86,7 +86,7 @@ def alone(label: str, name: str, recording: bool) -> Contestant:
     return build
 
 
-def rollout(name: str) -> Contestant:
+def rollout(name: str) -> EngineEntry:
     """MuJoCo's own loop that records every step."""
     import mujoco
     from mujoco.rollout import rollout as mujoco_rollout
@@ -102,7 +102,7 @@ def rollout(name: str) -> Contestant:
     return build
 
 
-def ensemble(name: str, bodies: int = BODIES, steps: int = STEPS, threads: int = 1) -> Contestant:
+def ensemble(name: str, bodies: int = BODIES, steps: int = STEPS, threads: int = 1) -> EngineEntry:
     """The note for many bodies in one call, each with a start of its own (at rest: the same)."""
     spread = np.random.default_rng(0).normal(size=(bodies, 7)) if name != "rest" else np.zeros((bodies, 7))
     starts = np.tile(scene(name).initial_state, (bodies, 1))
@@ -123,15 +123,15 @@ def body_and_world(name: str) -> tuple[reference_impl.Body, reference_impl.World
     return body, reference_impl.World(np.array([0.0, -9.8, 0.0]), floor)
 
 
-def prepared(start: Array, body: reference_impl.Body, world: reference_impl.World, rotation: str = "note") -> Contestant:
+def prepared(start: Array, body: reference_impl.Body, world: reference_impl.World, rotation: str = "note") -> EngineEntry:
     """The reference implementation by itself."""
     simulator = reference_impl.Simulator(body, world, DT, reference_impl.Methods(rotation=rotation))
     simulator.run(start, 1)
     return lambda: Run(partial(simulator.run, start, STEPS, STEPS))
 
 
-def timed(makers: dict[str, Contestant]) -> dict[str, list[float]]:
-    """Nanoseconds a step and body of each contestant, once a round, in turn."""
+def timed(makers: dict[str, EngineEntry]) -> dict[str, list[float]]:
+    """Nanoseconds a step and body of each entry, once a round, in turn."""
     runs = {}
     for label, make in makers.items():
         first = make()
@@ -154,14 +154,14 @@ def nanoseconds_a_step(runs: list[Run]) -> float:
     return taken / sum(run.body_steps for run in runs) * 1e9
 
 
-def rotations() -> dict[str, Contestant]:
+def rotations() -> dict[str, EngineEntry]:
     """Every rotation method on a free body."""
     body = reference_impl.Body(1.0, np.diag([1.0, 2.0, 3.0]), np.full((1, 3), 0.1))
     start = np.array([0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0.3, 0.8, -0.5])
     return {name: prepared(start, body, reference_impl.World(), name) for name in ROTATIONS}
 
 
-def parts() -> dict[str, Contestant]:
+def parts() -> dict[str, EngineEntry]:
     """A ball in flight with everything modelled, and with one part after the other left out."""
     ball = reference_impl.Body(1.0, 0.004 * np.eye(3), np.zeros((1, 3)), 0.1)
     turning = np.array([0, 1e3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1e-3])
@@ -176,7 +176,7 @@ def parts() -> dict[str, Contestant]:
     }
 
 
-def floors() -> dict[str, Contestant]:
+def floors() -> dict[str, EngineEntry]:
     """Each engine in flight, with no floor modelled and with one that it never meets."""
     names = {"flight": "no floor", "far": "a floor far below"}
     return {

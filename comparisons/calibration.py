@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine
-from comparisons.isolation import Cells, Failed, Limits
-from comparisons.phases import PHASES
-from comparisons.simulating import Contestant, assert_step_fits
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import EngineEntry, verify_time_step
+from comparisons.running.start_phases import START_PHASES
 from scenarios import DropspinError, Scenario, load
 
 Array = NDArray[np.float64]
@@ -76,7 +76,7 @@ def calibrate(
     dt: float,
     friction: str | float = "none",
     shape: Shape = "ball",
-    limits: Limits = Limits(),  # noqa: B008 - it cannot be changed
+    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
 ) -> Calibration:
     """The settings that give a restitution at a time step, measured.
 
@@ -86,7 +86,7 @@ def calibrate(
         dt: Time step [s].
         friction: 'none', 'infinite' or a coefficient.
         shape: What falls, flat onto a floor.
-        limits: What the measurement may use.
+        resources: What the measurement may use.
 
     Raises:
         DropspinError: The engine has no such settings, or broke down with them.
@@ -101,25 +101,25 @@ def calibrate(
             "floor": {"restitution": restitution, "friction": friction},
         }
     )
-    assert_step_fits(scene, dt)
+    verify_time_step(scene, dt)
     refusal = engine.declines(scene)
     if refusal is not None:
         raise DropspinError(f"{engine.label} cannot be calibrated for that: {refusal}.")
     programs = engine.programs(scene, dt)
     if not programs:
         raise DropspinError(f"{engine.label} has no settings to calibrate; engines that have are mujoco and pybullet.")
-    with Cells(limits) as cells:
+    with EngineProcesses(resources) as processes:
         try:
-            settings, measured = cells.call(Contestant(engine.label, engine), _measured, scene, dt, programs["python"])
+            settings, measured = processes.call(EngineEntry(engine.label, engine), _measured, scene, dt, programs["python"])
         except Failed as failure:
             raise DropspinError(f"{engine.label} broke down with these settings: {failure.reason}.") from None
     return Calibration(engine.label, settings, engine.reasons, programs, measured)
 
 
-def _measured(contestant: Contestant, scene: Scenario, dt: float, program: str) -> tuple[dict[str, Any], tuple[Measured, ...]]:
+def _measured(entry: EngineEntry, scene: Scenario, dt: float, program: str) -> tuple[dict[str, Any], tuple[Measured, ...]]:
     """What the engine sets, and what a program does."""
-    assert contestant.engine is not None
-    with contestant.engine.prepare(scene, dt) as simulation:
+    assert entry.engine is not None
+    with entry.engine.prepare(scene, dt) as simulation:
         settings = dict(simulation.settings)
     names: dict[str, Any] = {"__name__": "pasted"}
     exec(compile(program, "pasted", "exec"), names)
@@ -135,7 +135,7 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
     if not rests:
         low, slow = np.full_like(low, np.nan), np.full_like(slow, np.nan)
     half, _, _ = _bounces(motion, dt / 2.0)
-    at_impact = f"over {PHASES} drops from {DROP:g} m, which strike at as many places in a step"
+    at_impact = f"over {START_PHASES} drops from {DROP:g} m, which strike at as many places in a step"
     at_rest = f"dropped from {1e3 * LOW_DROP:g} mm, in the fifth second" if rests else "it does not come to rest within 5 s"
     step, how = _largest_step(motion, dt)
     return [
@@ -155,10 +155,10 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
 def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
     """Of drops that strike at as many places in a step: ratios of speeds, roots of ratios of heights, and the greatest depth [m]."""
     ratios, roots, deepest = [], [], 0.0
-    for part in (np.arange(PHASES) + 0.5) / PHASES:
+    for part in (np.arange(START_PHASES) + 0.5) / START_PHASES:
         drop = DROP + IMPACT * dt * part
         # The fall, and as long as the highest rebound takes to its apex; some steps more for those that take several.
-        heights, speeds = map(np.array, motion(drop, math.ceil(2.0 * IMPACT / GRAVITY / dt) + PHASES, dt))
+        heights, speeds = map(np.array, motion(drop, math.ceil(2.0 * IMPACT / GRAVITY / dt) + START_PHASES, dt))
         down = int(np.argmin(speeds))
         up = down + int(np.argmax(speeds[down:]))
         ratios.append(max(0.0, speeds[up]) / -speeds[down])

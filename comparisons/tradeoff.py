@@ -1,7 +1,7 @@
 """What accuracy costs: the error of each engine and method at each step, against the time it takes.
 
 Errors are of states at a fixed rate of output, whatever the step, so that a method is not held to its own few rows. Timed is native
-stepping alone, of contestants in turn, round after round: what disturbs one round disturbs all of it, and ratios are taken round by round.
+stepping alone, of entries in turn, round after round: what disturbs one round disturbs all of it, and ratios are taken round by round.
 """
 
 import math
@@ -13,15 +13,14 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.comparison import Comparison, Unresolved
 from comparisons.engines.base import Diverged, Engine
-from comparisons.isolation import Cells, Failed, Limits
-from comparisons.metrics import METRICS, metrics_for
-from comparisons.phases import Phase, start_phases
-from comparisons.simulating import MOST_STEPS, Contestant, contestant_named, simulate
+from comparisons.measuring.comparison import Comparison, Unresolved
+from comparisons.measuring.metrics import METRICS, leading_metric, metrics_for
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import MOST_STEPS, EngineEntry, as_scene, engine_entry, record, time_steps
+from comparisons.running.start_phases import StartPhase, start_phases
 from scenarios import DropspinError, Scenario, truth_for
 from scenarios.errors import UnknownName
-from scenarios.rotations import angle_between_orientations
 
 Array = NDArray[np.float64]
 
@@ -48,7 +47,6 @@ ON_A_FLOOR = (
 )
 DIVISIONS = (1, *(k * 2**j for j in range(22) for k in (2, 3)))
 """1, 2, 3, 4, 6, 8, 12, …: steps an output, each some 1.4 times as many as before."""
-TURNS = 1e-3  # rad
 FEWEST_OUTPUTS = 8
 LARGEST_TURN = 1.0  # rad a step, at the coarsest
 ROUNDS = 9
@@ -137,7 +135,7 @@ class TradeOff:
     def recommendation(self, within: float) -> Recommendation | None:
         """The cheapest within a tolerance; None if nothing is.
 
-        Of each engine that is the coarsest step that is within it together with all finer ones: a step whose error crosses 0 is luck.
+        Of each engine that is the coarsest step that is within it together with all finer ones: a step whose error crosses 0 is sampling_noise.
         """
         coarsest = self._coarsest(within)
         if not coarsest:
@@ -175,24 +173,13 @@ def _front(points: Sequence[Point], cost: Callable[[Point], float]) -> list[Poin
     return front
 
 
-def default_metric(scene: Scenario) -> str:
-    """What a scene is about: how high it bounces, or where it points to, if it turns, or where it gets to."""
-    truth = truth_for(scene)
-    assert truth is not None
-    names = {metric.name for metric in metrics_for(scene, truth)}
-    if "bounce_height_error" in names:
-        return "bounce_height_error"
-    motion = truth(np.linspace(0.0, min(scene.duration, truth.horizon), 9))
-    turned = angle_between_orientations(motion.orientation[:1], motion.orientation)
-    return "orientation_error" if turned.max() > TURNS else "position_error"
-
-
 def tradeoff(
-    scene: Scenario,
-    engines: Sequence[str] = (),
+    scene: Scenario | str,
+    engines: Sequence[str | Engine] = (),
     metric: str | None = None,
-    progress: Callable[[str, float], None] = lambda what, share: None,
-    limits: Limits = Limits(),  # noqa: B008 - it cannot be changed
+    *,
+    on_progress: Callable[[str, float], None] = lambda what, share: None,
+    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
 ) -> TradeOff:
     """Measure error and time of engines over a ladder of steps.
 
@@ -200,43 +187,44 @@ def tradeoff(
         scene: A scene with a truth.
         engines: Names with options; by default the methods that the scene lets differ.
         metric: The metric; by default what the scene is about.
-        progress: Called with a word on what is done, and the share of all of it.
-        limits: What each run may use.
+        on_progress: Called with what is done, and the share of all of it.
+        resources: What each run may use.
 
     Raises:
         DropspinError: The scene has no truth, or not this metric; or no engine runs it.
     """
+    scene = as_scene(scene)
     truth = truth_for(scene)
     if truth is None:
-        raise DropspinError(f"{scene.name} has no truth to hold errors against; choose a scene that has, see dropspin list.")
-    of_the_motion = default_metric(scene)
+        raise DropspinError(f"{scene.name} has no exact solution to compare with; choose a scene that has one, see dropspin list.")
+    of_the_motion = leading_metric(scene)
     chosen = metric or of_the_motion
     known = [one.name for one in metrics_for(scene, truth)]
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
-    contestants = [contestant_named(name) for name in engines or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
-    points: list[tuple[Contestant, float, float]] = []
+    entries = [engine_entry(name) for name in engines or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    points: list[tuple[EngineEntry, float, float]] = []
     left_out: dict[str, str] = {}
-    with Cells(limits) as cells:
-        for number, contestant in enumerate(contestants):
+    with EngineProcesses(resources) as processes:
+        for number, entry in enumerate(entries):
             try:
-                errors = _errors(contestant, scene, [chosen, of_the_motion], cells)
+                errors = _errors(entry, scene, [chosen, of_the_motion], processes)
             except Failed as failure:
-                left_out[contestant.label] = failure.reason
+                left_out[entry.label] = failure.reason
                 continue
-            points += [(contestant, dt, error) for dt, error, _ in errors]
-            progress(f"errors of {contestant.label}", 0.5 * (number + 1) / len(contestants))
+            points += [(entry, dt, error) for dt, error, _ in errors]
+            on_progress(f"errors of {entry.label}", 0.5 * (number + 1) / len(entries))
         if not points:
             raise DropspinError(f"no engine runs {scene.name}: {'; '.join(f'{label}: {why}' for label, why in left_out.items())}.")
         costs: list[list[float]] = [[] for _ in points]
         for number in range(ROUNDS):
-            for cost, (contestant, dt, _) in zip(costs, points, strict=True):
-                cost.append(cells.call(contestant, _cost, scene, dt))
-            progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
+            for cost, (entry, dt, _) in zip(costs, points, strict=True):
+                cost.append(processes.call(entry, _cost, scene, dt))
+            on_progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
         together: list[float] = []
-        for contestant, some in groupby(points, lambda point: point[0]):
-            together += cells.call(contestant, _costs_side_by_side, scene, [dt for _, dt, _ in some])
-        progress("ensembles", 1.0)
+        for entry, some in groupby(points, lambda point: point[0]):
+            together += processes.call(entry, _costs_side_by_side, scene, [dt for _, dt, _ in some])
+        on_progress("ensembles", 1.0)
     found = tuple(
         Point(one.label, dt, error, np.array(cost), apiece) for (one, dt, error), cost, apiece in zip(points, costs, together, strict=True)
     )
@@ -255,27 +243,27 @@ def output_interval(scene: Scenario) -> float:
     return min(intervals)
 
 
-def _errors(contestant: Contestant, scene: Scenario, metrics: Sequence[str], cells: Cells) -> list[tuple[float, float, float]]:
+def _errors(entry: EngineEntry, scene: Scenario, metrics: Sequence[str], processes: EngineProcesses) -> list[tuple[float, float, float]]:
     """Steps and errors by two metrics, from the coarsest step to the method's floor by the first, or as far as the budget goes.
 
     By the second it must converge, else it is another motion that it is good at: the note keeps the energy of a spin that it gets wrong.
     """
-    if contestant.engine is None:
-        raise Failed("missing", contestant.missing)
-    refusal = contestant.engine.declines(scene)
+    if entry.engine is None:
+        raise Failed("missing", entry.missing)
+    refusal = entry.engine.declines(scene)
     if refusal is not None:
         raise Failed("declined", refusal)
     interval = output_interval(scene)
     budget = BUDGET_IN_FLIGHT if scene.floor is None else BUDGET_ON_A_FLOOR
     found: list[tuple[float, float, float]] = []
     stuck = 0
-    cells.call(contestant, _error, scene, interval, 1, metrics)  # compiled, and warm, before anything is timed
+    processes.call(entry, _error, scene, interval, 1, metrics)  # compiled, and warm, before anything is timed
     for division in DIVISIONS:
         dt = interval / division
         if scene.duration / dt > (MOST_STEPS if scene.floor is None else MOST_RECORDED):
             break
         try:
-            errors, taken = cells.call(contestant, _error, scene, dt, division, metrics)
+            errors, taken = processes.call(entry, _error, scene, dt, division, metrics)
         except Failed:
             if found:
                 break  # what it can is measured
@@ -297,17 +285,17 @@ def _errors(contestant: Contestant, scene: Scenario, metrics: Sequence[str], cel
     return found
 
 
-def _error(contestant: Contestant, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
+def _error(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
     """Sizes of metrics' values at a step, NaN where it has none; and how long the run took [s]."""
-    assert contestant.engine is not None
+    assert entry.engine is not None
     truth = truth_for(scene)
     in_flight = scene.floor is None
-    phases = [Phase(scene, truth)] if in_flight else start_phases(scene, truth, dt)
+    phases = [StartPhase(scene, truth)] if in_flight else start_phases(scene, truth, dt)
     taken, cases = 0.0, []
     for phase in phases:
         start = time.perf_counter()
         try:
-            motion = simulate(phase.scene, contestant.engine, dt, every=division if in_flight else 1)
+            motion = record(entry.engine, phase.scene, dt, division if in_flight else 1).motion
         except Diverged:
             return [math.nan] * len(metrics), 0.0
         taken += time.perf_counter() - start
@@ -323,7 +311,7 @@ def _size(metric: str, cases: Sequence[Comparison]) -> float:
         return math.nan
 
 
-def _cost(contestant: Contestant, scene: Scenario, dt: float) -> float:
+def _cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     """Time a simulated second of native stepping [s/s]; NaN if the state it leads to is none.
 
     In flight a step takes what it takes: one call of so many steps is timed that the call itself does not count, past the scene's end if
@@ -331,39 +319,36 @@ def _cost(contestant: Contestant, scene: Scenario, dt: float) -> float:
     """
     if scene.floor is None:
         steps = 16
-        while (taken := _timed(contestant, scene, dt, steps)) < LONG_ENOUGH and steps < MOST_STEPS:
+        while (taken := _timed(entry, scene, dt, steps)) < LONG_ENOUGH and steps < MOST_STEPS:
             steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * LONG_ENOUGH / taken))))
         if np.isfinite(taken):
             return taken / (steps * dt)
     steps, total, runs = scene.steps(dt), 0.0, 0
     while total < LONG_ENOUGH and runs < MOST_RUNS:
-        total, runs = total + _timed(contestant, scene, dt, steps), runs + 1
+        total, runs = total + _timed(entry, scene, dt, steps), runs + 1
     return total / runs / (steps * dt)
 
 
-def _timed(contestant: Contestant, scene: Scenario, dt: float, steps: int) -> float:
+def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
     """How long some native steps take [s]; NaN if the engine has no state after them."""
-    assert contestant.engine is not None
-    with contestant.engine.prepare(scene, dt) as simulation:
-        start = time.perf_counter()
-        try:
-            simulation.advance(steps)
-        except Diverged:
-            return math.nan
-        taken = time.perf_counter() - start
-        return taken if np.isfinite(simulation.state()).all() else math.nan
+    assert entry.engine is not None
+    try:
+        taken, state = time_steps(entry.engine, scene, dt, steps)
+    except Diverged:
+        return math.nan
+    return taken if np.isfinite(state).all() else math.nan
 
 
-def _costs_side_by_side(contestant: Contestant, scene: Scenario, dts: Sequence[float]) -> list[float]:
+def _costs_side_by_side(entry: EngineEntry, scene: Scenario, dts: Sequence[float]) -> list[float]:
     """Time a simulated second and body [s/s] of native stepping of an ensemble, at each step; NaN if the engine has none.
 
     In flight a step takes what it takes, whatever its size; on a floor whole runs are timed, where they are not too long.
     """
-    assert contestant.engine is not None
+    assert entry.engine is not None
     if scene.floor is not None:
-        return [_timed_side_by_side(contestant.engine, scene, dt, scene.steps(dt)) / (scene.steps(dt) * dt) for dt in dts]
+        return [_timed_side_by_side(entry.engine, scene, dt, scene.steps(dt)) / (scene.steps(dt) * dt) for dt in dts]
     steps = MOST_SIDE_BY_SIDE // SIDE_BY_SIDE
-    taken = _timed_side_by_side(contestant.engine, scene, dts[-1], steps)
+    taken = _timed_side_by_side(entry.engine, scene, dts[-1], steps)
     return [taken / (steps * dt) for dt in dts]
 
 
@@ -373,7 +358,7 @@ def _timed_side_by_side(engine: Engine, scene: Scenario, dt: float, steps: int) 
     if steps * SIDE_BY_SIDE > MOST_SIDE_BY_SIDE:
         return math.nan
     for _ in range(1 + SIDE_BY_SIDE_ROUNDS):
-        ensemble = engine.prepare_ensemble(members, dt)
+        ensemble = engine.prepare_batch(members, dt)
         if ensemble is None:
             return math.nan
         start = time.perf_counter()

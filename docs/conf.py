@@ -25,13 +25,13 @@ CATALOGUE = Path(__file__).parent / "reference" / "catalogue.md"
 def table(rows: list[dict[str, Any]]) -> str:
     """Rows as a Markdown table."""
     heads = list(rows[0])
-    cells = [[str(row[head]).replace("|", "\\|") for head in heads] for row in rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in [heads, ["---"] * len(heads), *cells])
+    processes = [[str(row[head]).replace("|", "\\|") for head in heads] for row in rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in [heads, ["---"] * len(heads), *processes])
 
 
 def write_catalogue(_: Any) -> None:
     """Write the page of what `dropspin list` lists."""
-    from reports import look
+    from reports.views import listings as look
 
     listed = {"Scenes": look.scene_rows(), "Engines": look.engine_rows(), "Metrics": look.metric_rows()}
     parts = ["# Scenes, engines, metrics", *(f"## {title}\n\n{table(rows)}" for title, rows in listed.items())]

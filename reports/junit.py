@@ -7,11 +7,11 @@ from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from comparisons import Results
-from comparisons.provenance import versions_behind
-from comparisons.verdicts import BREAKDOWNS, FAILURES
-from reports.failing import again, what_fails
-from reports.numbers import step, subject, word
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES
+from comparisons.results.provenance import versions_behind
+from comparisons.results.results import Results
+from reports.views.failures import reproduce, what_fails
+from reports.views.numbers import step, subject, word
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "limited", "declined", "missing"}
 
@@ -21,10 +21,10 @@ def junit_xml(results: Results, baseline: str | None = None) -> bytes:
 
     Args:
         results: The run, with the rows of a check if there was one.
-        baseline: The file of the figures it was held against, for the commands that do it again.
+        baseline: The baseline file it was compared with, for the commands that reproduce failures.
     """
     document = JUnitXml("dropspin")
-    frame = results.frame.assign(broke_down=results.breakdowns)
+    frame = results.table.assign(broke_down=results.breakdowns)
     for engine in results.engines:
         suite = TestSuite(_printable(engine))
         suite.timestamp = datetime.fromisoformat(results.provenance["started"]).strftime("%Y-%m-%dT%H:%M:%S")
@@ -46,12 +46,12 @@ def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -
     of = _printable(f"{row['engine']}.{row['scene']}")
     case = TestCase(f"{accepted}{what}{at}", classname=of, time=0.0 if math.isnan(took) else round(took, 6))
     said = _printable(what_fails(row))
-    does_it_again = _printable(f"{said}\nAgain: {again(results, row, baseline)}")
+    details = _printable(f"{said}\nReproduce: {reproduce(results, row, baseline)}")
     verdict = row["verdict"]
     if verdict in FAILURES:
-        case.result = [_with_text(Failure(said, verdict), does_it_again)]
+        case.result = [_with_text(Failure(said, verdict), details)]
     elif row["broke_down"]:
-        case.result = [_with_text(Error(said, verdict), does_it_again)]
+        case.result = [_with_text(Error(said, verdict), details)]
     elif verdict != "passed":
         case.result = [Skipped(f"{word(verdict)}: {_printable(row['reason'])}")]
     return case

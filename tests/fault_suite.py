@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 
 import comparisons
 import scenarios
-from comparisons import Engine, Simulation
+from comparisons.engines.base import Engine, Simulation
 from scenarios.rotations import about, multiply, rotate, unrotate
 
 Array = np.ndarray
@@ -490,7 +490,7 @@ def catches(number: int) -> list[tuple[str, str]]:
     core = [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags and scene.ensemble is None]
     with np.errstate(all="ignore"):
         found = comparisons.run(core, [engine])
-    bad = found.frame[found.frame["verdict"].isin(["failed", "crashed", "diverged"])]
+    bad = found.table[found.table["verdict"].isin(["failed", "crashed", "diverged"])]
     return [(row.scene, f"{row.kind} of {row.metric}" if row.metric else row.verdict) for row in bad.itertuples()]
 
 

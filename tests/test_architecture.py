@@ -19,7 +19,7 @@ def modules_after(statement):
         ("import scenarios", {"mujoco", "pybullet", "numba", "pandas", "matplotlib", "mpmath"}),
         ("import reference_impl", {"mujoco", "pybullet", "pandas", "pydantic", "scenarios"}),
         ("import comparisons", {"mujoco", "pybullet", "numba", "matplotlib", "jinja2", "rich", "reports"}),
-        ("import reports.cli", {"mujoco", "pybullet", "numba", "pandas", "scipy", "matplotlib", "rich"}),
+        ("import reports.commands.main", {"mujoco", "pybullet", "numba", "pandas", "scipy", "matplotlib", "rich"}),
         ("import dropspin_command", {"scenarios", "comparisons", "reports", "click"}),
         ("import dropspin_pytest", {"scenarios", "comparisons", "reports", "reference_impl", "click", "numpy", "tomlkit", "filelock"}),
         ("import reports", {"mujoco", "pybullet", "numba", "matplotlib"}),

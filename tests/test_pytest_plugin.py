@@ -20,7 +20,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 ENGINES = """
 import os
 import numpy as np
-from comparisons import Engine, Simulation
+from comparisons.engines.base import Engine, Simulation
 from scenarios import truth_for
 
 print("imported", file=open("imports.log", "a"))

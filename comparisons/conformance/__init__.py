@@ -1,5 +1,1 @@
-"""Is an adapter right? Checks that anybody runs on an engine of their own."""
-
-from comparisons.conformance.checks import Finding, conform
-
-__all__ = ["Finding", "conform"]
+"""Conformance: checks of an engine adapter against the protocol and against reference motions."""

@@ -10,19 +10,19 @@ from typing import Any, Literal, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.building import ULPS, BuiltDifferently, assert_built_as_meant, assert_starts_as_meant, sound_limits, sound_record
-from comparisons.conformance.mistakes import explained, explained_start
+from comparisons.conformance.fault_models import explained, explained_start
 from comparisons.conformance.probes import DT, PROBES, Probe, differences
-from comparisons.engines.base import Diverged, Engine, Limit
-from comparisons.isolation import Cells, Failed, Limits
-from comparisons.simulating import Contestant
+from comparisons.engines.base import Diverged, Engine, EngineMissing, KnownLimitation
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import EngineEntry, engine_entry, record
+from comparisons.running.verification import ULPS, BuildMismatch, verified_record, verify_build, verify_start
 from scenarios import Scenario, load, names, truth_for
 from scenarios.errors import UnknownName
 from scenarios.rotations import angle_between_orientations
 from scenarios.truths import LAWS, Law
 
 Array = NDArray[np.float64]
-Verdict = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]
+CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]
 
 
 A_FEW_STEPS = 24
@@ -36,12 +36,12 @@ HARMLESS = 1e-9
 """Of the largest number, by which steps taken together may differ from steps taken one by one, and be told only."""
 
 
-class Finding(NamedTuple):
-    """What a check found."""
+class CheckResult(NamedTuple):
+    """The outcome of one check, and what was found."""
 
     check: str
-    verdict: Verdict
-    said: str
+    outcome: CheckOutcome
+    message: str
 
 
 class Wrong(Exception):
@@ -53,56 +53,59 @@ class Declined(Exception):
 
 
 def conform(
-    engine: Engine,
-    limits: Limits = Limits(processor_time=60.0),  # noqa: B008 - it cannot be changed
+    engine: Engine | str,
     checks: Sequence[str] = (),
-) -> list[Finding]:
-    """Hold an adapter against the protocol, and its motion against scenes that tell one mistake from another.
+    *,
+    resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
+) -> list[CheckResult]:
+    """Check an adapter against the protocol, and its motions against reference motions.
 
     Args:
-        engine: The engine.
-        limits: What each check may use.
-        checks: Which checks to make; all if none is named.
+        engine: The engine, or its name.
+        checks: The checks to make; all if none is named.
+        resources: What each check may use.
 
     Raises:
         UnknownName: There is no such check.
     """
     for unknown in set(checks) - CHECKS.keys():
         raise UnknownName("check", unknown, CHECKS)
-    contestant = Contestant(engine.label, engine)
+    entry = engine_entry(engine)
+    if entry.engine is None:
+        raise EngineMissing(entry.missing)
     found = []
-    with Cells(limits) as cells:
+    with EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
             try:
-                found.append(cells.call(contestant, _finding, check))
+                found.append(processes.call(entry, _check, check))
             except Failed as failure:
-                found.append(Finding(check, cast(Verdict, failure.verdict), failure.reason))
+                found.append(CheckResult(check, cast(CheckOutcome, failure.verdict), failure.reason))
     return found
 
 
-def _finding(contestant: Contestant, check: str) -> Finding:
-    assert contestant.engine is not None
+def _check(entry: EngineEntry, check: str) -> CheckResult:
+    assert entry.engine is not None
     try:
-        return CHECKS[check](contestant.engine, check)
-    except (Wrong, BuiltDifferently) as wrong:
-        return Finding(check, "failed", str(wrong))
+        return CHECKS[check](entry.engine, check)
+    except (Wrong, BuildMismatch) as wrong:
+        return CheckResult(check, "failed", str(wrong))
     except Declined as declined:
-        return Finding(check, "declined", str(declined))
+        return CheckResult(check, "declined", str(declined))
     except Diverged as diverged:
-        return Finding(check, "failed", f"the engine gave up: {diverged}")
+        return CheckResult(check, "failed", f"the engine gave up: {diverged}")
 
 
-def _claims(engine: Engine, check: str) -> Finding:
+def _claims(engine: Engine, check: str) -> CheckResult:
     """What the class says of itself."""
     order = engine.order
     if not (order is None or (isinstance(order, int | float) and order > 0)):
         raise Wrong(f"order is {order!r}; it is None for no claim, a number above 0, or inf for exact")
     if engine.precision not in (np.float32, np.float64):
         raise Wrong(f"precision is {engine.precision!r}; it is numpy.float64 or numpy.float32")
-    return Finding(check, "passed", f"order {order if order is not None else 'not claimed'}, {np.dtype(engine.precision).name}")
+    return CheckResult(check, "passed", f"order {order if order is not None else 'not claimed'}, {np.dtype(engine.precision).name}")
 
 
-def _reasons(engine: Engine, check: str) -> Finding:
+def _reasons(engine: Engine, check: str) -> CheckResult:
     """A scene is declined with a reason."""
     scenes = [load(name) for name in names()]
     for scene in [*scenes, *(probe.scene for probe in PROBES)]:
@@ -114,10 +117,10 @@ def _reasons(engine: Engine, check: str) -> Finding:
     declined = sum(engine.declines(scene) is not None for scene in scenes)
     if declined == len(scenes):
         raise Wrong(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.declines(scenes[0])}")
-    return Finding(check, "passed", f"{len(scenes) - declined} scenes of the catalogue are run, {declined} declined with a reason")
+    return CheckResult(check, "passed", f"{len(scenes) - declined} scenes of the catalogue are run, {declined} declined with a reason")
 
 
-def _builds(engine: Engine, check: str) -> Finding:
+def _builds(engine: Engine, check: str) -> CheckResult:
     """What is built is what was meant, in the probes and in every scene of the catalogue."""
     told = 0
     for scene in [TELLING, *(probe.scene for probe in PROBES), *(load(name) for name in names())]:
@@ -125,15 +128,15 @@ def _builds(engine: Engine, check: str) -> Finding:
             continue
         try:
             told += _built(engine, scene)
-        except (Wrong, BuiltDifferently) as wrong:
+        except (Wrong, BuildMismatch) as wrong:
             raise Wrong(f"{scene.name}: {wrong}") from None
         except Diverged:
             raise
         except Exception as error:
             raise Wrong(f"{scene.name}: {type(error).__name__}: {error}; what cannot be run is declined, with a reason") from error
     if not told:
-        return Finding(check, "passed", "the start is the scene's; as_built says nothing of mass, inertia and gravity")
-    return Finding(check, "passed", f"start, mass, inertia and gravity are the scene's to {ULPS} ulp")
+        return CheckResult(check, "passed", "the start is the scene's; as_built says nothing of mass, inertia and gravity")
+    return CheckResult(check, "passed", f"start, mass, inertia and gravity are the scene's to {ULPS} ulp")
 
 
 def _built(engine: Engine, scene: Scenario) -> bool:
@@ -145,11 +148,11 @@ def _built(engine: Engine, scene: Scenario) -> bool:
         if not np.isfinite(state).all():
             raise Wrong(f"the state at the start is not finite: {state.tolist()}")
         try:
-            assert_starts_as_meant(engine, scene, state)
-        except BuiltDifferently as error:
+            verify_start(engine, scene, state)
+        except BuildMismatch as error:
             raise Wrong(_start_in_words(engine, scene, state) or str(error)) from None
-        assert_built_as_meant(engine, scene, simulation)
-        sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        verify_build(engine, scene, simulation)
+        verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
         return simulation.as_built() is not None
 
 
@@ -158,24 +161,24 @@ def _start_in_words(engine: Engine, scene: Scenario, state: Array) -> str:
     near = np.abs(state - scene.initial_state).max() <= single * np.abs(scene.initial_state).max()
     if engine.precision is np.float64 and near and np.array_equal(state, np.float32(state)):
         return "the state carries single precision; declare precision = numpy.float32, or hand the start over undiminished"
-    mistake = explained_start(scene, state, single)
-    return "" if mistake is None else mistake.said
+    fault = explained_start(scene, state, single)
+    return "" if fault is None else fault.message
 
 
-def _rows(engine: Engine, check: str) -> Finding:
+def _rows(engine: Engine, check: str) -> CheckResult:
     """`record` and `advance` take the same steps."""
     scene = _run_by(engine)
     with engine.prepare(scene, DT) as simulation:
-        rows = sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        rows = verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
         end = simulation.state().copy()
     with engine.prepare(scene, DT) as simulation:
-        sparse = sound_record(simulation.record(A_FEW_STEPS, every=SEVERAL), 1 + A_FEW_STEPS // SEVERAL)
+        sparse = verified_record(simulation.record(A_FEW_STEPS, every=SEVERAL), 1 + A_FEW_STEPS // SEVERAL)
     with engine.prepare(scene, DT) as simulation:
         one_by_one = [simulation.state().copy()]
         for _ in range(A_FEW_STEPS):
             simulation.advance(1)
             one_by_one.append(simulation.state().copy())
-        again = sound_record(simulation.record(SEVERAL), 1 + SEVERAL)
+        again = verified_record(simulation.record(SEVERAL), 1 + SEVERAL)
     stepped = np.array(one_by_one)
     with engine.prepare(scene, DT) as simulation:
         simulation.advance(SEVERAL)
@@ -190,8 +193,8 @@ def _rows(engine: Engine, check: str) -> Finding:
     _assert_alike(rows[-1], end, "after record, state() is not the last row")
     _assert_alike(again[0], stepped[-1], "a second record does not begin where the simulation stands")
     if not np.array_equal(rows, stepped):
-        return Finding(check, "noted", f"record and advance differ by rounding, {_off(rows, stepped):.1g}")
-    return Finding(check, "passed", "record and advance take the same steps, bit for bit")
+        return CheckResult(check, "noted", f"record and advance differ by rounding, {_off(rows, stepped):.1g}")
+    return CheckResult(check, "passed", "record and advance take the same steps, bit for bit")
 
 
 def _assert_alike(found: Array, meant: Array, otherwise: str) -> None:
@@ -206,7 +209,7 @@ def _off(found: Array, meant: Array) -> float:
     return off if np.isfinite(off) else float("inf")
 
 
-def _clock(engine: Engine, check: str) -> Finding:
+def _clock(engine: Engine, check: str) -> CheckResult:
     """Rows are as far apart in time as asked, and of one time: place, attitude and velocity are clocks."""
     lengths = {dt: _ticks(engine, "coasting", dt, _place) for dt in STEPS_TRIED}
     asked = ", ".join(f"{dt:g}" for dt in STEPS_TRIED)
@@ -227,14 +230,13 @@ def _clock(engine: Engine, check: str) -> Finding:
         late = float(np.median(np.arange(len(ticks)) - ticks))
         if abs(late) > LATE:
             raise Wrong(f"{what} is {late:.2g} steps late: it belongs to another time than the row")
-    return Finding(check, "passed", f"steps are as long as asked, {asked} s")
+    return CheckResult(check, "passed", f"steps are as long as asked, {asked} s")
 
 
 def _ticks(engine: Engine, probe: str, dt: float, clock: Callable[[Scenario, Array], Array]) -> Array:
     """The steps since the start that each row is at, by a clock."""
     scene = _run_by(engine, probe)
-    with engine.prepare(scene, dt) as simulation:
-        rows = sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+    rows = _record(engine, scene, dt)
     ticks = clock(scene, rows) / dt
     if not np.isfinite(ticks).all():
         raise Wrong(f"the state is not finite after {A_FEW_STEPS} steps of {dt:g} s")
@@ -256,13 +258,13 @@ def _velocity(scene: Scenario, rows: Array) -> Array:
     return (rows[:, 7:10] - scene.start.velocity) @ g / (g @ g)
 
 
-def _stagger(engine: Engine, check: str) -> Finding:
+def _stagger(engine: Engine, check: str) -> CheckResult:
     """Whether velocity lags position by half a step is what the simulation says; from how far a fall runs ahead."""
     scene = _run_by(engine, "falling", "falling straight")
     steps, g = scene.steps(DT), scene.acceleration
     with engine.prepare(scene, DT) as simulation:
         said = simulation.staggered
-        end = sound_record(simulation.record(steps), 1 + steps)[-1]
+        end = verified_record(simulation.record(steps), 1 + steps)[-1]
     if not np.isfinite(end).all():
         raise Wrong("the state is not finite after a fall")
     truth = truth_for(scene)
@@ -270,17 +272,17 @@ def _stagger(engine: Engine, check: str) -> Finding:
     ahead = (end[:3] - truth(steps * DT).position[0]) @ g / (0.5 * g @ g * steps * DT * DT)
     lag = round(float(ahead))
     if abs(ahead) > 1.5 or abs(ahead - lag) > 0.25:
-        return Finding(check, "noted", f"the position after a fall is {ahead:.3g} half-steps' fall ahead, as in no known scheme")
+        return CheckResult(check, "noted", f"the position after a fall is {ahead:.3g} half-steps' fall ahead, as in no known scheme")
     if lag == 1 and not said:
         raise Wrong("a fall runs ahead by half a step, as in semi-implicit Euler, where velocity lags position; set staggered = True")
     if lag == 0 and said:
         raise Wrong("staggered is True, but velocity and position are of the same time; set staggered = False")
     if lag == -1:
-        return Finding(check, "noted", "a fall lags by half a step, as in explicit Euler")
-    return Finding(check, "passed", "velocity lags position by half a step" if said else "velocity and position are of the same time")
+        return CheckResult(check, "noted", "a fall lags by half a step, as in explicit Euler")
+    return CheckResult(check, "passed", "velocity lags position by half a step" if said else "velocity and position are of the same time")
 
 
-def _repeats(engine: Engine, check: str) -> Finding:
+def _repeats(engine: Engine, check: str) -> CheckResult:
     """The same scene gives the same bits, whatever else runs in the process."""
     a, b = _run_by(engine), _run_by(engine, "turning", "coasting")
     first, stepped = _record(engine, a), _stepped(engine, a)
@@ -294,7 +296,7 @@ def _repeats(engine: Engine, check: str) -> Finding:
             raise Wrong("two simulations that take turns disturb each other: they share something")
     if not _same(first, _record(engine, a)):
         raise Wrong("the same scene gives other bits after another one: A, B, A; something is left behind")
-    return Finding(check, "passed", "A, B, A gives the same bits, and so do simulations that take turns")
+    return CheckResult(check, "passed", "A, B, A gives the same bits, and so do simulations that take turns")
 
 
 def _same(one: Array, other: Array) -> bool:
@@ -310,12 +312,13 @@ def _stepped(engine: Engine, scene: Scenario, between: Callable[[], None] = lamb
         return simulation.state().copy()
 
 
-def _record(engine: Engine, scene: Scenario) -> Array:
-    with engine.prepare(scene, DT) as simulation:
-        return sound_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS).copy()
+def _record(engine: Engine, scene: Scenario, dt: float = DT) -> Array:
+    """The states of a few steps of a scene."""
+    few = scene.model_copy(update={"duration": (A_FEW_STEPS + 0.5) * dt})
+    return record(engine, few, dt, verify=False).motion.states
 
 
-def _keeps(engine: Engine, check: str) -> Finding:
+def _keeps(engine: Engine, check: str) -> CheckResult:
     """A state that was handed out stays as it is."""
     scene = _run_by(engine, "tumbling", "turning", "falling straight", "coasting")
     with engine.prepare(scene, DT) as simulation:
@@ -326,10 +329,10 @@ def _keeps(engine: Engine, check: str) -> Finding:
             raise Wrong("state() hands out the engine's own memory, which changes with the next step; hand out a copy")
         if np.array_equal(simulation.state(), before):
             raise Wrong(f"the state is the same after {A_FEW_STEPS} steps: nothing moves, or state() looks at what was at the start")
-    return Finding(check, "passed", "states that were handed out stay as they are")
+    return CheckResult(check, "passed", "states that were handed out stay as they are")
 
 
-def _stamp(engine: Engine, check: str) -> Finding:
+def _stamp(engine: Engine, check: str) -> CheckResult:
     """Results can be stamped with the settings."""
     with engine.prepare(_run_by(engine), DT) as simulation:
         settings = simulation.settings
@@ -338,11 +341,11 @@ def _stamp(engine: Engine, check: str) -> Finding:
     except (TypeError, ValueError) as error:
         raise Wrong(f"settings cannot be written as JSON: {error}") from None
     if "version" not in settings:
-        return Finding(check, "noted", "settings has no 'version'; results should say which version of the engine they are of")
-    return Finding(check, "passed", f"version {settings['version']}, {len(settings) - 1} settings")
+        return CheckResult(check, "noted", "settings has no 'version'; results should say which version of the engine they are of")
+    return CheckResult(check, "passed", f"version {settings['version']}, {len(settings) - 1} settings")
 
 
-def _leaves_nothing(engine: Engine, check: str) -> Finding:
+def _leaves_nothing(engine: Engine, check: str) -> CheckResult:
     """Nothing is written to the working directory, not even when a simulation breaks down."""
     scene = _run_by(engine, "tumbling", "turning", "falling straight", "coasting")
     wild = scene.starting_at(scene.initial_state * np.repeat([1.0, 1e4], [7, 6]))
@@ -358,34 +361,33 @@ def _leaves_nothing(engine: Engine, check: str) -> Finding:
         left = sorted(os.listdir(folder))
     if left:
         raise Wrong(f"files are left in the working directory: {', '.join(left)}")
-    return Finding(check, "passed", f"nothing is written to the working directory{broke}")
+    return CheckResult(check, "passed", f"nothing is written to the working directory{broke}")
 
 
-def _motion(engine: Engine, check: str) -> Finding:
+def _motion(engine: Engine, check: str) -> CheckResult:
     """The motion of a probe is its truth; if not, what it is instead."""
     probe = next(probe for probe in PROBES if probe.name == check)
-    scene, steps = probe.scene, probe.scene.steps(DT)
+    scene = probe.scene
     refusal = engine.declines(scene)
     if refusal is not None:
         raise Declined(refusal)
     truth = truth_for(scene)
     assert truth is not None
-    with engine.prepare(scene, DT) as simulation:
-        rows = sound_record(simulation.record(steps), 1 + steps)
-        limits = sound_limits(simulation.limits)
+    recording = record(engine, scene, DT, verify=False)
+    rows = recording.motion.states
     found, meant = rows[probe.rows], truth(probe.times).states
     if probe.off(found, meant) <= 1.0:
-        return Finding(check, "passed", _figures(found, meant))
-    explaining = [limit.said for limit in limits if _is_within(limit, found, meant, probe)]
+        return CheckResult(check, "passed", _figures(found, meant))
+    explaining = [one.message for one in recording.limitations if _is_within(one, found, meant, probe)]
     if explaining:
-        return Finding(check, "noted", "; ".join(explaining))
+        return CheckResult(check, "noted", "; ".join(explaining))
     law = _own_law(engine, probe, found)
     if law is not None:
-        return Finding(check, "noted", f"impacts follow the {law} law, as the engine says of itself")
-    mistake = explained(probe, found)
-    if mistake is not None:
-        return Finding(check, "noted" if mistake.is_a_trait else "failed", mistake.said)
-    return Finding(check, "failed", "; ".join([*_symptoms(probe, rows, meant), _figures(found, meant)]))
+        return CheckResult(check, "noted", f"impacts follow the {law} law, as the engine says of itself")
+    fault = explained(probe, found)
+    if fault is not None:
+        return CheckResult(check, "noted" if fault.is_peculiarity else "failed", fault.message)
+    return CheckResult(check, "failed", "; ".join([*_symptoms(probe, rows, meant), _figures(found, meant)]))
 
 
 def _own_law(engine: Engine, probe: Probe, found: Array) -> Law | None:
@@ -398,13 +400,14 @@ def _own_law(engine: Engine, probe: Probe, found: Array) -> Law | None:
     return None
 
 
-def _is_within(limit: Limit, found: Array, meant: Array, probe: Probe) -> bool:
+def _is_within(limitation: KnownLimitation, found: Array, meant: Array, probe: Probe) -> bool:
     """Whether a limit explains how far off a probe's motion is: its place and attitude, and with them what moves it."""
     position, attitude, _, _ = differences(found, meant)
     allowed = [
-        max(limit.sizes.get(f"{name}_error", 0.0), own) for name, own in zip(("position", "orientation"), probe.allowed, strict=False)
+        max(limitation.explained_errors.get(f"{name}_error", 0.0), own)
+        for name, own in zip(("position", "orientation"), probe.allowed, strict=False)
     ]
-    return bool(limit.sizes) and bool(position <= allowed[0] and attitude <= allowed[1])
+    return bool(limitation.explained_errors) and bool(position <= allowed[0] and attitude <= allowed[1])
 
 
 def _figures(found: Array, meant: Array) -> str:
@@ -415,7 +418,7 @@ def _figures(found: Array, meant: Array) -> str:
 
 
 def _symptoms(probe: Probe, rows: Array, meant: Array) -> Iterator[str]:
-    """What is seen of a motion that no known mistake explains."""
+    """What is seen of a motion that no known fault explains."""
     scene, end = probe.scene, rows[-1]
     if not np.any(end[7:]) and np.any(meant[-1, 7:]):
         yield "the body has come to a stand: it falls asleep"
@@ -463,7 +466,7 @@ def _kind(found: Any) -> str:
 TELLING = next(probe.scene for probe in PROBES if probe.name == "tumbling")
 """A start of which no two numbers are alike."""
 
-CHECKS: dict[str, Callable[[Engine, str], Finding]] = {
+CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
     "claims": _claims,
     "declines": _reasons,
     "builds what is meant": _builds,

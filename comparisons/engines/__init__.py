@@ -1,1 +1,1 @@
-"""Engine adapters: a scene goes in, native steps come out; all conversions of convention happen here and nowhere else."""
+"""Engines: the protocol, the registry, and one adapter a file."""

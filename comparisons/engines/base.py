@@ -45,33 +45,35 @@ class AsBuilt:
     gravity: Array
 
 
-class Limit(NamedTuple):
-    """A known limit of an engine that a simulation has met on its way.
+class KnownLimitation(NamedTuple):
+    """A known limitation of an engine that a simulation met.
 
     Attributes:
-        said: What it is, in a sentence, with the figure it has come to.
-        sizes: By metric, how large an error it explains; rows within that are `limited` instead of failed, all others are judged as ever.
+        message: The limitation in a sentence, with the value it reached.
+        explained_errors: By metric, the largest error that it explains. A failed measurement within that is `limited` instead of failed;
+            all others are judged as usual.
     """
 
-    said: str
-    sizes: Mapping[str, float] = {}
+    message: str
+    explained_errors: Mapping[str, float] = {}
 
 
 class Simulation:
-    """One scene at one time step, built and ready to go; a context manager.
+    """One scene at one time step, built and ready to step; a context manager.
 
     Attributes:
         staggered: Whether velocity lags position by half a step, as under semi-implicit Euler.
-        settings: What the results are stamped with, versions included; values that JSON knows.
-        limits: Known limits of the engine that it has met on the way: sentences, which are told, or `Limit`, which explains errors too.
+        settings: The settings in force, versions included, stored with the results; values that JSON can hold.
+        known_limitations: Known limitations of the engine that the simulation met: a sentence, which is reported, or a `KnownLimitation`,
+            which also explains errors.
     """
 
     staggered: bool = False
     settings: Mapping[str, Any] = {}
-    limits: Sequence[str | Limit] = ()
+    known_limitations: Sequence[str | KnownLimitation] = ()
 
     def advance(self, steps: int) -> None:
-        """Take some native steps and do nothing else: this is what gets timed."""
+        """Take some native steps and nothing else: this is what is timed."""
         raise NotImplementedError
 
     def state(self) -> Array:
@@ -92,7 +94,7 @@ class Simulation:
         return None
 
     def close(self) -> None:
-        """Give back what the simulation holds."""
+        """Release what the simulation holds."""
 
     def __enter__(self) -> Self:
         return self
@@ -101,20 +103,20 @@ class Simulation:
         self.close()
 
 
-class Ensemble:
-    """Many starts of a scene at one time step, that an engine takes side by side."""
+class BatchSimulation:
+    """One scene from many starts at one time step, stepped together by the engine."""
 
     def advance(self, steps: int) -> None:
-        """Take some native steps and do nothing else: this is what gets timed."""
+        """Take some native steps and nothing else: this is what is timed."""
         raise NotImplementedError
 
     def states(self) -> Array:
-        """As `Simulation.state`, of each, shape (size, 13)."""
+        """The state of each, as `Simulation.state` gives it, shape (size, 13)."""
         raise NotImplementedError
 
 
-class Number(NamedTuple):
-    """What a numeric option may be."""
+class NumericOption(NamedTuple):
+    """The default and the range of a numeric option."""
 
     default: float
     least: float
@@ -162,7 +164,7 @@ class Engine:
     """What the engine's state carries: numpy.float64 or numpy.float32."""
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Each option's values, the default first."""
-    numbers: ClassVar[Mapping[str, Number]] = {}
+    numbers: ClassVar[Mapping[str, NumericOption]] = {}
     """Each numeric option's default and range."""
     reasons: ClassVar[Mapping[str, str]] = {}
     """Why each setting of a calibrated simulation is what it is, by the names in `Simulation.settings`."""
@@ -236,12 +238,12 @@ class Engine:
         """Build a scene at a time step [s], start included."""
         raise NotImplementedError
 
-    def prepare_ensemble(self, members: Sequence[Scenario], dt: float) -> Ensemble | None:
-        """Build one scene from many starts, or None: the engine has no way of its own to take them side by side."""
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
+        """Build one scene from many starts; None if the engine cannot step them together."""
         return None
 
-    def record_ensemble(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
-        """Record one scene from many starts, shape (len(members), 1 + steps, 13); default loops; override with a native one."""
+    def record_batch(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
+        """Record one scene from many starts, shape (len(members), 1 + steps, 13); loops over single simulations unless overridden."""
         motions = []
         for member in members:
             with self.prepare(member, dt) as simulation:

@@ -3,8 +3,17 @@
 import dartpy as dart
 import numpy as np
 
-from comparisons import AsBuilt, Diverged, Engine, Limit, Simulation
-from comparisons.engines.base import EXPLICIT_GYROSCOPIC, SEMI_IMPLICIT_EULER, may_tumble, version
+from comparisons.engines.base import (
+    EXPLICIT_GYROSCOPIC,
+    SEMI_IMPLICIT_EULER,
+    AsBuilt,
+    Diverged,
+    Engine,
+    KnownLimitation,
+    Simulation,
+    may_tumble,
+    version,
+)
 from scenarios.body import Array, Body, Box, Sphere
 from scenarios.model import Floor, Scenario
 from scenarios.rotations import cross, rotate
@@ -112,7 +121,9 @@ class DartSimulation(Simulation):
             height = 0.1**2 / 2.0 * dt / abs(fall) if fall else 0.0
             lost = {"restitution_error": 1.0, "bounce_height_error": 1.0, "position_error": height}
             if not np.all((rebounds == 0.0) | (rebounds >= 0.1) & (rebounds <= 100.0)):
-                self.limits = [Limit("DART's rebounds below 0.1 m/s are none, and those above 100 m/s are 100 m/s", lost)]
+                self.known_limitations = [
+                    KnownLimitation("DART's rebounds below 0.1 m/s are none, and those above 100 m/s are 100 m/s", lost)
+                ]
         return rows
 
     def as_built(self) -> AsBuilt:

@@ -14,13 +14,13 @@ from comparisons.engines.base import (
     SEMI_IMPLICIT_EULER,
     Array,
     AsBuilt,
+    BatchSimulation,
     Engine,
-    Ensemble,
     Simulation,
     may_tumble,
     version,
 )
-from comparisons.predictions import bounce_error, flight_error
+from comparisons.measuring.predictions import bounce_error, flight_error
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Body, Box, Sphere, Vertices
@@ -84,12 +84,12 @@ class Document(Engine):
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return DocumentSimulation(scene, dt, self.methods())
 
-    def record_ensemble(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
+    def record_batch(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
         """All side by side."""
-        return DocumentEnsemble(members, dt, self.methods()).run(steps, every=1)
+        return DocumentBatch(members, dt, self.methods()).run(steps, every=1)
 
-    def prepare_ensemble(self, members: Sequence[Scenario], dt: float) -> Ensemble:
-        return DocumentEnsemble(members, dt, self.methods())
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
+        return DocumentBatch(members, dt, self.methods())
 
 
 class DocumentSimulation(Simulation):
@@ -120,7 +120,7 @@ class DocumentSimulation(Simulation):
         rows = self._simulator.run(self._state, steps, every)
         self._steps += steps
         if self._simulator.unsolved_steps:
-            self.limits = [f"the contact was not solved in {self._simulator.unsolved_steps} of {self._steps} steps"]
+            self.known_limitations = [f"the contact was not solved in {self._simulator.unsolved_steps} of {self._steps} steps"]
         return rows
 
     def as_built(self) -> AsBuilt:
@@ -128,7 +128,7 @@ class DocumentSimulation(Simulation):
         return AsBuilt(float(self._body.mass), self._body.inertia, gravity)
 
 
-class DocumentEnsemble(Ensemble):
+class DocumentBatch(BatchSimulation):
     """States that the reference implementation moves on, in lanes and threads."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:

@@ -15,18 +15,18 @@ from comparisons.engines.base import (
     SEMI_IMPLICIT_EULER,
     Array,
     AsBuilt,
+    BatchSimulation,
     Diverged,
     Engine,
-    Ensemble,
-    Limit,
-    Number,
+    KnownLimitation,
+    NumericOption,
     Simulation,
     may_tumble,
 )
 from comparisons.engines.mujoco_contact import IMPEDANCE, contact
 from comparisons.engines.mujoco_versions import SIDE_BY_SIDE, flight_of, numbers_of, refusal, refusal_of_boxes, solver
 from comparisons.engines.programs import can_be_pasted, rendered
-from comparisons.predictions import bounce_error, flight_error
+from comparisons.measuring.predictions import bounce_error, flight_error
 from reference_impl.simulate import usable_cores
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
@@ -70,7 +70,7 @@ class MuJoCo(Engine):
 
     name = "mujoco"
     choices: ClassVar = {"integrator": tuple(INTEGRATORS), "profile": PROFILES}
-    numbers: ClassVar = {"kappa": Number(0.0, 0.0, 1.0), "spring_steps": Number(0.0, 0.0, 1e4)}
+    numbers: ClassVar = {"kappa": NumericOption(0.0, 0.0, 1.0), "spring_steps": NumericOption(0.0, 0.0, 1e4)}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -165,10 +165,10 @@ class MuJoCo(Engine):
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return self._prepare(scene, dt)
 
-    def prepare_ensemble(self, members: Sequence[Scenario], dt: float) -> Ensemble | None:
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         if VERSION < SIDE_BY_SIDE:
             return None
-        return MuJoCoEnsemble([self._prepare(member, dt) for member in members])
+        return MuJoCoBatch([self._prepare(member, dt) for member in members])
 
     def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
         settings = {name: self.option(name) for name in ("profile", "integrator")}
@@ -215,7 +215,9 @@ class MuJoCoSimulation(Simulation):
         self._raise_if_bad(f"in step {self._steps + _last_good_row(rows) * every + 1}")
         self._steps += (len(rows) - 1) * every
         states = _to_world(rows)
-        self.limits = list(_limits_met(self._scene, states)) if every == 1 and self.settings["profile"] == "calibrated" else []
+        self.known_limitations = (
+            list(_limitations_met(self._scene, states)) if every == 1 and self.settings["profile"] == "calibrated" else []
+        )
         return states
 
     def _each_step(self, steps: int) -> Array:
@@ -258,7 +260,7 @@ class MuJoCoSimulation(Simulation):
                 raise Diverged(f"MuJoCo's {kind.name} (a number beyond {mujoco.mjMAXVAL:g} or NaN) {when}")
 
 
-class MuJoCoEnsemble(Ensemble):
+class MuJoCoBatch(BatchSimulation):
     """Starts that MuJoCo's rollout takes side by side, in threads; it records them all as it goes."""
 
     def __init__(self, simulations: Sequence[MuJoCoSimulation]) -> None:
@@ -281,7 +283,7 @@ def _last_good_row(rows: Array) -> int:
     return max(0, int(np.argmax(bad)) - 1)
 
 
-def _limits_met(scene: Scenario, states: Array) -> Iterator[Limit]:
+def _limitations_met(scene: Scenario, states: Array) -> Iterator[KnownLimitation]:
     """How fast contacts slip that Coulomb friction should slow: of each step, the corners that begin it below the floor.
 
     MuJoCo's cone is convex: a contact that slips at s gets up to a = µ s of rebound on top (dual cone, one-step damper). The hop takes
@@ -309,7 +311,7 @@ def _limits_met(scene: Scenario, states: Array) -> Iterator[Limit]:
     }
     if fastest > added:
         sizes |= {"restitution_error": added / fastest, "bounce_height_error": (2.0 * e * added * fastest + added**2) / fastest**2}
-    yield Limit(
+    yield KnownLimitation(
         f"contacts slip by up to {slip:.3g} m/s, to which MuJoCo's friction cone adds up to µ slip, {added:.3g} m/s of rebound", sizes
     )
 

@@ -23,13 +23,13 @@ from comparisons.engines.base import (
     Array,
     AsBuilt,
     Engine,
-    Limit,
+    KnownLimitation,
     Simulation,
     may_tumble,
     version,
 )
 from comparisons.engines.programs import can_be_pasted, rendered
-from comparisons.predictions import bounce_error, flight_error
+from comparisons.measuring.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
 from scenarios.mechanics import is_diagonal
@@ -244,7 +244,7 @@ class PyBulletSimulation(Simulation):
 
     def record(self, steps: int, every: int = 1) -> Array:
         rows = super().record(steps, every)
-        self.limits = list(_limits_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
+        self.known_limitations = list(_limitations_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
         return rows
 
     def as_built(self) -> AsBuilt:
@@ -262,14 +262,14 @@ _idle: dict[bool, list[int]] = {}
 """Connections at rest, by whether they are for defaults: to empty one takes a fifth of a new one's time, and gives the same bits."""
 
 
-def _limits_met(rows: Array, dt: float, fall: Array | None) -> Iterator[Limit]:
+def _limitations_met(rows: Array, dt: float, fall: Array | None) -> Iterator[KnownLimitation]:
     """Bullet's own limits that a motion has reached, from its states at every step.
 
     `fall` is what gravity adds to the velocity in a step [m/s], where a floor is to grip.
     """
     turn = float(np.linalg.norm(rows[:, 10:13], axis=1).max()) * dt
     if turn > LARGEST_TURN:
-        yield Limit(
+        yield KnownLimitation(
             f"the body turns by up to {turn:.3g} rad a step; beyond π/4 Bullet's rotations fall short", {"orientation_error": np.pi}
         )
     if fall is None:
@@ -277,7 +277,7 @@ def _limits_met(rows: Array, dt: float, fall: Array | None) -> Iterator[Limit]:
     pushes = np.diff(rows[:, 7:10], axis=0) - fall
     along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
     if bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
-        yield Limit(
+        yield KnownLimitation(
             f"a contact needs more than {STRONGEST_FRICTION:g} times its normal push to stick; Bullet's friction ends there, and it slips"
         )
 

@@ -13,7 +13,7 @@ import rapier3d
 from scipy.spatial.transform import Rotation
 
 from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, may_tumble, version
-from comparisons.predictions import spins_steadily
+from comparisons.measuring.predictions import spins_steadily
 from scenarios import Scenario, truth_for
 from scenarios.body import Box, Sphere
 from scenarios.mechanics import principal_axes

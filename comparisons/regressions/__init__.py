@@ -1,1 +1,1 @@
-"""Runs held against earlier ones: accepted figures, what changed between two runs and why, and when figures moved."""
+"""Regressions: baselines of accepted results, comparisons of two runs, histories of many."""

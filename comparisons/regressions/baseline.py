@@ -1,7 +1,7 @@
-"""Accepted figures: a text file, one line a figure, that says since when, why, and of which versions each was accepted.
+"""Baselines: accepted results in a text file, one line each, with the date, the reason and the versions of the acceptance.
 
-A figure that has not moved beyond its tolerance stays as it was accepted, so that the difference between two baselines shows what was
-moved on purpose, and nothing else. Each line says all that it is about, so that lines of two branches can stand in one file.
+A result that has not moved beyond its tolerance stays as it was accepted, so that the difference between two versions of the file shows
+only what was moved on purpose. Each line is complete in itself, so that a merge of two branches needs no other line.
 """
 
 import datetime
@@ -18,35 +18,35 @@ import tomlkit
 from pydantic import Field
 from tomlkit.items import InlineTable, Item
 
-from comparisons.ensembles import ENSEMBLE_METRICS
-from comparisons.metrics import METRICS
-from comparisons.provenance import digest, versions_behind
-from comparisons.regressions.figures import KEY, asked_for, changes, figures, of_engines_that_broke_down
-from comparisons.results import Results
-from comparisons.validating import validated
+from comparisons.measuring.metrics import METRICS
+from comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results
+from comparisons.results.ensembles import ENSEMBLE_METRICS
+from comparisons.results.provenance import digest, versions_behind
+from comparisons.results.results import Results
 from scenarios import DropspinError
 from scenarios.body import Table
 from scenarios.errors import did_you_mean
 from scenarios.loading import read_toml
+from scenarios.validation import validated
 
-FORMAT = 2
-"""1 had its figures in tables, whose headings a merge may part from them."""
+FORMAT = 3
+"""1 had its results in tables, whose headings a merge may separate from them; 2 called them figures."""
 LARGEST_FILE = 50_000_000  # bytes
-DIGITS_BELOW = 3
-"""A value is written to a two-hundredth of its tolerance, and no shorter than this."""
+EXTRA_DIGITS = 3
+"""A value is written with so many digits, and down to a two-hundredth of its tolerance."""
 KEY_LENGTH = 7
 """Digits of the hash that names an acceptance."""
 HEADER = (
-    "Figures of rigid-body engines, measured by dropspin, accepted by somebody; one line each: scene, engine, step [s], metric.",
-    "value ± tolerance, in the unit of the metric; by: which acceptance it is from.",
-    "`dropspin check RUN --baseline FILE` holds a run against them, `dropspin accept RUN` moves them.",
+    "Results of rigid-body engines, measured by dropspin and accepted; one line each: scene, engine, time step [s], metric.",
+    "value ± tolerance, in the unit of the metric; by: the acceptance it belongs to.",
+    "`dropspin check RUN --baseline FILE` compares a run with them, `dropspin accept RUN` replaces them.",
 )
-STUDIES = {"_order": "order", "_limit": "model_error"}
-"""How the names of figures end that several steps together give, and of which kind they are."""
+SUFFIXES = {"_order": "order", "_asymptotic_error": "asymptotic_error"}
+"""How the names of results end that several time steps give together, and their kinds."""
 
 
 class Acceptance(Table):
-    """When, why, and of which versions figures were accepted."""
+    """The date, the reason and the versions of an acceptance."""
 
     date: datetime.date
     reason: Annotated[str, Field(min_length=1)]
@@ -54,12 +54,12 @@ class Acceptance(Table):
 
     @property
     def key(self) -> str:
-        """What its figures name it by: a hash of all of it, so that two branches that each accept something do not give it one name."""
+        """Its name in the file: a hash of its content, so that two branches do not use one name for different acceptances."""
         return digest(self.model_dump())[:KEY_LENGTH]
 
 
 class _Line(Table):
-    """A figure in the file."""
+    """A result in the file."""
 
     value: Annotated[float, Field(allow_inf_nan=False)]
     tolerance: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -68,13 +68,13 @@ class _Line(Table):
 
 
 class _File(Table):
-    """The whole file, but for the figures' lines."""
+    """The whole file, except for the lines of results."""
 
-    format: Literal[2]
+    format: Literal[3]
     accepted: dict[str, dict[str, Any]] = Field(default_factory=dict)
     engines: dict[str, str] = Field(default_factory=dict)
     scenes: dict[str, str] = Field(default_factory=dict)
-    figures: dict[str, dict[str, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
+    results: dict[str, dict[str, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
 
 
 COLUMNS = {**dict.fromkeys(KEY, "str"), "value": "float64", "tolerance": "float64", "unit": "str", "by": "str", "known_failure": "bool"}
@@ -86,40 +86,40 @@ def _table(lines: list[dict[str, Any]]) -> pd.DataFrame:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Accepted figures.
+    """Accepted results.
 
     Attributes:
         acceptances: By key.
-        engines: What to name an engine by to run it, where that is not its label: `my_module:MyEngine`.
-        scenes: Of each scene the digest of what is simulated.
-        figures: As `regressions.figures` has them, with `by`, the key of the acceptance, and `known_failure`: whether a check that
-            the figure fails is not to fail the run, as long as the figure is not worse.
+        engines: The name to run an engine by, where that is not its label: `my_module:MyEngine`.
+        scenes: The digest of what each scene simulates.
+        results: As `comparable_results` gives them, with `by`, the key of the acceptance, and `known_failure`: whether a check that
+            the result fails is not to fail the run, as long as the result is not worse.
     """
 
     acceptances: Mapping[str, Acceptance] = field(default_factory=dict)
     engines: Mapping[str, str] = field(default_factory=dict)
     scenes: Mapping[str, str] = field(default_factory=dict)
-    figures: pd.DataFrame = field(default_factory=lambda: _table([]))
+    results: pd.DataFrame = field(default_factory=lambda: _table([]))
 
 
 def load_baseline(path: str | Path) -> Baseline:
     """Read a baseline.
 
     Raises:
-        DropspinError: It is none; the text says where, what was given, what is allowed.
+        DropspinError: It is not a baseline; the text says where, what was given, what is allowed.
     """
     where = str(path)
     written = validated(_File, where, read_toml(Path(path), where, "baseline", LARGEST_FILE))
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     lines = []
-    for scene, engines in written.figures.items():
+    for scene, engines in written.results.items():
         if scene not in written.scenes:
-            raise DropspinError(f"{where}: scenes: {scene!r} has figures, but no digest; accept them again.")
+            raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
         for engine, steps in engines.items():
             for step, named in steps.items():
-                _assert_steps(f"{where}: figures of {scene}, {engine}", step)
+                _assert_steps(f"{where}: results of {scene}, {engine}", step)
                 for name, content in named.items():
-                    here = f"{where}: figures of {scene}, {engine}, {step}: {name}"
+                    here = f"{where}: results of {scene}, {engine}, {step}: {name}"
                     metric, kind = _metric_and_kind(here, name)
                     line = validated(_Line, here, content)
                     if line.by not in acceptances:
@@ -133,25 +133,28 @@ def load_baseline(path: str | Path) -> Baseline:
 def accept(
     results: Results, earlier: Baseline, reason: str, date: datetime.date, *, known_failures: bool = False
 ) -> tuple[Baseline, pd.DataFrame]:
-    """The baseline that a run's figures make of an earlier one, and how it differs from that, as `changes` has it.
+    """Accept a run's results into a baseline.
 
-    Figures of scenes, engines and steps that the run is not of stay; so do figures that have not moved beyond their tolerance, and those of
-    engines that broke down in a scene, or are missing: that is nothing to accept. Of a scene that simulates something else now, all go.
+    Results that the run does not cover stay; so do results that have not moved beyond their tolerance, and those of engines that broke down
+    in a scene or are missing. All results of a scene that has changed are replaced.
 
     Args:
         results: The run.
-        earlier: What was accepted before; `Baseline()` if nothing was.
-        reason: Why this is what figures should be from now on.
-        date: Of the acceptance.
-        known_failures: Whether checks that the run's figures fail are known to fail, and accepted as such.
+        earlier: The baseline before; `Baseline()` if there is none.
+        reason: Why these results are accepted.
+        date: Date of the acceptance.
+        known_failures: Whether to accept failing checks as known failures.
+
+    Returns:
+        The new baseline, and its difference from the earlier one, as `values.changes` gives it.
     """
-    mine = figures(results)
+    mine = comparable_results(results)
     mine["known_failure"] = (mine["verdict"] == "failed") & known_failures
-    old = asked_for(earlier.figures, results)
+    old = asked_for(earlier.results, results)
     scenes = {name: scene.digest for name, scene in results.scenes.items()}
     same_scene = old["scene"].map(lambda name: earlier.scenes[name] == scenes[name]).astype(bool)
     found = changes(old[same_scene], mine)
-    lost = (found["change"] == "gone") & of_engines_that_broke_down(found, results)
+    lost = (found["change"] == "gone") & broke_down(found, results)
     kept = old[same_scene].merge(found.loc[(found["change"] == "same") | lost, KEY], on=KEY)
     if known_failures:
         flags = kept[KEY].merge(mine[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
@@ -159,7 +162,7 @@ def accept(
     acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(results.provenance))
     moved = mine.merge(kept[KEY], on=KEY, how="left", indicator=True)
     moved = moved[moved["_merge"] == "left_only"].assign(by=acceptance.key)
-    outside = earlier.figures.drop(old.index)
+    outside = earlier.results.drop(old.index)
     outdated = outside["scene"].map(lambda name: earlier.scenes[name] != scenes.get(name, earlier.scenes[name])).astype(bool)
     everything = pd.concat([outside[~outdated], kept, moved], ignore_index=True)[list(COLUMNS)]
     used = set(everything["by"])
@@ -187,8 +190,8 @@ def write_baseline(baseline: Baseline, path: str | Path) -> None:
 
 
 def _text(baseline: Baseline) -> str:
-    """The file's content; its lines in an order that does not depend on how they came about, and none that needs another to be read."""
-    held = baseline.figures.sort_values(KEY)
+    """The file's content, in an order that does not depend on how it was made."""
+    held = baseline.results.sort_values(KEY)
     engines, scenes = set(held["engine"]), set(held["scene"])
     lines = [*(f"# {line}" for line in HEADER), "", f"format = {FORMAT}", ""]
     for key, one in sorted(baseline.acceptances.items(), key=lambda item: (item[1].date, item[0])):
@@ -196,11 +199,11 @@ def _text(baseline: Baseline) -> str:
         lines.append(_assigned(["accepted", key], _inline(content)))
     lines.append("")
     for table, named, used in (("engines", baseline.engines, engines), ("scenes", baseline.scenes, scenes)):
-        lines += [_assigned([table, name], tomlkit.string(told)) for name, told in sorted(named.items()) if name in used]
+        lines += [_assigned([table, name], tomlkit.string(text)) for name, text in sorted(named.items()) if name in used]
     for _, rows in held.groupby(["scene", "engine", "steps"], sort=False):
         lines.append("")
         for row in rows.to_dict("records"):
-            lines.append(_assigned(["figures", row["scene"], row["engine"], row["steps"], _name(row)], _inline(_line(row))))
+            lines.append(_assigned(["results", row["scene"], row["engine"], row["steps"], _name(row)], _inline(_line(row))))
     return "\n".join(lines) + "\n"
 
 
@@ -215,13 +218,13 @@ def _inline(content: Mapping[str, Any]) -> InlineTable:
 
 
 def _name(row: Mapping[Hashable, Any]) -> str:
-    """What a figure is called in the file."""
-    return row["metric"] + next((ending for ending, kind in STUDIES.items() if kind == row["kind"]), "")
+    """The name of a result in the file."""
+    return row["metric"] + next((ending for ending, kind in SUFFIXES.items() if kind == row["kind"]), "")
 
 
 def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
     value, tolerance = float(row["value"]), float(f"{row['tolerance']:.2g}")
-    digits = DIGITS_BELOW if value == 0.0 else max(DIGITS_BELOW, DIGITS_BELOW + math.ceil(math.log10(abs(value) / tolerance)))
+    digits = EXTRA_DIGITS if value == 0.0 else max(EXTRA_DIGITS, EXTRA_DIGITS + math.ceil(math.log10(abs(value) / tolerance)))
     line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": row["by"]}
     return line | ({"known_failure": True} if row["known_failure"] else {})
 
@@ -230,18 +233,18 @@ def _assert_steps(where: str, steps: str) -> None:
     try:
         written = ", ".join(repr(float(step)) for step in steps.split(","))
     except ValueError:
-        raise DropspinError(f"{where}: {steps!r} is no step, nor several; write them in seconds, such as '0.004'.") from None
+        raise DropspinError(f"{where}: {steps!r} is not a time step or a list of them; write seconds, such as '0.004'.") from None
     if written != steps:
         raise DropspinError(f"{where}: {steps!r}: write it as {written!r}, or runs at this step will not find it.")
 
 
 def _metric_and_kind(where: str, name: str) -> tuple[str, str]:
-    """What a figure is of, by its name in the file."""
+    """The metric and the kind of a result, from its name in the file."""
     if name in METRICS:
         return name, METRICS[name].kind
     if name in ENSEMBLE_METRICS:
         return name, "ensemble"
-    for ending, kind in STUDIES.items():
+    for ending, kind in SUFFIXES.items():
         if name.removesuffix(ending) in METRICS and name.endswith(ending):
             return name.removesuffix(ending), kind
-    raise DropspinError(f"{where}: no such figure.{did_you_mean(name, [*METRICS, *ENSEMBLE_METRICS])}")
+    raise DropspinError(f"{where}: no such result.{did_you_mean(name, [*METRICS, *ENSEMBLE_METRICS])}")

@@ -1,14 +1,14 @@
-"""Two runs held against each other: what has changed, and what it is put down to."""
+"""Two runs compared: what changed, and what it is attributed to."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
 
-from comparisons.regressions.differences import Blame, blame, surroundings
-from comparisons.regressions.figures import asked_for, changes, figures, most_changed_first, regressed
+from comparisons.regressions.attribution import Attribution, attribute, surroundings
 from comparisons.regressions.speed import SpeedChange, speed_changes
-from comparisons.results import Results
+from comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed
+from comparisons.results.results import Results
 from scenarios import DropspinError
 
 
@@ -17,56 +17,52 @@ class Changes:
     """What differs between two runs.
 
     Attributes:
-        figures: As `regressions.changes` has them, most changed first; `change` is same, better, worse, moved, new or gone.
-        blames: By engine, what its changes are put down to; of those that have any.
-        surroundings: What differs that all engines share, in words.
-        other_scenes: Scenes that simulate something else in the later run, so that their figures are not compared.
-        in_one_only: Scenes, engines and steps that were asked for in one of the runs only, in words.
-        speed: How each engine's speed has changed beside the others'.
+        results: The comparable results as `values.changes` gives them, largest change first; `change` is same, better, worse, moved, new or gone.
+        attributions: By engine, what its changes are attributed to.
+        surroundings: What differs that all engines share, as text.
+        other_scenes: Scenes that are different in the later run, so that their results are not compared.
+        in_one_only: Scenes, engines and time steps that were asked for in one of the runs only, as text.
+        speed: How each engine's speed changed relative to the others'.
     """
 
-    figures: pd.DataFrame
-    blames: Mapping[str, Blame]
+    results: pd.DataFrame
+    attributions: Mapping[str, Attribution]
     surroundings: list[str]
     other_scenes: list[str]
     in_one_only: list[str]
     speed: list[SpeedChange]
 
     def of(self, *kinds: str) -> pd.DataFrame:
-        """The figures of some kinds of change."""
-        return self.figures[self.figures["change"].isin(kinds)]
+        """The results with some kinds of change."""
+        return self.results[self.results["change"].isin(kinds)]
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """What a gate is closed by: worse, moved, or gone."""
-        return regressed(self.figures)
-
-    def slower(self, share: float) -> list[SpeedChange]:
-        """The engines that have become slower by more than some share, beyond doubt."""
-        return [change for change in self.speed if change.least > 1.0 + share]
+        """The results that fail a comparison: worse, moved, or gone."""
+        return regressed(self.results)
 
 
 def compare(old: Results, new: Results) -> Changes:
-    """Hold a run against an earlier one.
+    """Compare a run with an earlier one.
 
-    Figures of scenes, engines and steps that were asked for in one of the runs only are neither new nor gone: they are left out.
+    Results of scenes, engines and time steps that were asked for in one of the runs only are left out: they are neither new nor gone.
 
     Raises:
         DropspinError: They have none in common.
     """
     other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
-    before, after = figures(old), figures(new)
+    before, after = comparable_results(old), comparable_results(new)
     found = changes(*(held[~held["scene"].isin(other)] for held in (asked_for(before, new), asked_for(after, old))))
     if found.empty and other:
-        raise DropspinError(f"the runs have no figure in common: {', '.join(other)}: another scene now, of the same name.")
+        raise DropspinError(f"the runs have no result in common: {', '.join(other)} changed between them.")
     if found.empty:
-        raise DropspinError("the runs have no figure in common: no scene, engine and step that both were asked for.")
+        raise DropspinError("the runs have no result in common: no scene, engine and time step that both were asked for.")
     found = most_changed_first(found)
     changed = found.groupby("engine")["change"].agg(lambda change: bool((change != "same").any()))
     unmoved = [str(engine) for engine, moved in changed.items() if not moved]
     stamps = old.provenance, new.provenance
-    blames = {str(engine): blame(*stamps, str(engine), unmoved) for engine, moved in changed.items() if moved}
-    return Changes(found, blames, surroundings(*stamps), other, _in_one_only(old, new), speed_changes(old, new))
+    attributions = {str(engine): attribute(*stamps, str(engine), unmoved) for engine, moved in changed.items() if moved}
+    return Changes(found, attributions, surroundings(*stamps), other, _in_one_only(old, new), speed_changes(old, new))
 
 
 def _in_one_only(old: Results, new: Results) -> list[str]:

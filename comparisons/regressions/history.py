@@ -1,34 +1,34 @@
-"""Figures over runs: when each moved, and what that is put down to."""
+"""Results over runs: when each moved, and what that is attributed to."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 
-from comparisons.provenance import versions_behind
-from comparisons.regressions.differences import Blame, blame
-from comparisons.regressions.figures import KEY, changes, figures, most_changed_first
-from comparisons.results import Results
+from comparisons.regressions.attribution import Attribution, attribute
+from comparisons.regressions.values import KEY, changes, comparable_results, most_changed_first
+from comparisons.results.provenance import versions_behind
+from comparisons.results.results import Results
 from scenarios import DropspinError
 
 
 @dataclass(frozen=True)
 class Move:
-    """A run in which figures of an engine moved.
+    """A run in which results of an engine moved.
 
     Attributes:
         engine: Label of the engine.
         before: Number of the earlier run, the last one that has the engine.
         run: Number of the run.
-        figures: What changed: worse, better or moved, most changed first, as `regressions.changes` has it.
-        blame: What it is put down to.
+        results: The changes (worse, better or moved) as `values.changes` gives them, largest first.
+        attribution: What they are attributed to.
     """
 
     engine: str
     before: int
     run: int
-    figures: pd.DataFrame
-    blame: Blame
+    results: pd.DataFrame
+    attribution: Attribution
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,46 +36,47 @@ class History:
     """Runs in the order of their time.
 
     Attributes:
-        names: Of the runs.
-        stamps: What tells each from the one before: time, commit, and versions.
-        figures: As `regressions.figures` has them, of all runs; `run` is the number.
+        names: Names of the runs.
+        stamps: Time, commit and versions of each.
+        results: The comparable results of all runs; `run` is the number.
         moves: In the order of the runs.
     """
 
     names: list[str]
     stamps: pd.DataFrame
-    figures: pd.DataFrame
+    results: pd.DataFrame
     moves: list[Move]
 
 
 def history(runs: Mapping[str, Results]) -> History:
-    """Follow figures over runs.
+    """Follow results over runs.
 
     Args:
-        runs: By name; they are put in the order of when they were started.
+        runs: By name; they are sorted by the time they were started.
 
     Raises:
         DropspinError: There are fewer than two.
     """
     if len(runs) < 2:
-        raise DropspinError(
-            f"a history takes two runs or more, and here {'is one' if runs else 'are none'}; give more, or a folder of runs."
-        )
+        raise DropspinError(f"a history needs two runs or more, got {len(runs)}; give more, or a folder of runs.")
     ordered = sorted(runs.items(), key=lambda item: str(item[1].provenance["started"]))
     names, results = [name for name, _ in ordered], [one for _, one in ordered]
     stamps = [
         {"run": name, "started": one.provenance["started"], "commit": one.provenance["commit"]} | versions_behind(one.provenance)
         for name, one in ordered
     ]
-    measured = [figures(one) for one in results]
+    measured = [comparable_results(one) for one in results]
     every = pd.concat([rows.assign(run=number) for number, rows in enumerate(measured)], ignore_index=True)
     return History(names, pd.DataFrame(stamps), every, _moves(results, measured))
 
 
-def _moves(results: Sequence[Results], figures_of: Sequence[pd.DataFrame]) -> list[Move]:
-    """Where figures moved: each is held against what it last moved to, so no slow drift escapes, and no run that lacks it hides one."""
+def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> list[Move]:
+    """The runs in which results moved.
+
+    Each result is compared with the one it last moved to, so that a slow drift is found, and a run without it hides nothing.
+    """
     engines = list(dict.fromkeys(engine for one in results for engine in one.engines))
-    held = dict.fromkeys(engines, figures_of[0].iloc[:0])
+    held = dict.fromkeys(engines, results_of[0].iloc[:0])
     scenes: dict[str, str] = {}
     last: dict[str, int] = {}
     found = []
@@ -84,7 +85,7 @@ def _moves(results: Sequence[Results], figures_of: Sequence[pd.DataFrame]) -> li
         other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
         scenes |= digests
         held = {engine: rows[~rows["scene"].isin(other)] for engine, rows in held.items()}
-        measured = {str(engine): rows for engine, rows in figures_of[run].groupby("engine", sort=False)}
+        measured = {str(engine): rows for engine, rows in results_of[run].groupby("engine", sort=False)}
         moved = {}
         for engine, now in measured.items():
             before = held[engine]
@@ -98,6 +99,6 @@ def _moves(results: Sequence[Results], figures_of: Sequence[pd.DataFrame]) -> li
         for engine, differing in moved.items():
             if len(differing):
                 stamps = results[last[engine]].provenance, one.provenance
-                found.append(Move(engine, last[engine], run, differing, blame(*stamps, engine, unmoved)))
+                found.append(Move(engine, last[engine], run, differing, attribute(*stamps, engine, unmoved)))
         last |= dict.fromkeys(measured, run)
     return found

@@ -1,7 +1,6 @@
-"""Speed beside an earlier run: as ratios between engines of one run, for absolute times are the machine's.
+"""Speed compared with an earlier run: as ratios between engines of one run, because absolute times depend on the machine.
 
-An engine has become slower if it has against every other engine; so that of two engines one that has become faster does not make the other
-one slower in the face of a third.
+An engine has become slower if it has against every other engine, so that one engine that became faster does not make another one slower.
 """
 
 from itertools import permutations
@@ -11,25 +10,25 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from comparisons.results import Results
+from comparisons.results.results import Results
 
 CONFIDENCE = 0.95
 
 
 class SpeedChange(NamedTuple):
-    """How the time of an engine's step has changed against that of another engine.
+    """How the time of an engine's step changed relative to another engine's.
 
     Attributes:
         engine: Its label.
-        beside: The other engine's.
-        ratio: Its time over the other's, over what that was before: the median over scenes and steps.
+        other: The other engine's label.
+        ratio: Its time over the other's, over the same ratio before: the median over scenes and time steps.
         least: Lower end of the median's confidence interval.
         most: Upper end.
-        cases: How many scenes and steps.
+        cases: Number of scenes and time steps.
     """
 
     engine: str
-    beside: str
+    other: str
     ratio: float
     least: float
     most: float
@@ -37,11 +36,11 @@ class SpeedChange(NamedTuple):
 
 
 def speed_changes(old: Results, new: Results) -> list[SpeedChange]:
-    """For each engine, of those beside which it can be measured in both runs, the one against which it has lost least."""
+    """For each engine, its change relative to the engine against which it lost least, of those that both runs have."""
     before, after = (_times(results) for results in (old, new))
     pairs = [
-        _change(engine, beside, before, after)
-        for engine, beside in permutations([engine for engine in new.engines if engine in before and engine in after], 2)
+        _change(engine, other, before, after)
+        for engine, other in permutations([engine for engine in new.engines if engine in before and engine in after], 2)
     ]
     found = [change for change in pairs if change.cases > 0]
     engines = dict.fromkeys(change.engine for change in found)
@@ -49,16 +48,16 @@ def speed_changes(old: Results, new: Results) -> list[SpeedChange]:
 
 
 def _times(results: Results) -> pd.DataFrame:
-    """Seconds a step, one row for each scene and step, one column for each engine."""
-    rows = results.frame.dropna(subset=["time_per_step", "dt"])
+    """Seconds per step, one row for each scene and time step, one column for each engine."""
+    rows = results.table.dropna(subset=["time_per_step", "dt"])
     return rows.pivot_table("time_per_step", ["scene", "dt"], "engine", aggfunc="first")
 
 
-def _change(engine: str, beside: str, before: pd.DataFrame, after: pd.DataFrame) -> SpeedChange:
-    """Exact interval of the median, from the order of the ratios; with fewer than six of them it has no ends."""
-    ratios = (after[engine] / after[beside] / (before[engine] / before[beside])).dropna().to_numpy()
+def _change(engine: str, other: str, before: pd.DataFrame, after: pd.DataFrame) -> SpeedChange:
+    """The median ratio and its exact confidence interval, which is unbounded with fewer than six cases."""
+    ratios = (after[engine] / after[other] / (before[engine] / before[other])).dropna().to_numpy()
     if len(ratios) == 0:
-        return SpeedChange(engine, beside, np.nan, np.nan, np.nan, 0)
+        return SpeedChange(engine, other, np.nan, np.nan, np.nan, 0)
     interval = stats.quantile_test(ratios, q=1.0).confidence_interval(CONFIDENCE)
     least, most = (float(np.nan_to_num(end, nan=missing)) for end, missing in zip(interval, (0.0, np.inf), strict=True))
-    return SpeedChange(engine, beside, float(np.median(ratios)), least, most, len(ratios))
+    return SpeedChange(engine, other, float(np.median(ratios)), least, most, len(ratios))

@@ -15,7 +15,7 @@ Spacing = Literal["linear", "log"]
 
 
 @dataclass(frozen=True)
-class Axis:
+class SweepAxis:
     """One axis: the dotted name of what it sets, and how many values it has."""
 
     name: str
@@ -33,13 +33,13 @@ class Axis:
         raise NotImplementedError
 
     @property
-    def told(self) -> Sequence[Any]:
+    def extremes(self) -> Sequence[Any]:
         """The values that its range can be judged by: each that was listed, else the ends."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Listed(Axis):
+class Listed(SweepAxis):
     """Values as written."""
 
     values: tuple[Any, ...]
@@ -60,12 +60,12 @@ class Listed(Axis):
         return values[places]
 
     @property
-    def told(self) -> Sequence[Any]:
+    def extremes(self) -> Sequence[Any]:
         return self.values
 
 
 @dataclass(frozen=True)
-class _Between(Axis):
+class _Between(SweepAxis):
     """So many values from one number to another."""
 
     first: float
@@ -77,7 +77,7 @@ class _Between(Axis):
         return self.count
 
     @property
-    def told(self) -> Sequence[Any]:
+    def extremes(self) -> Sequence[Any]:
         return self.first, self.last
 
 

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from comparisons.engines.base import EngineMissing
-from comparisons.isolation import Cells, Limits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.sweeps.parts import Folder
 from comparisons.sweeps.work import Part, Work, versions_here
 from scenarios import DropspinError
@@ -55,7 +55,7 @@ def connected(scheduler: str) -> Iterator[Any]:
             client.run(_leave, on_error="ignore")
 
 
-def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Folder, told: Callable[[int], None]) -> None:
+def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Folder, on_progress: Callable[[int], None]) -> None:
     """Have parts done by the workers of a client's scheduler; the other arguments are those of `local.run_here`.
 
     Raises:
@@ -99,11 +99,11 @@ def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Folde
                 )
             del tries[part]
             done += part.last - part.first
-        told(done)
+        on_progress(done)
 
 
-Stamp = tuple[str, Limits]
-_idle: dict[Stamp, list[Cells]] = {}
+Stamp = tuple[str, ResourceLimits]
+_idle: dict[Stamp, list[EngineProcesses]] = {}
 """The engines' processes of this worker by the sweep they are for, as many sets as its threads have been at work at a time."""
 
 
@@ -120,14 +120,14 @@ def _do(work: Work, part: Part, where: str) -> None:
     for package, version in versions_here().items():
         if version != work.versions[package]:
             raise DropspinError(f"a worker has {package} {version}, here it is {work.versions[package]}; install the same on both.")
-    stamp = (work.identity, work.limits)
+    stamp = (work.identity, work.resources)
     _leave(but=stamp)  # a client that was killed has left its own
     at_rest = _idle.setdefault(stamp, [])
-    cells = at_rest.pop() if at_rest else Cells(work.limits, start_method="spawn")
+    processes = at_rest.pop() if at_rest else EngineProcesses(work.resources, start_method="spawn")
     try:
-        folder.write(*part, work.table(part, cells, _go_on_unless_closing))
+        folder.write(*part, work.table(part, processes, _go_on_unless_closing))
     finally:
-        at_rest.append(cells)  # which nobody takes up if the sweep has been left meanwhile
+        at_rest.append(processes)  # which nobody takes up if the sweep has been left meanwhile
         if _idle.get(stamp) is not at_rest:
             _end(at_rest)
 
@@ -146,7 +146,7 @@ def _leave(but: Stamp | None = None) -> None:
         _end(_idle.pop(stamp))
 
 
-def _end(at_rest: list[Cells]) -> None:
+def _end(at_rest: list[EngineProcesses]) -> None:
     while at_rest:
         with at_rest.pop():
             pass

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic_core import to_json
 
 from comparisons.engines.base import Engine
-from comparisons.sweeps.axes import Axis, Drawn
+from comparisons.sweeps.axes import Drawn, SweepAxis
 from comparisons.sweeps.fields import content_of, path_of, put
 from scenarios import DropspinError, Scenario
 
@@ -106,7 +106,7 @@ class Sweep:
     engines: tuple[Engine, ...]
     dts: tuple[float, ...]
     seeds: Sequence[int] | None
-    axes: tuple[Axis, ...]
+    axes: tuple[SweepAxis, ...]
     draws: int
     metrics: tuple[str, ...]
 

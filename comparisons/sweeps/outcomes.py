@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.comparison import Comparison, Unresolved
-from comparisons.metrics import METRICS
+from comparisons.measuring.comparison import Comparison, Unresolved
+from comparisons.measuring.metrics import METRICS
+from comparisons.running.recording import Breakdown
 from reference_impl.summary import FIGURES, Moved, summarise
 from scenarios import Scenario, Trajectory, truth_for
 
@@ -56,9 +57,9 @@ class Outcomes:
         """Of some of them."""
         return Outcomes(*(column[places] for column in vars(self).values()))
 
-    def tell(self, place: int, verdict: str, reason: str) -> None:
-        """What became of a job that has no motion."""
-        self.verdict[place], self.reason[place] = verdict, " ".join(reason.split())
+    def set_breakdown(self, place: int, breakdown: Breakdown) -> None:
+        """Record why a job has no motion."""
+        self.verdict[place], self.reason[place] = breakdown.verdict, " ".join(breakdown.reason.split())
 
     def take(self, places: NDArray[np.intp], motions: Array, moved: Moved, floor: bool, damped: bool) -> None:
         """What became of the jobs at some places, by their motions, shape (len(places), n, 13)."""
@@ -68,7 +69,7 @@ class Outcomes:
         self.state[places] = motions[np.arange(len(places)), moved.rows - 1]
         self.verdict[places] = "measured"
         for place in np.flatnonzero(bad >= 0):
-            self.tell(places[place], "diverged", f"not finite at t = {bad[place] * moved.dt[place]:g} s")
+            self.set_breakdown(places[place], Breakdown("diverged", f"the state is not finite at t = {bad[place] * moved.dt[place]:g} s"))
             self.state[places[place]] = np.nan
 
 
@@ -103,10 +104,10 @@ def origins(starts: Array, resting_heights: Array, floor: bool) -> Array:
     return np.stack([np.zeros(len(starts)), resting_heights, np.zeros(len(starts))], axis=1)
 
 
-def truth_metrics(scene: Scenario, states: Array, dt: float, lag: float, names: Sequence[str]) -> list[float]:
+def truth_metrics(scene: Scenario, motion: Trajectory, names: Sequence[str]) -> list[float]:
     """Metrics of one motion beside the truth; NaN where the scene has not got one, or the step is too coarse for it."""
     truth = truth_for(scene)
-    case = Comparison.with_truth(scene, Trajectory.from_states(dt * np.arange(len(states), dtype=float), states, lag), truth)
+    case = Comparison.with_truth(scene, motion, truth)
     return [_value(METRICS[name].measure, case) if METRICS[name].applies(scene, truth) else np.nan for name in names]
 
 

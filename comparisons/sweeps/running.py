@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from comparisons.isolation import Limits
+from comparisons.running.processes import ResourceLimits
 from comparisons.sweeps.cluster import connected, run_on_cluster
 from comparisons.sweeps.jobs import Sweep
 from comparisons.sweeps.local import run_here
@@ -21,8 +21,8 @@ def run_sweep(
     *,
     resume: bool = False,
     scheduler: str | None = None,
-    limits: Limits = Limits(processor_time=60.0),  # noqa: B008 - it cannot be changed
-    told: Callable[[int], None] = lambda done: None,
+    resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
+    on_progress: Callable[[int], None] = lambda done: None,
 ) -> None:
     """Run what a folder has not yet of a sweep.
 
@@ -31,13 +31,13 @@ def run_sweep(
         where: The folder, or a URL that fsspec knows.
         resume: Go on where an earlier run of the same sweep ended, however it ended.
         scheduler: The address of a Dask scheduler; None: on this machine.
-        limits: What an engine may use for one job.
-        told: Called with the number of jobs done since the last call, those that were there first; may raise to end it all.
+        resources: What an engine may use for one job.
+        on_progress: Called with the number of jobs done since the last call, those that were there first; may raise to end it all.
 
     Raises:
         DropspinError: The folder holds something else, or cannot be written.
     """
-    work = Work.of(sweep, limits)
+    work = Work.of(sweep, resources)
     folder = Folder(where, work.identity)
     earlier = folder.about()
     if earlier is not None:
@@ -49,15 +49,15 @@ def run_sweep(
             )
     else:
         kept = 0
-    told(kept)
+    on_progress(kept)
     parts = work.missing(folder)
     if scheduler is None:
         folder.begin(work.about)
-        run_here(work, parts, folder, told)
+        run_here(work, parts, folder, on_progress)
         return
     with connected(scheduler) as client:
         folder.begin(work.about)
-        run_on_cluster(client, work, parts, folder, told)
+        run_on_cluster(client, work, parts, folder, on_progress)
 
 
 def count(where: str) -> int:
@@ -65,7 +65,7 @@ def count(where: str) -> int:
     return sum(jobs for jobs, _ in _parts(where)) if Folder(where).about() is not None else 0
 
 
-def read(where: str) -> pd.DataFrame:
+def read_sweep(where: str) -> pd.DataFrame:
     """The table of a sweep, in the order of its jobs; of one that has not come to its end, what there is.
 
     Raises:

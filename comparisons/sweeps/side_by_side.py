@@ -15,13 +15,13 @@ from pydantic import ValidationError
 
 import reference_impl
 from comparisons.engines.document import Document, reference_body, reference_world
-from comparisons.simulating import LEAST_STEPS, MOST_STEPS
+from comparisons.running.recording import FEWEST_STEPS, MOST_STEPS
 from comparisons.sweeps.fields import Path, path_of, put, with_fields
 from comparisons.sweeps.jobs import OPTION, Jobs
 from comparisons.sweeps.outcomes import Outcomes, origins, truth_metrics
 from comparisons.sweeps.singly import scene_of
 from reference_impl.summary import Moved
-from scenarios import Scenario, SceneError
+from scenarios import Scenario, SceneError, Trajectory
 from scenarios.body import Body
 from scenarios.ensemble import clearances, spread_starts
 from scenarios.model import TOUCHING, unit
@@ -137,7 +137,11 @@ def _run(jobs: Jobs, places: Places, engine: Document, scene: Scenario, found: O
             for place, motion, rows in zip(some, motions, moved.rows, strict=True):
                 if found.verdict[places[place]] == "measured":
                     dt = float(jobs.dts[place])
-                    found.metrics[places[place]] = truth_metrics(scene_of(jobs, place), motion[:rows], dt, 0.5 * dt, metrics)
+                    found.metrics[places[place]] = truth_metrics(
+                        scene_of(jobs, place),
+                        Trajectory.from_states(dt * np.arange(rows, dtype=float), motion[:rows], 0.5 * dt),
+                        metrics,
+                    )
 
 
 def _batches(order: Places, steps: NDArray[np.int64]) -> Iterator[Places]:
@@ -178,7 +182,7 @@ def _lot(jobs: Jobs, scene: Scenario) -> tuple[_Lot, NDArray[np.bool_]]:
     size = np.array([body.size for body in bodies])
     with np.errstate(all="ignore"):  # what does not fit is left over
         ratio = of(("duration",), scene.duration) / jobs.dts
-        fits = built & (ratio + 1e-9 >= LEAST_STEPS) & (ratio + 1e-9 <= MOST_STEPS)
+        fits = built & (ratio + 1e-9 >= FEWEST_STEPS) & (ratio + 1e-9 <= MOST_STEPS)
     if has_floor:
         fits &= clearance >= -0.5 * TOUCHING * size  # what is nearer to the bound is left to the scene itself
     gravity = None

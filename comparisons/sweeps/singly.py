@@ -1,12 +1,8 @@
-"""One job after another, through any engine, as a run would do each."""
-
-import time
+"""One job of a sweep after another, with any engine."""
 
 import numpy as np
 
-from comparisons.building import assert_built_as_meant, sound_limits, sound_record
-from comparisons.engines.base import Diverged
-from comparisons.simulating import assert_step_fits
+from comparisons.running.recording import Breakdown, try_record, verify_time_step
 from comparisons.sweeps.fields import with_fields
 from comparisons.sweeps.jobs import Jobs
 from comparisons.sweeps.outcomes import Outcomes, moved_alone, truth_metrics
@@ -15,41 +11,28 @@ from scenarios.ensemble import spread_start
 
 
 def run_singly(jobs: Jobs, place: int, found: Outcomes, metrics: tuple[str, ...]) -> None:
-    """Run the job at a place; whatever goes wrong is told in its row."""
+    """Run the job at a place; what goes wrong is recorded in its row."""
     dt = float(jobs.dts[place])
     try:
         scene = scene_of(jobs, place)
         engine = jobs.engine_at(place)
-        assert_step_fits(scene, dt)
-        refusal = engine.declines(scene)
+        verify_time_step(scene, dt)
     except DropspinError as error:
-        refusal = str(error)
-    if refusal is not None:
-        found.tell(place, "declined", refusal)
+        found.set_breakdown(place, Breakdown("declined", str(error)))
         return
-    steps = scene.steps(dt)
-    found.steps[place] = steps
-    try:
-        with engine.prepare(scene, dt) as simulation:
-            assert_built_as_meant(engine, scene, simulation)
-            start = time.perf_counter()
-            states = sound_record(simulation.record(steps), steps + 1)
-            taken = time.perf_counter() - start
-            lag = 0.5 * dt if simulation.staggered else 0.0
-            limits = sound_limits(simulation.limits)
-    except Diverged as error:
-        found.tell(place, "diverged", str(error))
+    recording = try_record(engine, scene, dt)
+    if isinstance(recording, Breakdown):
+        found.steps[place] = 0 if recording.verdict == "declined" else scene.steps(dt)
+        found.set_breakdown(place, recording)
         return
-    except Exception as error:  # an engine is somebody else's code: whatever it raises costs its own row and is told there
-        found.tell(place, "crashed", f"{type(error).__name__}: {error}")
-        return
-    found.time_per_step[place] = taken / steps
-    moved = moved_alone(scene, dt, lag, steps + 1)
-    found.take(np.array([place]), states[np.newaxis], moved, scene.floor is not None, scene.damping is not None)
+    steps, motion = scene.steps(dt), recording.motion
+    found.time_per_step[place] = recording.seconds / steps
+    moved = moved_alone(scene, dt, motion.velocity_lag, steps + 1)
+    found.take(np.array([place]), motion.states[np.newaxis], moved, scene.floor is not None, scene.damping is not None)
     if found.verdict[place] == "measured":
-        found.reason[place] = "; ".join(limit.said for limit in limits)
+        found.reason[place] = "; ".join(one.message for one in recording.limitations)
         if metrics:
-            found.metrics[place] = truth_metrics(scene, states, dt, lag, metrics)
+            found.metrics[place] = truth_metrics(scene, motion, metrics)
 
 
 def scene_of(jobs: Jobs, place: int) -> Scenario:

@@ -8,17 +8,17 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from comparisons.engines.registry import engine
-from comparisons.metrics import METRICS
-from comparisons.simulating import assert_step_fits
-from comparisons.sweeps.axes import Axis, Drawn, Listed, Spaced, Spacing
+from comparisons.measuring.metrics import METRICS
+from comparisons.running.recording import verify_time_step
+from comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
 from comparisons.sweeps.fields import NoSuchField, assert_has, with_fields
 from comparisons.sweeps.jobs import OPTION, Sweep, configured
-from comparisons.validating import validated
 from reference_impl.summary import FIGURES
 from scenarios import DropspinError, Scenario, SceneError, load
 from scenarios.body import Number, Positive, Table
 from scenarios.errors import UnknownName
 from scenarios.loading import read_toml
+from scenarios.validation import validated
 
 MOST_JOBS = 10**15
 WHOLE_NUMBERS = frozenset({"ensemble.size", "ensemble.seed"})
@@ -136,8 +136,8 @@ def _flat(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     return found
 
 
-def _grid(where: str, table: Mapping[str, Any]) -> list[Axis]:
-    axes: list[Axis] = []
+def _grid(where: str, table: Mapping[str, Any]) -> list[SweepAxis]:
+    axes: list[SweepAxis] = []
     for name, given in _flat(table).items():
         here = f"{where}: grid: {name}"
         if isinstance(given, Mapping):
@@ -169,12 +169,12 @@ def _canonical(here: str, name: str, value: Any) -> Any:
     return value
 
 
-def _random(where: str, table: Mapping[str, Any]) -> list[Axis]:
+def _random(where: str, table: Mapping[str, Any]) -> list[SweepAxis]:
     if not table:
         return []
     size = validated(Draws, f"{where}: random", {key: table[key] for key in ("count", "seed") if key in table})
     spans = _flat({key: value for key, value in table.items() if key not in ("count", "seed")})
-    axes: list[Axis] = []
+    axes: list[SweepAxis] = []
     for name, given in spans.items():
         here = f"{where}: random: {name}"
         if not isinstance(given, Mapping):
@@ -208,21 +208,21 @@ def _assert_sound(where: str, sweep: Sweep) -> None:
     for axis in sweep.axes:
         here = f"{where}: {'random' if isinstance(axis, Drawn) else 'grid'}: {axis.name}"
         try:
-            for value in axis.told:
+            for value in axis.extremes:
                 _assert_allowed(sweep, axis, value)
         except DropspinError as error:
             raise DropspinError(f"{here}: {error}") from None
     for scene in sweep.scenes:
         for dt in sweep.dts:
             try:
-                assert_step_fits(scene, dt)
+                verify_time_step(scene, dt)
             except DropspinError:
                 # A duration that is swept may be longer; a job that is too short says so in its row.
                 if not any(axis.name == "duration" for axis in sweep.axes):
                     raise
 
 
-def _assert_allowed(sweep: Sweep, axis: Axis, value: Any) -> None:
+def _assert_allowed(sweep: Sweep, axis: SweepAxis, value: Any) -> None:
     if axis.name == "dt":
         if type(value) is not float or not 0.0 < value < math.inf:
             raise DropspinError(f"got {value!r}; a time step is a number above 0, in s.")
@@ -239,12 +239,12 @@ def _assert_allowed(sweep: Sweep, axis: Axis, value: Any) -> None:
             _assert_some_scene(sweep, scene, axis, value)
 
 
-def _assert_some_scene(sweep: Sweep, scene: Scenario, axis: Axis, value: Any) -> None:
+def _assert_some_scene(sweep: Sweep, scene: Scenario, axis: SweepAxis, value: Any) -> None:
     """Raise what the scene says to a value, if it does so with the other fields as they are, at their first and at their last."""
     others = [other for other in sweep.axes if other.name not in (axis.name, "dt") and not other.name.startswith(OPTION)]
     refusals = []
     for place in (None, 0, -1):
-        company = [] if place is None else [(other.name, other.told[place]) for other in others]
+        company = [] if place is None else [(other.name, other.extremes[place]) for other in others]
         try:
             with_fields(scene, [*company, (axis.name, value)])
         except SceneError as error:

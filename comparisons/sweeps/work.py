@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 
 from comparisons.engines.document import Document
-from comparisons.isolation import Cells, Failed, Limits
-from comparisons.provenance import provenance, versions
-from comparisons.simulating import Contestant
+from comparisons.results.provenance import provenance, versions
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import Breakdown, EngineEntry
 from comparisons.sweeps.jobs import Jobs, Sweep
 from comparisons.sweeps.measuring import measured
 from comparisons.sweeps.outcomes import STATE, Outcomes, joined
@@ -40,18 +40,18 @@ class Work:
 
     Attributes:
         sweep: What is asked for.
-        limits: What an engine may use for one job.
+        resources: What an engine may use for one job.
         versions: Of everything that the figures depend on.
     """
 
     sweep: Sweep
-    limits: Limits
+    resources: ResourceLimits
     versions: dict[str, str | None]
 
     @classmethod
-    def of(cls, sweep: Sweep, limits: Limits) -> "Work":
+    def of(cls, sweep: Sweep, resources: ResourceLimits) -> "Work":
         """With the versions that are installed here."""
-        return cls(sweep, limits, versions_here())
+        return cls(sweep, resources, versions_here())
 
     @cached_property
     def identity(self) -> str:
@@ -84,7 +84,7 @@ class Work:
     def part_size(self) -> int:
         """How many jobs make a part: as many as take about two seconds, by what the most expensive of them may take."""
         others = [axis for axis in self.sweep.axes if axis.name in ("dt", "duration")]
-        ends = {axis.name: [float(value) for value in axis.told] for axis in others}
+        ends = {axis.name: [float(value) for value in axis.extremes] for axis in others}
         longest = max([scene.duration for scene in self.sweep.scenes] if "duration" not in ends else ends["duration"])
         steps = longest / min([*self.sweep.dts, *ends.get("dt", [])])
         slow = any(not isinstance(engine, Document) for engine in self.sweep.engines) or bool(self.sweep.metrics)
@@ -105,47 +105,47 @@ class Work:
             if part.first not in present:
                 yield part
 
-    def table(self, part: Part, cells: Cells, go_on: Callable[[], None] = lambda: None) -> pa.Table:
+    def table(self, part: Part, processes: EngineProcesses, go_on: Callable[[], None] = lambda: None) -> pa.Table:
         """Do a part.
 
         Args:
             part: Which.
-            cells: The engines' processes.
+            processes: The engines' processes.
             go_on: Called before each piece of work, and after one that failed; raises if the sweep is over.
         """
         lots = self.sweep.jobs(part.first, part.last)
-        return _as_table(self.sweep, lots, joined([self._outcomes(jobs, cells, go_on) for jobs in lots]))
+        return _as_table(self.sweep, lots, joined([self._outcomes(jobs, processes, go_on) for jobs in lots]))
 
-    def _outcomes(self, jobs: Jobs, cells: Cells, go_on: Callable[[], None]) -> Outcomes:
+    def _outcomes(self, jobs: Jobs, processes: EngineProcesses, go_on: Callable[[], None]) -> Outcomes:
         """Jobs of one engine in its process; where they break it, once more one by one, to find which of them does."""
-        contestant = Contestant(jobs.engine.label, jobs.engine)
+        entry = EngineEntry(jobs.engine.label, jobs.engine)
         first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
         go_on()
         try:
-            found = cells.call(contestant, _measured_here, self.sweep, first, last)
+            found = processes.call(entry, _measured_here, self.sweep, first, last)
         except Failed:
-            return joined([self._outcome(contestant, number, cells, go_on) for number in range(first, last)])
+            return joined([self._outcome(entry, number, processes, go_on) for number in range(first, last)])
         if not (found.verdict == "crashed").any():
             return found
         # What a job raises may be the fault of those before it, such as a leak: it counts if the job does it in a new process.
         lots = []
         for place, number in enumerate(range(first, last)):
             if found.verdict[place] == "crashed":
-                cells.renew(contestant)
-                lots.append(self._outcome(contestant, number, cells, go_on))
+                processes.renew(entry)
+                lots.append(self._outcome(entry, number, processes, go_on))
             else:
                 lots.append(found[place : place + 1])
         return joined(lots)
 
-    def _outcome(self, contestant: Contestant, number: int, cells: Cells, go_on: Callable[[], None]) -> Outcomes:
+    def _outcome(self, entry: EngineEntry, number: int, processes: EngineProcesses, go_on: Callable[[], None]) -> Outcomes:
         """A job alone; if it breaks its engine, that."""
         go_on()
         try:
-            return cells.call(contestant, _measured_here, self.sweep, number, number + 1)
+            return processes.call(entry, _measured_here, self.sweep, number, number + 1)
         except Failed as failure:
             go_on()  # or it was ended with the sweep, and is to be run again
             lost = Outcomes.blank(1, len(self.sweep.metrics))
-            lost.tell(0, failure.verdict, failure.reason)
+            lost.set_breakdown(0, Breakdown(failure.verdict, failure.reason))
             return lost
 
 
@@ -154,7 +154,7 @@ def versions_here() -> dict[str, str | None]:
     return versions() | {"reference_impl": sources.HASH[:12]}
 
 
-def _measured_here(contestant: Contestant, sweep: Sweep, first: int, last: int) -> Outcomes:
+def _measured_here(entry: EngineEntry, sweep: Sweep, first: int, last: int) -> Outcomes:
     return measured(sweep, first, last)
 
 

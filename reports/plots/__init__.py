@@ -5,7 +5,6 @@ and the lines that make it.
 """
 
 from reports.plots.bounces import plot_bounce_ladder
-from reports.plots.conditions import extremes_figure, plot_conditions, plot_stability_map, stability_figure
 from reports.plots.convergence import plot_error_over_dt
 from reports.plots.ensembles import plot_angular_momentum_of_ensemble, plot_energy_of_ensemble, plot_rest_of_ensemble
 from reports.plots.figures import (
@@ -19,6 +18,7 @@ from reports.plots.figures import (
 )
 from reports.plots.growth import plot_error_growth
 from reports.plots.history import plot_history
+from reports.plots.limits import limits_figure, plot_failure_modes
 from reports.plots.over_time import Quantity, angular_momentum_length, height, plot_over_time, quantities, tilt
 from reports.plots.spins import plot_polhode
 from reports.plots.style import FAINT, INK
@@ -32,13 +32,13 @@ __all__ = [
     "bounce_figure",
     "convergence_figure",
     "ensemble_figure",
-    "extremes_figure",
     "flight_figure",
     "height",
     "history_figure",
+    "limits_figure",
     "plot_angular_momentum_of_ensemble",
     "plot_bounce_ladder",
-    "plot_conditions",
+    "plot_failure_modes",
     "plot_energy_of_ensemble",
     "plot_error_growth",
     "plot_error_over_dt",
@@ -46,10 +46,8 @@ __all__ = [
     "plot_over_time",
     "plot_polhode",
     "plot_rest_of_ensemble",
-    "plot_stability_map",
     "plot_tradeoff",
     "quantities",
-    "stability_figure",
     "tilt",
     "time_figure",
     "tradeoff_figure",

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons import Results
-from comparisons.comparison import SHORTEST_FLIGHT, Comparison
+from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison
+from comparisons.results.results import Results
 from reports.plots.style import Array, as_truth, at_one_step, label_powers, step_of
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import apex

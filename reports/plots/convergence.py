@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from comparisons import Results
-from reports.colours import engine_colours, engine_markers
+from comparisons.results.results import Results
+from reports.plots.colours import engine_colours, engine_markers
 from reports.plots.style import ROUNDING, Array, ink, label_powers, metric_label, thinner
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Ax
         largest = max([largest, *sizes])
         style: Any = {"marker": markers[engine], "markerfacecolor": "none", "linewidth": 1.5, "color": colours[engine]}
         axes.loglog(rows["dt"], sizes, markersize=thinner(8.0, 4.0, number, len(results.engines)), label=engine, **style)
-        foreseen = results.frame[(results.frame["kind"] == "prediction") & (results.frame["engine"] == engine)]
+        foreseen = results.table[(results.table["kind"] == "prediction") & (results.table["engine"] == engine)]
         foreseen = foreseen[(foreseen["scene"] == scene_name) & (foreseen["metric"] == metric) & (foreseen["value"].abs() > ROUNDING)]
         if not foreseen.empty:
             label = None if is_labelled else "predicted"
@@ -44,9 +44,9 @@ def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Ax
 
 def _draw_fit(results: Results, scene_name: str, metric: str, engine: str, dts: Array, errors: Array, axes: "Axes") -> None:
     """Draw |m + C hᵖ| through the finest step, dashed, from the coarsest to a quarter of the finest."""
-    frame = results.frame
+    frame = results.table
     mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric) & (frame["engine"] == engine)]
-    fitted, limits = (mine[mine["kind"] == kind] for kind in ("order", "model_error"))
+    fitted, limits = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))
     if fitted.empty or limits.empty:
         return
     order = float(fitted["value"].iloc[0])

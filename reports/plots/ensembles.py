@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from comparisons import Results
+from comparisons.results.results import Results
 from reports.plots.style import TIME, Array, at_one_step
 from scenarios import DropspinError
 

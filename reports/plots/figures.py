@@ -1,10 +1,10 @@
 """The report's figures: plots side by side, in the colours of the page, under one legend."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from comparisons import Results
+from comparisons.results.results import Results
 from reports.plots.bounces import plot_bounce_ladder
 from reports.plots.convergence import plot_error_over_dt
 from reports.plots.ensembles import (
@@ -41,6 +41,15 @@ GROWTH = ("orientation_error", "position_error", "energy_error")
 WORTH_A_POINT, WORTH_A_LINE = 1e-13, 1e-11
 """Errors that are nowhere larger are rounding; over many steps it adds up."""
 MOST_PANELS = 3
+
+
+def report_figures(results: Results) -> "Iterator[tuple[str, Figure]]":
+    """Name and figure of each plot of the report."""
+    for number, scene in enumerate(results.scenes):
+        for kind, draw in FIGURES.items():
+            figure = draw(results, scene)
+            if figure is not None:
+                yield f"{number:02d}-{kind}", figure
 
 
 def tradeoff_figure(found: "TradeOff") -> "Figure":
@@ -123,8 +132,8 @@ def bounce_figure(results: Results, scene_name: str) -> "Figure | None":
 
 def history_figure(history: "History", scene_name: str) -> "Figure":
     """Each metric of a scene over runs."""
-    figures = history.figures[~history.figures["kind"].isin(["order", "model_error"])]
-    metrics = list(dict.fromkeys(figures.loc[figures["scene"] == scene_name, "metric"]))
+    results = history.results[~history.results["kind"].isin(["order", "asymptotic_error"])]
+    metrics = list(dict.fromkeys(results.loc[results["scene"] == scene_name, "metric"]))
     with _figure([""] * len(metrics), MOST_PANELS) as (figure, panels):
         for axes, metric in zip(panels, metrics, strict=True):
             plot_history(history, scene_name, metric, axes)
@@ -156,3 +165,13 @@ def _add_legend(figure: "Figure", panels: "list[Axes]") -> None:
     named = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     handles, labels = list(named.values()), list(named)
     figure.legend(handles, labels, loc="outside upper left", ncols=len(labels), fontsize=9)
+
+
+FIGURES: "dict[str, Callable[[Results, str], Figure | None]]" = {
+    "time": time_figure,
+    "flight": flight_figure,
+    "bounces": bounce_figure,
+    "convergence": convergence_figure,
+    "ensemble": ensemble_figure,
+}
+"""The figures of a scene in the report, where it has them."""

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons import Results
-from comparisons.comparison import Comparison, Unresolved
-from comparisons.errors import ERRORS
+from comparisons.measuring.comparison import Comparison, Unresolved
+from comparisons.measuring.errors_over_time import ERRORS
+from comparisons.results.results import Results
 from reports.plots.style import ROUNDING, TIME, Array, at_one_step, label_powers, metric_label, stride
 from scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
 
@@ -24,7 +24,7 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
     Args:
         results: The run.
         scene_name: One of its scenes; it must have a truth.
-        metric: A key of `comparisons.errors.ERRORS`, such as `orientation_error`.
+        metric: A key of `comparisons.measuring.errors_over_time.ERRORS`, such as `orientation_error`.
         axes: What to draw into.
 
     Raises:

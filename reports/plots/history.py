@@ -1,11 +1,11 @@
-"""Figures over runs."""
+"""Results over runs."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from comparisons.regressions.history import History
-from reports.colours import engine_colours
+from reports.plots.colours import engine_colours
 from reports.plots.style import metric_label, power, thinner
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 LONGEST_LABEL = 22
 SMALLEST, MOST_TICKS = 1e-3, 7
-"""Figures below this share of the largest are drawn near 0, on a linear part of the axis."""
+"""Results below this share of the largest are drawn near 0, on a linear part of the axis."""
 
 
 def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -> None:
@@ -28,11 +28,11 @@ def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -
     """
     from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
-    figures = history.figures
-    shown = figures[(figures["scene"] == scene_name) & (figures["metric"] == metric) & ~figures["kind"].isin(["order", "model_error"])]
+    results = history.results
+    shown = results[(results["scene"] == scene_name) & (results["metric"] == metric) & ~results["kind"].isin(["order", "asymptotic_error"])]
     steps = min(shown["steps"], key=float)
     shown = shown[shown["steps"] == steps]
-    engines = list(dict.fromkeys(figures["engine"]))
+    engines = list(dict.fromkeys(results["engine"]))
     colours = engine_colours(engines)
     for number, engine in enumerate(engines):
         line = shown[shown["engine"] == engine].sort_values("run")
@@ -40,11 +40,11 @@ def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -
             continue
         width = thinner(3.8, 1.2, number, len(engines))
         axes.plot(line["run"], line["value"], color=colours[engine], linewidth=width, marker="o", markersize=width + 1.5, label=engine)
-        moved = [move.run for move in history.moves if move.engine == engine and _has(move.figures, scene_name, metric, steps)]
+        moved = [move.run for move in history.moves if move.engine == engine and _has(move.results, scene_name, metric, steps)]
         at = line[line["run"].isin(moved)]
         axes.plot(at["run"], at["value"], "o", markersize=13.0, markerfacecolor="none", markeredgecolor=colours[engine])
     sizes = shown["value"].abs()
-    if sizes.max() > 0.0:  # figures of several engines, orders of magnitude apart, each visible
+    if sizes.max() > 0.0:  # results of several engines, orders of magnitude apart, each visible
         smallest = max(float(sizes[sizes > 0.0].min()), SMALLEST * float(sizes.max()))
         linear = float(10.0 ** np.floor(np.log10(smallest)))
         axes.set_yscale("symlog", linthresh=linear)
@@ -75,5 +75,5 @@ def run_labels(history: History) -> list[str]:
     return [", ".join(f"{column} {row[column]}" for column in telling)[:LONGEST_LABEL] for row in stamps.to_dict("records")]
 
 
-def _has(figures: "pd.DataFrame", scene_name: str, metric: str, steps: str) -> bool:
-    return bool(((figures["scene"] == scene_name) & (figures["metric"] == metric) & (figures["steps"] == steps)).any())
+def _has(results: "pd.DataFrame", scene_name: str, metric: str, steps: str) -> bool:
+    return bool(((results["scene"] == scene_name) & (results["metric"] == metric) & (results["steps"] == steps)).any())

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons import Results
+from comparisons.results.results import Results
 from reports.plots.style import TIME, Array, as_truth, at_one_step, exactly, thinned
 from scenarios import Scenario, Trajectory, truth_for
 from scenarios.mechanics import angular_momentum, energy

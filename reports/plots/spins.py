@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons import Results
+from comparisons.results.results import Results
 from reports.plots.style import Array, as_truth, at_one_step, exactly, ink, thinned
 from scenarios import DropspinError, Scenario, Trajectory, truth_for
 from scenarios.rotations import cross, unrotate

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons import METRICS, Results
-from reports.colours import engine_colours, engine_markers
+from comparisons.measuring.metrics import METRICS
+from comparisons.results.results import Results
+from reports.plots.colours import engine_colours, engine_markers
 from scenarios import Scenario, Trajectory, Truth
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from comparisons.tradeoff import SIDE_BY_SIDE
-from reports.colours import engine_colours, engine_markers
+from reports.plots.colours import engine_colours, engine_markers
 from reports.plots.style import ROUNDING, ink, label_powers, metric_label
 
 if TYPE_CHECKING:

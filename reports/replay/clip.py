@@ -94,7 +94,7 @@ def _writer(file: Path) -> tuple[Any, Any]:
 
 
 def _frame(axes: "Axes3D", replay: Replay) -> None:
-    """Limits that hold all of every motion, with our y up; a floor."""
+    """ResourceLimits that hold all of every motion, with our y up; a floor."""
     size = replay.scene.body.size
     places = np.concatenate([motion.frames.position for motion in replay.motions])
     places = places[replay.in_sight(places)]

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons import Results
-from comparisons.comparison import Comparison, exactly
-from reports.colours import engine_colours
+from comparisons.measuring.comparison import Comparison, exactly
+from comparisons.results.results import Results
+from reports.plots.colours import engine_colours
 from scenarios import DropspinError, Scenario, Trajectory, truth_for
 from scenarios.mechanics import angular_momentum
 from scenarios.rotations import about, conjugate, cross, dot, multiply

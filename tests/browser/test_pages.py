@@ -17,12 +17,12 @@ from playwright.sync_api import sync_playwright
 
 import comparisons
 import scenarios
-from reports.cli import dropspin
-from reports.findings import lasting_errors
-from reports.folder import write
-from reports.html import FIGURES
+from reports.commands.main import dropspin
+from reports.html.report import FIGURES
 from reports.replay.motions import TRUTH
-from reports.section import Section
+from reports.run_folder import write
+from reports.sections import Section
+from reports.views.findings import lasting_errors
 from scenarios.rotations import about, angle_between_orientations, multiply
 
 ENGINES = ["document", "mujoco", "pybullet"]

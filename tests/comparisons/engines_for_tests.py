@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons import Diverged, Engine, Simulation
+from comparisons.engines.base import Diverged, Engine, Simulation
 from scenarios import load, names, truth_for
 from scenarios.rotations import multiply
 
@@ -102,7 +102,7 @@ class HeavyInertia(Exact):
     name = "heavy-inertia"
 
     def prepare(self, scene, dt):
-        from comparisons import AsBuilt
+        from comparisons.engines.base import AsBuilt
 
         simulation = ExactSimulation(scene, dt)
         body = scene.body

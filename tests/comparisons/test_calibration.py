@@ -8,9 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from comparisons import engine, simulate
 from comparisons.calibration import calibrate
 from comparisons.engines.mujoco_contact import damping_ratio
+from comparisons.engines.registry import engine
+from comparisons.running.recording import simulate
 from scenarios import DropspinError, load
 
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95)

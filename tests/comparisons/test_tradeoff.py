@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from comparisons import METRICS, measure, simulate
+from comparisons.measuring.metrics import METRICS
+from comparisons.running.recording import simulate
+from comparisons.running.run import measure
 from comparisons.tradeoff import DIVISIONS, Point, TradeOff, default_metric, output_interval, tradeoff
 from scenarios import DropspinError, load
 

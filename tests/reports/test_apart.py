@@ -5,8 +5,8 @@ import math
 import pandas as pd
 import pytest
 
-from comparisons.results import as_frame
-from reports.apart import taken_apart
+from comparisons.results.results import as_frame
+from reports.views.error_budget import taken_apart
 
 
 class Made:
@@ -16,14 +16,14 @@ class Made:
         shared = {"scene": "made", "engine": "made", "metric": "orientation_error" if unit == "rad" else "energy_error", "unit": unit}
         rows = [shared | {"dt": 1e-3, "kind": "truth", "value": value, "verdict": "measured"}]
         rows += [shared | {"metric": "penetration", "dt": 1e-3, "kind": "truth", "value": 1e-5, "verdict": "measured"}]
-        rows += [shared | {"metric": "penetration", "kind": "model_error", "value": 0.0, "upper": 1e-9, "cause": "discretisation"}]
+        rows += [shared | {"metric": "penetration", "kind": "asymptotic_error", "value": 0.0, "upper": 1e-9, "cause": "discretisation"}]
         if limit is not None:
             m, uncertainty, cause = limit
             reason = "follows no power of the step; take finer steps"
-            rows += [shared | {"kind": "model_error", "value": m, "upper": uncertainty, "cause": cause, "reason": reason}]
+            rows += [shared | {"kind": "asymptotic_error", "value": m, "upper": uncertainty, "cause": cause, "reason": reason}]
         if order is not None:
             rows += [shared | {"kind": "order", "value": order}]
-        self.frame = as_frame(rows)
+        self.table = as_frame(rows)
 
 
 def parts(made):
@@ -113,5 +113,5 @@ def test_half_a_turn_is_told():
 
 def test_small_errors_are_not_worth_a_word():
     made = Made(1e-5, limit=(1e-5, 1e-9, "model"))
-    assert isinstance(made.frame, pd.DataFrame)
+    assert isinstance(made.table, pd.DataFrame)
     assert taken_apart(made, "made") == []

@@ -15,7 +15,7 @@ import pytest
 import comparisons
 import scenarios
 from comparisons.engines.mujoco_engine import MuJoCo
-from reports.failing import failing
+from reports.views.failures import failing
 
 DROPSPIN = Path(sys.executable).with_name("dropspin")
 SCENE = """
@@ -223,7 +223,7 @@ def test_interrupted_runs_go_on(how, tmp_path):
 def test_resume_runs_again_what_was_asked_differently(tmp_path):
     """Other steps, another scene of the same name: nothing of an earlier run is taken for it."""
     import comparisons
-    from reports.folder import Measured
+    from reports.run_folder import Measured
 
     scene = scenarios.load("spin-principal")
     earlier = comparisons.run([scene], ["document"], [4e-3])
@@ -243,16 +243,16 @@ def test_resume_runs_again_what_was_asked_differently(tmp_path):
     assert runs_again(scene, ["document"], [2e-3])
     assert runs_again(scene, ["mujoco"], [4e-3])
     assert runs_again(scene.model_copy(update={"duration": 0.5}), ["document"], [4e-3])
-    assert runs_again(scene, ["document"], [4e-3], limits=comparisons.Limits(processor_time=600.0))
+    assert runs_again(scene, ["document"], [4e-3], limits=comparisons.ResourceLimits(processor_time=600.0))
 
 
 def test_an_interrupt_that_is_swallowed_still_stops_the_run(tmp_path, monkeypatch):
     """A callback of an engine or of the compiler may eat the exception; the next step of the run notices."""
     from click.testing import CliRunner
 
-    from reports import cli
+    from reports.commands import main as cli
 
-    monkeypatch.setattr("reports.interrupts._interrupts", [signal.SIGINT])
+    monkeypatch.setattr("reports.commands.interrupts._interrupts", [signal.SIGINT])
     done = CliRunner().invoke(cli.dropspin, ["run", "spin-principal", "-e", "document", "--dt", "0.01", "-o", str(tmp_path / "out")])
     assert done.exit_code != 0
     assert list(tmp_path.iterdir()) == []

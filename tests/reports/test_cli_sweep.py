@@ -139,10 +139,10 @@ def parent_of(process):
 def test_an_interrupt_that_is_swallowed_still_stops_the_sweep(tmp_path, monkeypatch):
     from click.testing import CliRunner
 
-    from reports import cli
+    from reports.commands import main as cli
 
     (tmp_path / "spec.toml").write_text(SPEC)
-    monkeypatch.setattr("reports.interrupts._interrupts", [signal.SIGINT])
+    monkeypatch.setattr("reports.commands.interrupts._interrupts", [signal.SIGINT])
     done = CliRunner().invoke(cli.dropspin, ["sweep", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "out")])
     assert done.exit_code != 0
     assert not (tmp_path / "out").exists()

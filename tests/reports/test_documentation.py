@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 import pytest
 
-from reports.cli import dropspin
+from reports.commands.main import dropspin
 from scenarios import load
 
 ROOT = Path(__file__).parents[2]

@@ -8,10 +8,11 @@ from dataclasses import replace
 import pytest
 from click.testing import CliRunner
 
-from comparisons.extremes import AXES, Explored, Extremes, Mapped, Point
-from comparisons.extremes.conditions import Finding
-from reports import extremes, plots
-from reports.cli import dropspin
+from comparisons.robustness import AXES, AxisScan, Mapped, Point, RobustnessStudy
+from comparisons.robustness.failure_modes import Diagnosis
+from reports import plots
+from reports.commands.main import dropspin
+from reports.views import limits as extremes
 from scenarios import load
 
 SPIN = load("spin-principal")
@@ -19,8 +20,8 @@ SPIN = load("spin-principal")
 
 def line(engine, conditions, axis="spin"):
     """An engine with a condition at 1, 10, … rad/s, of which the first is the scene's own."""
-    points = tuple(Point(10.0**n, Finding(one, "orientation_error", 0.2, "it is off by 0.2")) for n, one in enumerate(conditions))
-    return Explored(SPIN, AXES[axis], engine, 1.0, points)
+    points = tuple(Point(10.0**n, Diagnosis(one, "orientation_error", 0.2, "it is off by 0.2")) for n, one in enumerate(conditions))
+    return AxisScan(SPIN, AXES[axis], engine, 1.0, points)
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def study():
         line("a", ["sound", "inaccurate"], "step"),
     )
     planes = (Mapped(SPIN, (AXES["spin"], AXES["inertia-ratio"]), "a", ((1.0, lines[0]), (10.0, lines[1]))),)
-    return Extremes(SPIN, 5e-3, 0.1, lines, planes, {"c": "not installed"})
+    return RobustnessStudy(SPIN, 5e-3, 0.1, lines, planes, {"c": "not installed"})
 
 
 def test_sentences(study):
@@ -54,7 +55,7 @@ def test_tables(study):
 def test_ranges():
     """Both ways from the scene's own value, as far as it is sound all the way; none if it is not there."""
     found = line("a", ["sound", "inaccurate", "sound", "sound", "sound", "clamped", "sound"])
-    study = Extremes(SPIN, 5e-3, 0.1, (replace(found, base=1e3), replace(found, base=10.0), line("a", ["sound"])), (), {})
+    study = RobustnessStudy(SPIN, 5e-3, 0.1, (replace(found, base=1e3), replace(found, base=10.0), line("a", ["sound"])), (), {})
     told = [(row["sound from"], row["to"], row["beyond"]) for row in extremes.range_rows([study])]
     assert told == [
         ("100", "1e+04", "inaccurate at 10; clamped at 1e+05"),
@@ -83,7 +84,7 @@ def test_a_map_changes_colour_half_way_between_two_points(study):
     """On the axis's own scale: 1 and 10 meet at √10, 10 and 100 at √1000; a condition that goes on is one bar."""
     import matplotlib.pyplot as plt
 
-    axes = plt.figure().gca()
+    axes = plt.size().gca()
     plots.plot_conditions(study, "spin", axes)
     bars = [(patch.get_y() + 0.5 * patch.get_height(), patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
     plt.close("all")
@@ -121,7 +122,7 @@ def test_from_the_command_line(tmp_path, monkeypatch):
 def test_bad_input(asked, said, capfd, monkeypatch):
     import sys
 
-    from reports import cli
+    from reports.commands import main as cli
 
     monkeypatch.setattr(sys, "argv", ["dropspin", "limits", "spin-principal", *asked])
     with pytest.raises(SystemExit) as end:

@@ -18,15 +18,16 @@ import yaml
 
 import comparisons
 import scenarios
-from reports.gate import Held, accepted_sentences, sentences
 from reports.junit import junit_xml
+from reports.views.check import Held, accepted_sentences, sentences
 
 ROOT = Path(__file__).parents[2]
 DROPSPIN = Path(sys.executable).with_name("dropspin")
 ENGINE, LABEL = "my_engine:MyEngine", "my-engine"
 MY_ENGINE = '''
 import os
-from comparisons import Engine, engine
+from comparisons.engines.base import Engine
+from comparisons.engines.registry import engine
 
 
 class MyEngine(Engine):

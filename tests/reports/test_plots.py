@@ -8,7 +8,7 @@ import pytest
 
 import comparisons
 import scenarios
-from comparisons.store import restore, save
+from comparisons.results.store import restore, save
 from reports import plots
 from reports.plots.spins import VIEWS, energy_ellipsoid, facing
 from reports.plots.style import power
@@ -21,7 +21,7 @@ DT = 1e-3
 
 def made(scene, motion, dt=DT):
     """A run in which an engine did just this."""
-    frame = comparisons.run([load("spin-principal")], ["mujoco"], [1e-2]).frame.iloc[:0]
+    frame = comparisons.run([load("spin-principal")], ["mujoco"], [1e-2]).table.iloc[:0]
     return comparisons.Results(frame, {scene.name: scene}, ("made",), {(scene.name, "made", dt): motion})
 
 

@@ -15,7 +15,7 @@ from PIL import Image
 import comparisons
 import reports
 import scenarios
-from reports.cli import dropspin, main
+from reports.commands.main import dropspin, main
 from reports.replay import as_data, replay_of, replay_page, write_clip
 from reports.replay.bodies import outline
 from reports.replay.motions import MOST_FRAMES, _stride, floor_impulses

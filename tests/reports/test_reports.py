@@ -12,9 +12,9 @@ import pytest
 import comparisons
 import reports
 import scenarios
-from comparisons.store import restore
-from reports.findings import finding_sentences, profile_comparisons
-from reports.numbers import written
+from comparisons.results.store import restore
+from reports.views.findings import finding_sentences, profile_comparisons
+from reports.views.numbers import written
 from scenarios import DropspinError
 
 NASTY = "<script>alert(1)</script>$x_{"
@@ -108,7 +108,7 @@ def test_names_with_markup_are_inert(folder):
 def test_page_says_the_verdict_first(results, folder):
     """The sentence before any table, one chip for each scene and engine, the colours of each engine."""
     text = (folder / "report.html").read_text(encoding="utf-8")
-    held = (results.frame["verdict"] == "passed").sum()
+    held = (results.table["verdict"] == "passed").sum()
     assert f"All {held} checks hold:" in text
     assert text.index("checks hold") < text.index("<table")
     assert len(re.findall(r'class="chip (passed|measured)"', text)) == 6
@@ -132,7 +132,7 @@ def test_failures_come_first(tmp_path):
 def test_data_comes_back_as_it_was(results, folder):
     """Table, trajectories, scenes: equal to the bit."""
     again = restore(folder)
-    pd.testing.assert_frame_equal(again.frame, results.frame)
+    pd.testing.assert_frame_equal(again.table, results.table)
     assert set(again.trajectories) == set(results.trajectories)
     for key, motion in results.trajectories.items():
         np.testing.assert_array_equal(again.trajectories[key].states, motion.states)
@@ -140,8 +140,8 @@ def test_data_comes_back_as_it_was(results, folder):
     assert [scene.digest for scene in again.scenes.values()] == [scene.digest for scene in results.scenes.values()]
     assert again.engines == results.engines
     csv = pd.read_csv(folder / "results.csv")
-    assert len(csv) == len(results.frame)
-    assert list(csv.columns) == list(results.frame.columns)
+    assert len(csv) == len(results.table)
+    assert list(csv.columns) == list(results.table.columns)
 
 
 def test_provenance(folder):
@@ -173,7 +173,7 @@ def test_an_earlier_run_is_replaced_and_nothing_else_is_touched(results, tmp_pat
 
 def test_a_write_that_fails_leaves_the_old_run(results, tmp_path, monkeypatch):
     """Killed half-way, the old folder stands and no temporary one is left."""
-    import reports.folder as writing
+    import reports.run_folder as writing
 
     target = tmp_path / "run"
     reports.write(results, target)
@@ -305,10 +305,10 @@ def test_terminal_says_what_becomes_of_the_errors(studied, capsys):
 
 def test_two_steps_say_nothing_about_limits():
     """No study, no sentence."""
-    from reports.findings import finding_sentences
+    from reports.views.findings import finding_sentences
 
     found = comparisons.run([scenarios.load("spin-asymmetric")], ["document"], [8e-3, 4e-3])
-    assert not found.frame["kind"].isin(["order", "model_error"]).any()
+    assert not found.table["kind"].isin(["order", "asymptotic_error"]).any()
     assert finding_sentences(found) == []
 
 
@@ -320,8 +320,8 @@ def test_folder_that_is_no_run(tmp_path):
 
 def test_plots_are_the_same_every_time(results):
     """A report that changes without reason does not review."""
-    from reports.html import figures
-    from reports.svg import svg
+    from reports.html.report import figures
+    from reports.plots.svg import svg
 
     once, again = ({name: svg(figure, name) for name, figure in figures(results)} for _ in range(2))
     assert once == again
@@ -345,7 +345,7 @@ def test_many_engines_break_the_table_and_no_number(capsys):
 
     every = ["document", "document[rotation=rk4]", "document[rotation=exact,law=normal]", "mujoco", "mujoco[integrator=implicit]"]
     found = comparisons.run([scenarios.load("spin-principal")], every, [1e-2])
-    apart = found.frame[(found.frame["kind"] == "agreement") & (found.frame["metric"] == "energy_error")]["value"].abs().max()
+    apart = found.table[(found.table["kind"] == "agreement") & (found.table["metric"] == "energy_error")]["value"].abs().max()
     for engines in (found.engines, found.engines[:3], found.engines[1:2]):
         for width in (60, 80, 90, 200):
             reports.print_table(replace(found, engines=engines), Console(width=width, no_color=True))

@@ -6,8 +6,8 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from reports.cli import dropspin
-from reports.written import folder_made, write_table
+from reports.commands.main import dropspin
+from reports.output import folder_made, write_table
 from scenarios import DropspinError
 
 

@@ -1,0 +1,154 @@
+"""Convergence over several time steps: of each error the observed order, the asymptotic error as dt → 0, and the cause.
+
+Every engine must meet this, whatever a scene expects besides: its asymptotic error is 0 within its uncertainty, and its order is not below
+the one it claims. A known fault, expected of this engine by name, passes as long as the asymptotic error is the expected one.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.engines.base import KnownLimitation
+from comparisons.judging.error_budget import ErrorBudget, error_budget
+from comparisons.judging.verdicts import Cause, Judgement, Verdict, known_fault, with_limitations
+from comparisons.measuring.metrics import Average, Metric
+from comparisons.measuring.tolerances import rounding
+from scenarios import Scenario
+
+Array = NDArray[np.float64]
+
+STUDIES = ("order", "asymptotic_error")
+"""Kinds of measurements that several time steps give together."""
+ARTEFACTS = frozenset({"energy_error_raw"})
+"""Metrics that show how a state is sampled rather than how wrong it is."""
+JUMPING = frozenset({"desync_rate"})
+"""Metrics that change from flight to flight, not with a power of the step."""
+ORDER_SHORTFALL = 0.25
+"""How far below the claimed order three time steps may find the order."""
+SATURATION = 0.9 * math.pi
+"""An angle this near to half a turn saturates, so it says no longer how wrong the attitude is."""
+DESYNCHRONISED = 0.5
+"""Of the height of the drop: a bouncing body that is so far off is in another flight, and the position error says nothing any more."""
+
+
+class Claim(NamedTuple):
+    """What an engine states for a scene: its order of accuracy or None, the precision of its state, and the limitations it met."""
+
+    label: str
+    order: float | None
+    precision: type
+    limitations: tuple[KnownLimitation, ...] = ()
+
+
+class SeriesPoint(NamedTuple):
+    """A metric at one time step: dt [s], number of steps, its average over start phases, and its tolerance."""
+
+    dt: float
+    steps: int
+    average: Average
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class ConvergenceStudy:
+    """What several time steps say of one metric: the cause of its errors, and judgements of order and asymptotic error where there are any."""
+
+    cause: Cause
+    order: Judgement | None
+    asymptotic_error: Judgement | None
+
+
+def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> ConvergenceStudy:
+    """The observed order and the asymptotic error of one metric of an engine, judged.
+
+    Args:
+        scene: The scene.
+        claim: What the engine states.
+        metric: The metric.
+        series: The metric at each time step.
+    """
+    dts, errors, resolutions, rounded = _worst_part(scene, claim, metric, series)
+    budget = partial(error_budget, claimed=claim.order, signed=metric.signed, jumps=metric.name in JUMPING)
+    found = budget(dts, errors, resolutions, rounded)
+    tolerances = np.array([point.tolerance for point in series])
+    order_tolerance, error_tolerance = _tolerances(found, lambda moved: budget(dts, moved, resolutions, rounded), errors, tolerances)
+    order, limit = _judge_order(claim, found), _judge_asymptotic_error(scene, claim, metric, found, float(np.min(dts)))
+    return ConvergenceStudy(
+        found.cause,
+        None if order is None else replace(order, tolerance=order_tolerance),
+        None if limit is None else with_limitations(replace(limit, tolerance=error_tolerance), metric.name, claim.limitations),
+    )
+
+
+def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:
+    """A study of an engine with default settings; a model error that the calibrated engine does not have becomes a setting error."""
+    if study.cause != "model" or calibrated is None or calibrated.asymptotic_error is None:
+        return study
+    if calibrated.asymptotic_error.cause not in ("discretisation", "rounding"):
+        return study
+    order, limit = study.order, study.asymptotic_error
+    if limit is not None:
+        cured = ", but the calibrated profile does: it is a setting" if limit.verdict == "failed" else ""
+        limit = replace(limit, cause="setting", reason=limit.reason + cured)
+    return ConvergenceStudy("setting", None if order is None else replace(order, cause="setting"), limit)
+
+
+def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> tuple[Array, Array, Array, Array]:
+    """Time steps, errors, their resolution and what rounding may do, of the part that is largest at the finest step."""
+    dts, steps = np.array([point.dt for point in series]), np.array([point.steps for point in series], dtype=float)
+    averages = [point.average for point in series]
+    resolved = [average for average in averages if np.isfinite(average.parts).all()]
+    shape = min((average.parts.shape for average in resolved), default=(1,))
+    finest = averages[int(np.argmin(dts))].parts[: shape[0]]
+    worst = np.unravel_index(np.argmax(np.abs(finest)), finest.shape)
+    errors, resolutions = (
+        np.array([values[worst] if values.shape[1:] == shape[1:] else math.nan for values in both])
+        for both in zip(*(average[:2] for average in averages), strict=True)
+    )
+    rounded = rounding(scene, metric.unit, claim.precision, steps)
+    if metric.unit == "rad":
+        errors[np.abs(errors) > SATURATION] = math.nan
+    if metric.name == "position_error" and scene.starts_above_floor:
+        errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
+    return dts, errors, resolutions, rounded
+
+
+def _tolerances(found: ErrorBudget, budget: Callable[[Array], ErrorBudget], errors: Array, tolerances: Array) -> tuple[float, float]:
+    """How far order and asymptotic error move when each error moves by its tolerance; NaN if they are undefined then."""
+    orders, limits = [], []
+    for nth in np.flatnonzero(np.isfinite(errors)):
+        moved = [budget(np.where(np.arange(len(errors)) == nth, errors + sign * tolerances, errors)) for sign in (-1.0, 1.0)]
+        orders.append(np.max(np.abs([one.order - found.order for one in moved])))
+        limits.append(np.max(np.abs([one.asymptotic_error - found.asymptotic_error for one in moved])))
+    return float(np.sum(orders)), float(np.maximum(np.sum(limits), found.uncertainty))
+
+
+def _judge_order(claim: Claim, found: ErrorBudget) -> Judgement | None:
+    claimed = claim.order if found.cause == "discretisation" else None
+    if math.isnan(found.order) and claimed != math.inf:
+        return None
+    lower = math.nan if claimed is None else claimed - ORDER_SHORTFALL
+    verdict: Verdict = "measured" if claimed is None else "passed" if found.order >= lower else "failed"
+    if verdict == "failed" and not found.is_asymptotic:
+        verdict = "measured"
+    steps = ", ".join(f"{dt:g}" for dt in found.window)
+    left_out = "".join(f"; {dt:g} s left out: {why}" for dt, why in found.left_out)
+    claim_text = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
+    reason = f"fitted at {steps} s{left_out}{claim_text}" if steps else f"{found.reason}{claim_text}"
+    return Judgement(found.order, verdict, lower=lower, cause=found.cause, reason=reason)
+
+
+def _judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, found: ErrorBudget, finest: float) -> Judgement | None:
+    if math.isnan(found.asymptotic_error):
+        return None
+    reason: str = found.reason
+    verdict: Verdict = "measured" if found.cause == "unresolved" else "passed"
+    if found.cause == "model":
+        fault = known_fault(scene, claim.label, finest, metric, found.asymptotic_error, found.uncertainty)
+        verdict, reason = ("failed", f"{reason}; no step cures it") if fault is None else ("passed", fault)
+    return Judgement(found.asymptotic_error, verdict, -found.uncertainty, found.uncertainty, found.cause, reason)

@@ -1,0 +1,74 @@
+"""Predicted errors: what the error of an integration scheme must be, where theory gives it.
+
+Free flight: semi-implicit Euler has an exact discrete solution (`scenarios.discrete_flight`), whose metrics are measured.
+A body that falls flat, over the drop's height H, with u its impact speed, averaged over start phases:
+
+    impact detected late, v⁺ = -e v⁻ - s g h        bounce height  -(1 - e)/2 u h/H,          restitution  -s g h/u
+    gravity before the impact, as in the note    bounce height  (2e - 1)(1 + e)/2 u h/H,   restitution  e g h/u
+
+Source: expansion of one step about the impact, to first order in the step h.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from comparisons.measuring.comparison import Comparison, Unresolved
+from comparisons.measuring.metrics import METRICS
+from scenarios import Scenario, Trajectory, Truth, discrete_flight
+from scenarios.mechanics import angular_momentum
+
+
+def flight_error(scene: Scenario, truth: Truth | None, metric: str, dt: float, *, exact_rotation: bool) -> float | None:
+    """The error of semi-implicit Euler in free flight; None where the rotation is not that simple, or the scene no free flight."""
+    if truth is None or scene.floor is not None or scene.damping is not None or (exact_rotation and not spins_steadily(scene)):
+        return None
+    return _measured(metric, _flight(scene, truth, dt, exact_rotation))
+
+
+@lru_cache(maxsize=4)  # every metric of a scene asks for it
+def _flight(scene: Scenario, truth: Truth, dt: float, exact_rotation: bool) -> Comparison:
+    return Comparison.with_truth(scene, discrete_flight(scene, dt, exact_rotation=exact_rotation), truth)
+
+
+def bounce_error(
+    scene: Scenario, truth: Truth | None, metric: str, dt: float, *, gravity_first: bool = False, restitution_lost: float = 0.0
+) -> float | None:
+    """The error of the first bounce of a body that falls flat; None for other scenes and metrics.
+
+    Args:
+        scene: The scene.
+        truth: Its truth.
+        metric: Name of the metric.
+        dt: Time step [s].
+        gravity_first: Whether gravity acts in a step before the impact does, as in the note.
+        restitution_lost: s, the share of a step's gravity that the rebound is slower by.
+    """
+    if truth is None or truth.name != "bounce-ladder" or not truth.events or not scene.starts_above_floor:
+        return None
+    assert scene.floor is not None
+    u, e, g = -float(truth.events[0].before[8]), scene.floor.restitution, -float(scene.acceleration[1])
+    if u < scene.floor.rest_speed:
+        return None
+    if metric == "bounce_height_error":
+        share = 0.5 * (2.0 * e - 1.0) * (1.0 + e) if gravity_first else -0.5 * (1.0 - e)
+        return share * u * dt / scene.clearance
+    if metric == "restitution_error":
+        return (e if gravity_first else -restitution_lost) * g * dt / u
+    return None
+
+
+def spins_steadily(scene: Scenario) -> bool:
+    """Whether the body turns about a principal axis, or not at all."""
+    w = np.array(scene.start.angular_velocity)
+    L = angular_momentum(scene, Trajectory.from_states(np.zeros(1), scene.initial_state[None]))[0]
+    return float(np.linalg.norm(np.cross(w, L))) <= 1e-12 * float(np.linalg.norm(w) * np.linalg.norm(L))
+
+
+def _measured(metric: str, case: Comparison) -> float | None:
+    try:
+        value = METRICS[metric].average([case]).value
+    except Unresolved:
+        return None
+    return None if math.isnan(value) else value

@@ -1,0 +1,99 @@
+"""What differs between the circumstances of two runs, and which of it a change of results is attributed to."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any, Literal
+
+from comparisons.results.provenance import MEASURING
+
+Stamp = Mapping[str, Any]
+Origin = Literal["engine", "adapter", "settings", "surroundings", "either", "absent", "nothing"]
+MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """What the changes of an engine's results are attributed to.
+
+    Attributes:
+        origin: `absent` if there are no measurements in one of the runs; the engine's version, else its adapter's code, else its settings; the
+            surroundings (dropspin, its code, the libraries, the machine); `either` where both differ and the cause cannot be isolated;
+            `nothing` where the whole provenance is the same.
+        message: The same in a sentence, without the engine's name.
+    """
+
+    origin: Origin
+    message: str
+
+
+def surroundings(old: Stamp, new: Stamp) -> list[str]:
+    """What differs that all engines share, as text."""
+    found = [
+        f"{package} {old['versions'][package]} → {new['versions'][package]}"
+        for package in MEASURING
+        if old["versions"][package] != new["versions"][package]
+    ]
+    if old["code"] != new["code"]:
+        found.append("dropspin's own code")
+    return found + [f"{word} {old[key]} → {new[key]}" for key, word in MACHINE.items() if old[key] != new[key]]
+
+
+def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
+    """What differs of an engine itself, the most likely cause first."""
+    found: dict[Origin, str] = {}
+    before, after = (stamp["settings"].get(engine, {}) for stamp in (old, new))
+    versions = [{str(settings["version"]) for settings in stamped.values() if "version" in settings} for stamped in (before, after)]
+    name = engine.split("[", maxsplit=1)[0]
+    if versions[0] != versions[1] and all(versions):
+        found["engine"] = f"{name} {_listed(versions[0])} → {_listed(versions[1])}"
+    if old["adapters"].get(engine) != new["adapters"].get(engine):
+        found["adapter"] = f"the code of {name}'s adapter"
+    changed = _changed_settings(before, after)
+    if changed:
+        found["settings"] = f"its settings ({', '.join(changed)})"
+    return found
+
+
+def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str]) -> Attribution:
+    """Attribute the changes of an engine's results.
+
+    Args:
+        old: Provenance of the earlier run.
+        new: Of the later one.
+        engine: Label of the engine whose results changed.
+        unmoved: Other engines of both runs whose results are all the same, which rules the surroundings out.
+    """
+    absent = [word for word, stamp in (("earlier", old), ("later", new)) if not stamp["settings"].get(engine)]
+    if absent:
+        return Attribution("absent", f"it has no measurements in the {absent[0]} run: it broke down, declined, or is missing")
+    own, around = of_engine(old, new, engine), surroundings(old, new)
+    if not own and not around:
+        return Attribution(
+            "nothing", "the provenance of both runs is the same; the engine is not deterministic, or has changed without a new version"
+        )
+    if not own:
+        return Attribution("surroundings", f"attributed to the surroundings: {', '.join(around)}")
+    first = next(iter(own))
+    message = f"attributed to {'the engine' if first == 'engine' else f'its {first}'}: {', '.join(own.values())}"
+    if not around:
+        return Attribution(first, message)
+    if unmoved:
+        return Attribution(
+            first, f"{message}; {', '.join(around)} differ too, but the results of {', '.join(sorted(unmoved))} are the same"
+        )
+    return Attribution(
+        "either", f"{', '.join(chain(own.values(), around))}; the cause cannot be isolated, as no engine's results stayed the same"
+    )
+
+
+def _changed_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+    """Names of the settings that differ in a scene and time step that both ran, without versions."""
+    pairs = [(before[case], after[case]) for case in before if case in after]
+    names = dict.fromkeys(name for pair in pairs for settings in pair for name in settings)
+    differ = [name for name in names if any(one.get(name) != other.get(name) for one, other in pairs)]
+    return [name for name in differ if name not in ("version", "numba")]
+
+
+def _listed(versions: Collection[Any]) -> str:
+    return ", ".join(sorted(map(str, versions)))

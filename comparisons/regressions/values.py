@@ -1,0 +1,113 @@
+"""The comparable results of a run: those that can be compared with an earlier run, each with a tolerance of its own."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
+from comparisons.judging.verdicts import BREAKDOWNS
+from comparisons.results.results import Results
+
+KEY = ["scene", "engine", "steps", "metric", "kind"]
+"""The columns that identify a result; `steps` is the time step as text, for orders and asymptotic errors all the steps used."""
+
+BETTER: Mapping[str, Literal["smaller", "larger", "neither"]] = {
+    "truth": "smaller",
+    "invariant": "smaller",
+    "asymptotic_error": "smaller",
+    "order": "larger",
+    "ensemble": "neither",
+}
+"""Kinds of comparable rows, and which way is better: errors towards 0, orders upwards; a mean can only be the same or another."""
+
+
+def comparable_results(results: Results) -> pd.DataFrame:
+    """The comparable results of a run.
+
+    Returns:
+        The columns of `KEY`, then `value` and `tolerance` in `unit`, and the `verdict`. Results that are not finite are
+        left out, and those that only show how a state is sampled.
+    """
+    table = results.table.assign(steps=step_names(results))
+    compared = table["kind"].isin(list(BETTER)) & ~table["metric"].isin(list(ARTEFACTS))
+    usable = np.isfinite(table["value"]) & np.isfinite(table["tolerance"])
+    return table.loc[compared & usable, [*KEY, "value", "tolerance", "unit", "verdict"]].reset_index(drop=True)
+
+
+def step_names(results: Results) -> pd.Series:
+    """For each row of a run its time step [s] as text, or all of them, coarsest first."""
+    return results.table["dt"].map(lambda dt: _every(results) if np.isnan(dt) else repr(dt))
+
+
+def asked_for(held: pd.DataFrame, results: Results) -> pd.DataFrame:
+    """The results that belong to scenes, engines and time steps that a run was asked for."""
+    steps = {_every(results), *map(repr, _dts(results))}
+    return held[held["scene"].isin(list(results.scenes)) & held["engine"].isin(results.engines) & held["steps"].isin(steps)]
+
+
+def broke_down(rows: pd.DataFrame, results: Results) -> "pd.Series[bool]":
+    """Which rows belong to engines that broke down in the scene, or are missing."""
+    pairs = ["scene", "engine"]
+    broken = results.table.loc[results.table["verdict"].isin(BREAKDOWNS | {"missing"}), pairs]
+    return pd.Series(pd.MultiIndex.from_frame(rows[pairs]).isin(pd.MultiIndex.from_frame(broken)), rows.index)
+
+
+def _every(results: Results) -> str:
+    return ", ".join(map(repr, _dts(results)))
+
+
+def _dts(results: Results) -> list[float]:
+    return sorted(map(float, results.provenance["asked"]["dts"]), reverse=True)
+
+
+def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
+    """Results compared with earlier ones.
+
+    Args:
+        before: The earlier results, as `comparable_results` gives them.
+        after: The later ones.
+
+    Returns:
+        The columns of `KEY`, then `unit`, `value`, `before`, the `tolerance` that separates them, the bounds `lower` and `upper` on the
+        value within which it is not worse, `change` (same, better, worse, moved, new, gone) and by how much
+        it has changed, `in_tolerances`.
+    """
+    held = [*KEY, "value", "tolerance", "unit"]
+    both = before[held].merge(after[held], how="outer", on=KEY, suffixes=("_before", "_after"), sort=False)
+    old, new = both["value_before"].to_numpy(), both["value_after"].to_numpy()
+    # The earlier tolerance alone: a result that has gone wrong must not widen its own bounds.
+    tolerance = both["tolerance_before"].fillna(both["tolerance_after"]).to_numpy()
+    way = both["kind"].map(BETTER).to_numpy()
+    errors = way == "smaller"
+    # An error may be anything between 0 and what it was; on the other side of 0 it is another error.
+    lower = np.where(errors, np.fmin(old, 0.0), old) - tolerance
+    upper = np.where(way == "larger", np.inf, np.where(errors, np.fmax(old, 0.0), old) + tolerance)
+    better = np.where(errors, np.abs(new) < np.abs(old) - tolerance, (way == "larger") & (new > old + tolerance))
+    within = (lower <= new) & (new <= upper)
+    other_side = errors & (np.abs(new) <= np.abs(old) + tolerance)
+    change = np.select(
+        [np.isnan(old), np.isnan(new), within & better, within, (way == "neither") | other_side],
+        ["new", "gone", "better", "same", "moved"],
+        "worse",
+    )
+    unit = both["unit_after"].where(both["unit_after"].notna(), both["unit_before"])
+    found = {"unit": unit, "value": new, "before": old, "tolerance": tolerance, "lower": lower, "upper": upper, "change": change}
+    return both[KEY].assign(**found, in_tolerances=np.abs(new - old) / tolerance)
+
+
+def regressed(found: pd.DataFrame) -> pd.DataFrame:
+    """The changes that fail a check: worse, moved, or gone.
+
+    An order or an asymptotic error that is undefined now follows from the errors, which are results of their own.
+    """
+    lost = (found["change"] == "gone") & ~found["kind"].isin(STUDIES)
+    return found[found["change"].isin(["worse", "moved"]) | lost]
+
+
+def most_changed_first(found: pd.DataFrame) -> pd.DataFrame:
+    """Changes, largest first in units of their tolerance; counts, which jump, after all others."""
+    ordered = found.assign(jumps=found["metric"].isin(list(JUMPING)))
+    ordered = ordered.sort_values(["jumps", "in_tolerances"], ascending=[True, False], na_position="last", kind="stable")
+    return ordered.drop(columns="jumps").reset_index(drop=True)

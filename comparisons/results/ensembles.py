@@ -1,0 +1,54 @@
+"""Ensembles: what became of each start, and the metrics that are means over them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SAMPLES = 41
+"""Times at which an ensemble's energy is kept, the start and the end among them."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnsembleOutcome:
+    """What became of each member of an ensemble.
+
+    Attributes:
+        t: Times [s], shape (SAMPLES,).
+        energy: Energy of each at these times, over the scene's energy, shape (size, SAMPLES).
+        rebound: Largest height of each after its first contact, over its start's height, shape (size,); 0 without a contact.
+        rest_time: When each was last in motion [s], shape (size,).
+        angular_momentum: |L| of each at these times, over r √(2 E M), E the scene's energy and r the body's size, shape (size, SAMPLES).
+    """
+
+    t: Array
+    energy: Array
+    rebound: Array
+    rest_time: Array
+    angular_momentum: Array
+
+
+@dataclass(frozen=True)
+class EnsembleMetric:
+    """A mean over an ensemble: its unit, its definition, and the value of each member."""
+
+    unit: str
+    definition: str
+    of_each: Callable[[EnsembleOutcome], Array]
+
+
+ENSEMBLE_METRICS = {
+    "energy_halfway": EnsembleMetric(
+        "1", "Energy halfway through, over the scene's energy (of the fall, or of the start's motion).", lambda o: o.energy[:, SAMPLES // 2]
+    ),
+    "energy_at_end": EnsembleMetric(
+        "1", "Energy at the end, over the scene's energy (of the fall, or of the start's motion).", lambda o: o.energy[:, -1]
+    ),
+    "rebound_height": EnsembleMetric(
+        "1", "Largest height of the centre of mass after the first contact, over its start's; 0 without a contact.", lambda o: o.rebound
+    ),
+    "rest_time": EnsembleMetric("s", "Time at which it was last in motion; the scene's end if it still moves.", lambda o: o.rest_time),
+}

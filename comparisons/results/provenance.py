@@ -1,0 +1,110 @@
+"""Provenance of results: versions, machine, commit, time."""
+
+import hashlib
+import inspect
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
+from typing import Any
+
+MEASURING = ("dropspin", "numpy", "numba", "scipy")
+STAMPED = (*MEASURING, "mujoco", "pybullet", "rapier3d", "dartpy", "drake")
+PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))
+"""The packages that results depend on; the reports only show them."""
+
+
+def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Where and when a run started, and what it was asked for."""
+    return {
+        "asked": dict(asked),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "wheels": {package: tag for package in STAMPED if (tag := _wheel(package))},
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "cpu": processor(),
+        "cores": os.cpu_count(),
+        "commit": _commit(),
+        "code": code(*PACKAGES),
+    }
+
+
+def versions() -> dict[str, str | None]:
+    """Installed versions of the packages that results depend on; None where one is missing."""
+    return {package: _version(package) for package in STAMPED}
+
+
+def versions_behind(stamp: Mapping[str, Any]) -> dict[str, str]:
+    """The versions that a run's results depend on: of the packages that measured them, and of the engines as they report it."""
+    engines = {label.split("[")[0]: settings.get("version") for label, settings in first_settings(stamp).items()}
+    engines.pop("document", None)  # part of dropspin
+    packages = {package: stamp["versions"][package] for package in MEASURING}
+    return {name: str(found) for name, found in (packages | engines | {"python": stamp["python"]}).items() if found}
+
+
+def first_settings(stamp: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Each engine's settings in the first scene it ran."""
+    return {label: next(iter(stamped.values())) for label, stamped in stamp["settings"].items() if stamped}
+
+
+def processor() -> str:
+    """The processor's name, as far as the system gives it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    named = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return named[0] if named else platform.machine()
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _wheel(package: str) -> str | None:
+    """What a package was built for, such as cp311-cp311-manylinux_2_28_x86_64."""
+    try:
+        wheel = distribution(package).read_text("WHEEL") or ""
+    except PackageNotFoundError:
+        return None
+    tags = [line.removeprefix("Tag: ") for line in wheel.splitlines() if line.startswith("Tag: ")]
+    return ", ".join(tags) or None
+
+
+def code(*places: Path) -> str:
+    """A short hash of the Python files at some places; it shows changes that no version number shows."""
+    files = sorted(file for place in places for file in (place.rglob("*.py") if place.is_dir() else [place]))
+    found = hashlib.sha256()
+    for file in files:
+        found.update(file.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def adapter_code(engine: object) -> str | None:
+    """The hash of the file that defines an engine's adapter; None for one that is not in a file."""
+    try:
+        return code(Path(inspect.getfile(type(engine))))
+    except (OSError, TypeError):
+        return None
+
+
+def digest(settings: Mapping[str, Any]) -> str:
+    """A short hash of settings: equal hashes mean equal settings."""
+    return hashlib.sha256(json.dumps(settings, sort_keys=True, default=str).encode()).hexdigest()[:12]
+
+
+def _commit() -> str | None:
+    """The commit of the working directory, which is the user's own repository as often as not."""
+    try:
+        answer = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, timeout=5, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return answer.stdout.strip() or None

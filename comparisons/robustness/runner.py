@@ -1,0 +1,183 @@
+"""An engine at one operating point: its motions, diagnosed, from several starts so that one lucky start does not count."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.robustness.axes import Axis, OperatingPoint, restored
+from comparisons.robustness.failure_modes import SOUND, Diagnosis, ExtendedMotion, FailureMode, clamped, diagnose, held_speeds, worst
+from comparisons.running.processes import EngineProcesses, Failed
+from comparisons.running.recording import Breakdown, EngineEntry, Recording, try_record
+from comparisons.running.start_phases import start_phases
+from scenarios import DropspinError, Scenario, Trajectory, truth_for
+from scenarios.rotations import angle_between_orientations
+from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
+
+Array = NDArray[np.float64]
+
+FEWEST_STEPS_WITHOUT_GRAVITY = 1000
+"""Steps of a run without gravity, to see whether it is stable; with gravity a longer run would be another motion."""
+BROKEN = frozenset({"declined", "diverged", "crashed", "timed_out"})
+"""Failure modes without a motion to compare."""
+MOST_ROWS = 20_000
+STARTS = 4
+"""Starts of a scene with an impact, evenly spread within a step: one start may be right by chance."""
+OTHER_START = 1.25
+"""Factor on speed and height of another start, to see whether speeds are clamped."""
+SAME_MOTION = 1e-6
+"""Relative to sizes and speeds of the scene: how much motions may differ whose scenes differ by a scale only."""
+
+Diagnose = Callable[[float], Diagnosis]
+
+
+class Runner:
+    """An engine in its process, compared within a tolerance."""
+
+    def __init__(self, entry: EngineEntry, within: float, processes: EngineProcesses) -> None:
+        self.label = entry.label
+        self._entry, self._within, self._processes = entry, within, processes
+
+    def along(self, nominal: OperatingPoint, axis: Axis) -> Diagnose:
+        """The function from a value on an axis to a diagnosis."""
+        if axis.name == "duration":
+            return _AlongDuration(self, nominal, axis)
+        unscaled = _Unscaled(self, nominal, axis) if axis.promised else None
+
+        def diagnose_at(value: float) -> Diagnosis:
+            try:
+                moved = axis.at(nominal, value)
+            except DropspinError as error:
+                return _without_value("declined", str(error))
+            found = self.diagnosis(moved)
+            if unscaled is None or found.mode != unscaled.diagnosis.mode or found.mode in BROKEN:
+                return found
+            return unscaled.compare(moved, value)
+
+        return diagnose_at
+
+    def diagnosis(self, point: OperatingPoint, extend: bool = True) -> Diagnosis:
+        """The worst diagnosis of a scene at a time step, from several starts if it has an impact, and after its end if `extend`."""
+        scene, dt = point
+        phases = start_phases(scene, truth_for(scene), dt)
+        starts = STARTS if scene.steps(dt) <= MOST_ROWS else 1
+        some = phases[:: max(1, len(phases) // starts)]
+        recordings = self.record([phase.scene for phase in some], dt, extend)
+        if isinstance(recordings, Diagnosis):
+            return recordings
+        motions = [_extended(phase.scene, dt, one) for phase, one in zip(some, recordings, strict=True)]
+        return worst([diagnose(one, self._within) for one in motions] + self._clamps(point, motions[0]))
+
+    def record(self, scenes: Sequence[Scenario], dt: float, extend: bool = True) -> "list[Recording] | Diagnosis":
+        """The engine's recordings of scenes, or why there are none."""
+        try:
+            return self._processes.call(self._entry, _record, scenes, dt, extend)
+        except Failed as failure:
+            return _without_value("timed_out" if failure.verdict == "timed_out" else "crashed", failure.reason)
+
+    def beginning(self, point: OperatingPoint, recording: Recording) -> Diagnosis:
+        """The diagnosis of a scene that is the beginning of a longer one."""
+        interval = float(recording.motion.t[1] - recording.motion.t[0])
+        rows = 1 + math.floor(point.scene.duration / interval + 1e-9)
+        cut = replace(recording, motion=recording.motion[:rows], continuation=recording.continuation[:0])
+        motion = _extended(point.scene, point.dt, cut)
+        return worst([diagnose(motion, self._within), *self._clamps(point, motion)])
+
+    def _clamps(self, point: OperatingPoint, motion: ExtendedMotion) -> list[Diagnosis]:
+        """Speeds that are clamped: they look cut off, and come out the same from another start."""
+        scene = motion.scene
+        stays = scene.floor is not None and not scene.starts_above_floor and not any(scene.start.velocity)
+        if motion.whole.first_bad_row is not None or (stays and not any(scene.start.angular_velocity)) or not held_speeds(motion.whole):
+            return []
+        state = scene.initial_state
+        state[RATES] *= OTHER_START
+        state[1] += (OTHER_START - 1.0) * (scene.clearance if scene.floor is not None else 0.0)
+        other = scene.starting_at(state)
+        recordings = self.record([other], point.dt)
+        return [] if isinstance(recordings, Diagnosis) else clamped(motion.whole, _extended(other, point.dt, recordings[0]).whole)
+
+
+class _Unscaled:
+    """The scene at its nominal scale, whose motion every other scale should reproduce in its own units."""
+
+    def __init__(self, runner: Runner, nominal: OperatingPoint, axis: Axis) -> None:
+        self.diagnosis = runner.diagnosis(nominal)
+        self._runner, self._nominal, self._axis = runner, nominal, axis
+        self._recordings = runner.record([nominal.scene], nominal.dt)
+
+    def compare(self, moved: OperatingPoint, value: float) -> Diagnosis:
+        """Whether the motion at another scale is the nominal one, as far as the exact solution is known."""
+        recordings = self._runner.record([moved.scene], moved.dt)
+        if isinstance(recordings, Diagnosis) or isinstance(self._recordings, Diagnosis):
+            return self.diagnosis
+        scene = self._nominal.scene
+        own, other = self._recordings[0].motion, recordings[0].motion
+        found = restored(other.states, self._axis, self._axis.base(self._nominal), value)
+        rows = min(len(own), len(found))
+        for truth, times in ((truth_for(scene), own.t[:rows]), (truth_for(moved.scene), other.t[:rows])):
+            if truth is not None:
+                rows = min(rows, int(np.count_nonzero(truth.covers(times))))
+        difference = _difference(own.states[:rows], found[:rows], scene.body.size, float(np.linalg.norm(scene.acceleration)))
+        if difference <= SAME_MOTION:
+            return SOUND
+        message = f"the motion differs from the one at the nominal {self._axis.name} by {difference:.1e} of its sizes and speeds"
+        return Diagnosis("inaccurate", f"depends on {self._axis.name}", difference, message)
+
+
+class _AlongDuration:
+    """Durations: the first values are run, those between are beginnings of a longer run."""
+
+    def __init__(self, runner: Runner, nominal: OperatingPoint, axis: Axis) -> None:
+        self._runner, self._nominal, self._axis = runner, nominal, axis
+        self._beginning = runner.diagnosis(nominal, extend=False)
+        self._runs: dict[float, Recording | Diagnosis] = {}
+
+    def __call__(self, duration: float) -> Diagnosis:
+        moved = self._axis.at(self._nominal, duration)
+        longer = [length for length in self._runs if length >= duration]
+        if not longer:
+            recordings = self._runner.record([moved.scene], moved.dt, extend=False)
+            self._runs[duration] = recordings if isinstance(recordings, Diagnosis) else recordings[0]
+        found = self._runs[min(longer, default=duration)]
+        return found if isinstance(found, Diagnosis) else worst([self._beginning, self._runner.beginning(moved, found)])
+
+
+def _extended(scene: Scenario, dt: float, recording: Recording) -> ExtendedMotion:
+    """A recording as the motion of the scene's own duration, and the whole motion."""
+    own, more = recording.motion, recording.continuation
+    times, states = np.concatenate([own.t, more.t]), np.concatenate([own.states, more.states])
+    return ExtendedMotion(scene, dt, own, Trajectory.from_states(times, states, own.velocity_lag), truth_for(scene))
+
+
+def _difference(first: Array, second: Array, size: float, g: float) -> float:
+    """The largest difference of two motions, relative to sizes and speeds; infinite if one is not finite."""
+    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        return math.inf
+    turned = float(angle_between_orientations(first[:, ORIENTATION], second[:, ORIENTATION]).max())
+    # Relative to what moves the body at all: a speed that is rounding is no scale.
+    speed = max(float(np.abs(first[:, VELOCITY]).max()), size * float(np.abs(first[:, SPIN]).max()), math.sqrt(g * size))
+    scales = ((POSITION, size), (VELOCITY, speed), (SPIN, speed / size))
+    ratios = [float(np.abs(first[:, part] - second[:, part]).max()) / scale for part, scale in scales if scale > 0.0]
+    return max(turned, *ratios)
+
+
+def _without_value(mode: FailureMode, reason: str) -> Diagnosis:
+    return Diagnosis(mode, mode, math.nan, reason)
+
+
+def _record(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend: bool) -> list[Recording] | Diagnosis:
+    """In the engine's process: its recordings of scenes, or why there are none."""
+    assert entry.engine is not None
+    found = []
+    for scene in scenes:
+        steps = scene.steps(dt)
+        extra = max(0, FEWEST_STEPS_WITHOUT_GRAVITY - steps) if extend and scene.gravity is None else 0
+        recording = try_record(entry.engine, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra)
+        if isinstance(recording, Breakdown):
+            if recording.verdict == "diverged":
+                return Diagnosis("diverged", "gave up", math.inf, recording.reason)
+            return _without_value("declined" if recording.verdict == "declined" else "crashed", recording.reason)
+        found.append(recording)
+    return found

@@ -1,0 +1,125 @@
+"""The study behind `dropspin limits`: engines along every axis of a scene."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product, takewhile
+
+from comparisons.engines.base import Engine
+from comparisons.robustness.axes import AXES, Axis, OperatingPoint
+from comparisons.robustness.runner import Runner
+from comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
+from comparisons.running.processes import EngineProcesses, ResourceLimits
+from comparisons.running.recording import as_scene, engine_entry, verify_time_step
+from scenarios import DropspinError, Scenario
+from scenarios.errors import UnknownName
+
+IN_FLIGHT = (
+    "document",
+    "document[rotation=gyroscopic]",
+    "document[rotation=rk4]",
+    "mujoco",
+    "mujoco[integrator=implicitfast]",
+    "mujoco[integrator=rk4]",
+    "pybullet",
+    "pybullet[coordinates=multibody,velocity_clamp=kept]",
+)
+ON_A_FLOOR = (
+    "document",
+    "document[contact=sequential,law=coulomb,rotation=rk4]",
+    "mujoco",
+    "pybullet",
+    "pybullet[coordinates=multibody,velocity_clamp=kept]",
+)
+SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")
+"""A spin that every method knows, one that few do, a ball and a box that bounce, and a block that comes to rest."""
+DT = 5e-3  # s
+WITHIN = 0.1
+RESOURCES = ResourceLimits(processor_time=60.0)
+ACCURATE, STABLE = ("sound",), ("sound", "inaccurate")
+
+
+@dataclass(frozen=True)
+class RobustnessStudy:
+    """What becomes of engines at a scene's extremes.
+
+    Attributes:
+        scene: The scene.
+        dt: The step where it is not the step that is varied [s].
+        within: How large an error may be.
+        scans: Each engine along each axis.
+        left_out: Engines that do not run the scene, and why.
+    """
+
+    scene: Scenario
+    dt: float
+    within: float
+    scans: tuple[AxisScan, ...]
+    left_out: dict[str, str]
+
+    def largest_steps(self, engine: str) -> tuple[float | None, float | None]:
+        """The largest steps that an engine is accurate at, and stable, together with all finer ones [s]; None if the finest is not."""
+        points = next((one.points for one in self.scans if one.axis.name == "step" and one.engine == engine), ())
+        return _last_before_any_other(points, ACCURATE), _last_before_any_other(points, STABLE)
+
+
+def _last_before_any_other(points: Sequence[ScanPoint], allowed: Sequence[str]) -> float | None:
+    values = [point.value for point in takewhile(lambda point: point.mode in allowed, points)]
+    return values[-1] if values else None
+
+
+def find_limits(
+    scene: Scenario | str,
+    engines: Sequence[str | Engine] = (),
+    axes: Sequence[str] = (),
+    *,
+    dt: float = DT,
+    within: float = WITHIN,
+    on_progress: Callable[[str, float], None] = lambda what, share: None,
+    resources: ResourceLimits = RESOURCES,
+) -> RobustnessStudy:
+    """Take a scene to its extremes along axes.
+
+    Args:
+        scene: A scene, its catalogue name, or the path of its file.
+        engines: Engines or names with options; by default the methods that differ on such a scene.
+        axes: Names of axes; by default all that the scene has, see `AXES`.
+        dt: Time step [s], where it is not what is varied.
+        within: The largest error that counts as accurate: a ratio, or an angle in radians.
+        on_progress: Called with what is done, and the share of all of it.
+        resources: What an engine may use for one point.
+
+    Raises:
+        DropspinError: There is no such engine or axis, or the scene does not have the axis.
+    """
+    scene = as_scene(scene)
+    verify_time_step(scene, dt)
+    if not 0.0 < within < math.inf:
+        raise DropspinError(f"within: got {within!r}; give a number above 0, a ratio or an angle in radians.")
+    chosen = _axes(scene, tuple(dict.fromkeys(axes)))
+    named = [engine_entry(name) for name in engines or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    entries = list({one.label: one for one in named}.values())
+    left_out = {one.label: one.missing for one in entries if one.engine is None}
+    work = list(product([one for one in entries if one.engine is not None], chosen))
+    scans = []
+    with EngineProcesses(resources) as processes:
+        for number, (entry, axis) in enumerate(work):
+            report = partial(_report, on_progress, f"{entry.label}, {axis.name}", number / len(work))
+            scans.append(scan_axis(Runner(entry, within, processes), OperatingPoint(scene, dt), axis, on_progress=report))
+    return RobustnessStudy(scene, dt, within, tuple(scans), left_out)
+
+
+def _report(on_progress: Callable[[str, float], None], what: str, share: float, value: float) -> None:
+    on_progress(f"{what} {value:.3g}", share)
+
+
+def _axes(scene: Scenario, names: Sequence[str]) -> list[Axis]:
+    """The axes of these names, or all that a scene has."""
+    for name in names:
+        if name not in AXES:
+            raise UnknownName("axis", name, AXES)
+        if not AXES[name].applies(scene):
+            has = ", ".join(axis.name for axis in AXES.values() if axis.applies(scene))
+            raise DropspinError(f"axis {name!r}: {scene.name} does not have it; it has {has}.")
+    return [AXES[name] for name in names] if names else [axis for axis in AXES.values() if axis.applies(scene)]

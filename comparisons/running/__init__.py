@@ -1,0 +1,1 @@
+"""Scenes driven through engines: recordings, processes of their own, start phases, ensembles, whole runs."""

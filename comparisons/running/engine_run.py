@@ -1,0 +1,85 @@
+"""One engine on one scene at one time step: the motions from all its starts, and what the engine states of itself."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from comparisons.engines.base import Engine, KnownLimitation
+from comparisons.measuring.metrics import metrics_for
+from comparisons.measuring.tolerances import perturbed
+from comparisons.results.ensembles import EnsembleOutcome
+from comparisons.running.ensembles import run_ensemble
+from comparisons.running.recording import Breakdown, EngineEntry, classify, record, time_steps
+from scenarios import Scenario, Trajectory, truth_for
+
+TIMING_REPEATS = 3
+
+
+@dataclass
+class EngineRun:
+    """What one engine did with one scene at one time step.
+
+    Attributes:
+        label: The engine's label.
+        breakdown: Why there is no motion; None if there is one.
+        motion: From the scene's own start, every step.
+        phases: From each start phase.
+        perturbed: From starts perturbed by a few ulp, set by set: an estimate of what rounding may do.
+        limitations: Known limitations that the engine met.
+        settings: The settings that it reported.
+        time_per_step: The least wall time of a native step [s].
+        outcome: What became of the scene's ensemble.
+        discretisation: The discretisation that the engine states for this scene.
+        order: The order that it claims.
+        precision: Of its state.
+        predicted: Errors by metric that its scheme must have.
+    """
+
+    label: str
+    breakdown: Breakdown | None = None
+    motion: Trajectory | None = None
+    phases: list[Trajectory] = field(default_factory=list)
+    perturbed: list[list[Trajectory]] = field(default_factory=list)
+    limitations: Sequence[KnownLimitation] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+    time_per_step: float = float("nan")
+    outcome: EnsembleOutcome | None = None
+    discretisation: str | None = None
+    order: float | None = None
+    precision: type = np.float64
+    predicted: dict[str, float] = field(default_factory=dict)
+
+
+def run_engine(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario]) -> EngineRun:
+    """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result."""
+    engine, found = entry.engine, EngineRun(entry.label)
+    if engine is None:
+        found.breakdown = Breakdown("missing", entry.missing)
+        return found
+    try:
+        refusal = engine.declines(scene)
+        if refusal is not None:
+            found.breakdown = Breakdown("declined", refusal)
+            return found
+        found.discretisation, found.order, found.precision = engine.discretisation(scene), engine.order_in(scene), engine.precision
+        own = record(engine, scene, dt)
+        found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
+        found.phases = [own.motion] if len(starts) == 1 else [record(engine, start, dt).motion for start in starts]
+        found.perturbed = [[record(engine, start, dt).motion for start in moved] for moved in perturbed(scene, starts, engine.precision)]
+        found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt)
+        # The predicted error of a bounce is a mean over start phases.
+        found.predicted = _predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}
+        steps = scene.steps(dt)
+        found.time_per_step = min(time_steps(engine, scene, dt, steps)[0] for _ in range(TIMING_REPEATS)) / steps
+    except Exception as error:
+        found.breakdown = classify(error)
+    return found
+
+
+def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:
+    """The errors that the engine's scheme must have, by metric."""
+    truth = truth_for(scene)
+    found = {metric.name: engine.predicted_error(scene, truth, metric.name, dt) for metric in metrics_for(scene, truth)}
+    return {name: value for name, value in found.items() if value is not None}

@@ -1,0 +1,85 @@
+"""Ensembles: beyond its horizon no single trajectory of a chaotic scene can be compared, but means over many starts can.
+
+Every engine runs the same starts. Means over them are compared, each with the 95 % confidence interval of Student's t. Differences between
+two engines are taken start by start, so that what they have in common is not noise.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from comparisons.engines.base import Engine
+from comparisons.judging.verdicts import Judgement
+from comparisons.measuring.comparison import Comparison, Unresolved
+from comparisons.measuring.metrics import last_time_in_motion
+from comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
+from comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, EnsembleOutcome
+from comparisons.running.recording import record_batch
+from scenarios import Scenario, members
+from scenarios.mechanics import angular_momentum, energy
+
+Array = NDArray[np.float64]
+
+BATCH_SIZE = 32
+"""Members whose every step is held in memory at a time."""
+CONFIDENCE = 0.95
+
+
+def run_ensemble(engine: Engine, scene: Scenario, dt: float) -> EnsembleOutcome:
+    """Run an ensemble through an engine.
+
+    Raises:
+        Diverged: A motion is not finite.
+    """
+    steps = scene.steps(dt)
+    rows = np.round(np.linspace(0.0, steps, SAMPLES)).astype(int)
+    energies, momenta, rebounds, rest_times = [], [], [], []
+    starts = members(scene)
+    for first in range(0, len(starts), BATCH_SIZE):
+        batch = starts[first : first + BATCH_SIZE]
+        for member, motion in zip(batch, record_batch(engine, batch, dt), strict=True):
+            case = Comparison(member, motion)
+            contact = case.first_contact
+            scale = _energy_scale(case)
+            energies.append(energy(member, motion[rows]) / scale)
+            lengths = np.linalg.norm(angular_momentum(member, motion[rows]), axis=1)
+            momenta.append(lengths / (scene.body.size * np.sqrt(2.0 * scale * scene.body.mass)))
+            rebounds.append(0.0 if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1])
+            rest_times.append(last_time_in_motion(member, motion))
+    t = (dt * np.arange(steps + 1, dtype=float))[rows]
+    return EnsembleOutcome(t, np.array(energies), np.array(rebounds), np.array(rest_times), np.array(momenta))
+
+
+def judge_means(scene: Scenario, dt: float, outcome: EnsembleOutcome) -> Iterator[tuple[str, Judgement]]:
+    """Each ensemble metric and its mean over the starts, between the ends of its confidence interval."""
+    for name, metric in ENSEMBLE_METRICS.items():
+        mean, half = _mean(metric.of_each(outcome))
+        sampling_noise = OF_TWO_DRAWS * (mean + half - mean)
+        allowed = tolerance(scene, metric.unit, np.float64, scene.steps(dt), sampling_noise)
+        yield name, Judgement(mean, "measured", mean - half, mean + half, "chaotic", tolerance=allowed)
+
+
+def judge_differences(first: EnsembleOutcome, second: EnsembleOutcome) -> Iterator[tuple[str, Judgement]]:
+    """Each ensemble metric and the mean difference of two engines, start by start, and whether it is significant."""
+    for name, metric in ENSEMBLE_METRICS.items():
+        differences = metric.of_each(first) - metric.of_each(second)
+        mean, half = _mean(differences)
+        significance = "not significant" if mean - half <= 0.0 <= mean + half else "significant"
+        reason = f"the difference is {significance} at 95 % confidence, over {len(differences)} starts"
+        yield name, Judgement(mean, "measured", mean - half, mean + half, "chaotic", reason)
+
+
+def _mean(values: Array) -> tuple[float, float]:
+    """The mean, and half the width of its confidence interval."""
+    mean, error = float(np.mean(values)), float(stats.sem(values))
+    return mean, float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(values) - 1)) * error
+
+
+def _energy_scale(case: Comparison) -> float:
+    """The scene's energy [J]; 1 where nothing moves and nothing pulls, as there is no energy to measure then."""
+    try:
+        return case.energy_scale
+    except Unresolved:
+        return 1.0

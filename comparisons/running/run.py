@@ -1,0 +1,150 @@
+"""A run: scenes × engines × time steps, measured against exact solutions and against each other, and judged."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any, NamedTuple
+
+from comparisons.engines.base import Engine
+from comparisons.judging.verdicts import verify_expectations
+from comparisons.measuring.comparison import Comparison
+from comparisons.measuring.metrics import metrics_for
+from comparisons.results.provenance import adapter_code, provenance
+from comparisons.results.results import Results, joined
+from comparisons.running.processes import EngineProcesses, ResourceLimits
+from comparisons.running.recording import EngineEntry, as_scene, engine_entry, verify_time_step
+from comparisons.running.scene_run import run_scene
+from comparisons.running.start_phases import StartPhase
+from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+
+DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
+
+OnProgress = Callable[[str, str, float], None]
+"""Called with scene, engine and time step [s]."""
+
+
+def run(
+    scenes: Scenario | str | Iterable[Scenario | str],
+    engines: Engine | str | Iterable[Engine | str],
+    dt: float | Iterable[float] = DEFAULT_DTS,
+    *,
+    on_progress: OnProgress = lambda scene, engine, dt: None,
+    resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    keep: Callable[[Results], None] = lambda part: None,
+    done: Iterable[Results] = (),
+) -> Results:
+    """Run every scene with every engine at every time step, measure, and judge.
+
+    Args:
+        scenes: One scene or several: scenes, catalogue names or paths; their names must differ.
+        engines: One engine or several: engines, or names with options. One that is not installed is `missing` in the results.
+        dt: One time step or several [s].
+        on_progress: Called after each of the len(scenes) * len(engines) * len(dt) pieces of work.
+        resources: What an engine may use for one of these pieces; each engine runs in a process of its own.
+        keep: Called with the results of each scene as soon as it is done.
+        done: Results of scenes from an earlier run. Those with the same request, versions and machine are not run again.
+
+    Raises:
+        DropspinError: The request cannot be run: an unknown engine, an impossible time step, equal names.
+    """
+    prepared = prepare_run(scenes, engines, dt)
+    entries, dts = prepared.entries, prepared.dts
+    stamp = _stamp(prepared, resources)
+    earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if _is_the_same(part.provenance, stamp)}
+    parts = []
+    with EngineProcesses(resources) as processes:
+        for scene, truth in zip(prepared.scenes, prepared.truths, strict=True):
+            if scene.model_dump_json() in earlier:
+                parts.append(replace(earlier[scene.model_dump_json()], scenes={scene.name: scene}))
+                for entry, step in product(entries, dts):
+                    on_progress(scene.name, entry.label, step)
+                continue
+            parts.append(run_scene(StartPhase(scene, truth), entries, dts, processes, on_progress, stamp))
+            keep(parts[-1])
+    return joined(parts, stamp)
+
+
+class PreparedRun(NamedTuple):
+    """A request of a run that was checked: scenes with their exact solutions, engines, time steps [s]."""
+
+    scenes: list[Scenario]
+    truths: list[Truth | None]
+    entries: list[EngineEntry]
+    names: dict[str, str]
+    """By label: what each engine was asked for by, where that is a name."""
+    dts: list[float]
+
+
+def prepare_run(
+    scenes: Scenario | str | Iterable[Scenario | str], engines: Engine | str | Iterable[Engine | str], dt: float | Iterable[float]
+) -> PreparedRun:
+    """Check a request of a run, and find its engines and exact solutions.
+
+    Raises:
+        DropspinError: The request cannot be run.
+    """
+    chosen = [as_scene(one) for one in _several("scenes", scenes, (Scenario, str))]
+    asked = _several("engines", engines, (Engine, str))
+    entries = [engine_entry(one) for one in asked]
+    dts = _several("dt", dt, (int, float))
+    for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
+        if not given:
+            raise DropspinError(f"{name}: got none; give at least one.")
+    labels = [entry.label for entry in entries]
+    truths = [truth_for(scene) for scene in chosen]
+    _verify_request(chosen, truths, dts, labels)
+    names = {entry.label: name.strip() for entry, name in zip(entries, asked, strict=True) if isinstance(name, str)}
+    return PreparedRun(chosen, truths, entries, names, dts)
+
+
+def _several(name: str, given: Any, single: tuple[type, ...]) -> list[Any]:
+    """One thing or several as a list."""
+    if isinstance(given, single):
+        return [given]
+    if not isinstance(given, Iterable) or isinstance(given, Mapping):
+        raise DropspinError(
+            f"{name}: got a {type(given).__name__}; give one of {' or '.join(kind.__name__ for kind in single)}, or a list."
+        )
+    return list(given)
+
+
+def _verify_request(scenes: Sequence[Scenario], truths: Sequence[Truth | None], dts: Sequence[float], labels: Sequence[str]) -> None:
+    names = [scene.name for scene in scenes]
+    if len(set(names)) < len(names):
+        raise DropspinError(f"two scenes have the same name ({', '.join(names)}); a scene's name is its file's name, rename one.")
+    for scene, truth in zip(scenes, truths, strict=True):
+        verify_expectations(scene, truth, labels)
+        for dt in dts:
+            verify_time_step(scene, dt)
+    if len(set(dts)) < len(dts):
+        raise DropspinError(f"dt: a time step is given twice ({', '.join(f'{dt:g}' for dt in dts)}); give each once.")
+    if len(set(labels)) < len(labels):
+        raise DropspinError(f"an engine is given twice: {', '.join(labels)}; give each once.")
+
+
+def _stamp(prepared: PreparedRun, resources: ResourceLimits) -> dict[str, Any]:
+    """The provenance of a run before it starts."""
+    asked = {
+        "scenes": [scene.name for scene in prepared.scenes],
+        "engines": [entry.label for entry in prepared.entries],
+        "dts": list(prepared.dts),
+        "time_limit": resources.processor_time,
+    }
+    adapters = {entry.label: adapter_code(entry.engine) for entry in prepared.entries if entry.engine is not None}
+    return provenance(asked) | {"names": prepared.names, "adapters": adapters}
+
+
+def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
+    """Whether two runs had the same engines, time steps, time limit, versions, code and machine."""
+    asked = all(earlier["asked"][what] == stamp["asked"][what] for what in ("engines", "dts", "time_limit"))
+    return asked and all(earlier[what] == stamp[what] for what in ("versions", "python", "cpu", "code", "adapters"))
+
+
+def measure(scene: Scenario | str, motion: Trajectory) -> dict[str, float]:
+    """Every metric that the scene has, of one motion; NaN where the time step is too coarse for it."""
+    scene = as_scene(scene)
+    if not isinstance(motion, Trajectory):
+        raise DropspinError(f"motion: got a {type(motion).__name__}; give a Trajectory, such as simulate() returns.")
+    truth = truth_for(scene)
+    case = Comparison.with_truth(scene, motion, truth)
+    return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}

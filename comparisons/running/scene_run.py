@@ -1,0 +1,231 @@
+"""One scene of a run: every engine at every time step, the measurements, their convergence, and the engines' agreement."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.engines.base import calibrated_label
+from comparisons.judging.agreement import judge_agreement
+from comparisons.judging.convergence import (
+    ARTEFACTS,
+    Claim,
+    ConvergenceStudy,
+    SeriesPoint,
+    attributed_to_setting,
+    study_convergence,
+)
+from comparisons.judging.error_budget import is_sufficient
+from comparisons.judging.verdicts import Judgement, judge, with_limitations
+from comparisons.measuring.comparison import Comparison, Unresolved, exactly
+from comparisons.measuring.metrics import METRICS, Average, Metric, metrics_for
+from comparisons.measuring.tolerances import FEW_DRAWS, tolerance
+from comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
+from comparisons.results.measurement import Case, Measurement, as_table
+from comparisons.results.results import Results, TrajectoryKey
+from comparisons.running.engine_run import EngineRun
+from comparisons.running.ensembles import judge_differences, judge_means
+from comparisons.running.processes import EngineProcesses
+from comparisons.running.recording import Breakdown, EngineEntry, divergence
+from comparisons.running.start_phases import StartPhase, start_phases
+from scenarios import Scenario, Trajectory
+
+
+class Measured(NamedTuple):
+    """A measurement, and the average over start phases that its value is the largest part of; None for a remark."""
+
+    measurement: Measurement
+    average: Average | None
+
+
+@dataclass
+class _Collected:
+    """What a scene's run has gathered so far, engine by engine."""
+
+    measured: dict[str, list[Measured]]
+    rows: list[Measurement] = field(default_factory=list)
+    claims: dict[str, Claim] = field(default_factory=dict)
+    trajectories: dict[TrajectoryKey, Trajectory] = field(default_factory=dict)
+    ensembles: dict[TrajectoryKey, EnsembleOutcome] = field(default_factory=dict)
+    settings: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+def run_scene(
+    own: StartPhase,
+    entries: Sequence[EngineEntry],
+    dts: Sequence[float],
+    processes: EngineProcesses,
+    on_progress: Callable[[str, str, float], None],
+    stamp: Mapping[str, Any],
+) -> Results:
+    """Run one scene with every engine at every time step.
+
+    Args:
+        own: The scene from its own start, and its exact solution.
+        entries: The engines.
+        dts: Time steps [s].
+        processes: The engines' processes.
+        on_progress: Called with scene, engine and time step after each engine.
+        stamp: The run's provenance.
+    """
+    scene = own.scene
+    labels = tuple(entry.label for entry in entries)
+    found = _Collected({label: [] for label in labels})
+    for dt in dts:
+        phases = start_phases(scene, own.truth, dt)
+        times = dt * np.arange(1 + scene.steps(dt), dtype=float)
+        exact = [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+        compared: list[tuple[EngineRun, list[Comparison]]] = []
+        for entry in entries:
+            engine_run = processes.run_engine(entry, scene, dt, [phase.scene for phase in phases])
+            cases = [] if _breakdown(engine_run) else _compare(engine_run.phases, phases, exact)
+            found.measured[entry.label] += _measure(own, dt, engine_run, phases, exact, cases)
+            _collect(found, own, dt, engine_run)
+            compared.append((engine_run, cases))
+            on_progress(scene.name, entry.label, dt)
+        for first, second in combinations(compared, 2):
+            found.rows += _agreement(own, dt, phases, first, second)
+    rows = found.rows + _with_convergence(scene, found, labels, dts)
+    provenance = {**stamp, "settings": found.settings}
+    return Results(as_table(rows), {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance)
+
+
+def _compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[Trajectory | None]) -> list[Comparison]:
+    """Motions from all start phases compared with the exact solution."""
+    together = zip(phases, motions, exact, strict=True)
+    return [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in together]
+
+
+def _breakdown(engine_run: EngineRun) -> Breakdown | None:
+    """Why an engine has no motion to measure; None if it has."""
+    if engine_run.breakdown is not None:
+        return engine_run.breakdown
+    assert engine_run.motion is not None
+    return next(filter(None, map(divergence, [engine_run.motion, *engine_run.phases])), None)
+
+
+def _measure(
+    own: StartPhase,
+    dt: float,
+    engine_run: EngineRun,
+    phases: Sequence[StartPhase],
+    exact: Sequence[Trajectory | None],
+    cases: Sequence[Comparison],
+) -> list[Measured]:
+    """Every metric of one engine at one time step, judged; a remark if it has no motion."""
+    scene, truth = own
+    case = Case(scene.name, engine_run.label, dt, scene.steps(dt), engine_run.time_per_step)
+    breakdown = _breakdown(engine_run)
+    if breakdown is not None:
+        return [Measured(case.remark(breakdown.verdict, breakdown.reason), None)]
+    perturbed = [_compare(motions, phases, exact) for motions in engine_run.perturbed]
+    rows = [Measured(case.remark("limited", one.message), None) for one in engine_run.limitations]
+    for metric in metrics_for(scene, truth):
+        average, judgement = _judge_metric(scene, dt, engine_run.label, metric, cases)
+        moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))
+        sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
+        allowed = tolerance(scene, metric.unit, engine_run.precision, case.steps, sampling_noise)
+        judgement = with_limitations(replace(judgement, tolerance=allowed), metric.name, engine_run.limitations)
+        name = truth.name if metric.kind == "truth" and truth is not None else ""
+        rows.append(Measured(case.measurement(metric.kind, metric.name, metric.unit, judgement, name), average))
+    if truth is None:
+        rows.append(Measured(case.remark("no_truth", "no closed form is known for this scene"), None))
+    return rows
+
+
+def _judge_metric(scene: Scenario, dt: float, label: str, metric: Metric, cases: Sequence[Comparison]) -> tuple[Average, Judgement]:
+    """A metric's average over the start phases, and its judgement."""
+    try:
+        with np.errstate(all="ignore"):  # an engine may return 1e300; the inf or NaN that follows is judged as such
+            average = metric.average(cases)
+        unresolved = ""
+    except Unresolved as error:
+        average, unresolved = Average(*[np.array([np.nan])] * 3), str(error)
+    judgement = judge(scene, label, dt, metric, average.value)
+    reason = "; ".join(filter(None, [unresolved, judgement.reason]))
+    # A value that is not a number is a failure, expected or not; one that the step cannot resolve fails only an expectation.
+    verdict = "failed" if np.isnan(average.value) and not unresolved else judgement.verdict
+    if verdict == "failed" and not reason:
+        reason = f"{metric.name.replace('_', ' ')} is undefined: what it measures did not happen"
+    return average, replace(judgement, verdict=verdict, reason=reason, cause="unresolved" if unresolved else "")
+
+
+def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRun) -> None:
+    """Keep what one engine gave at one time step, apart from its metrics."""
+    scene, label = own.scene, engine_run.label
+    case = Case(scene.name, label, dt, scene.steps(dt))
+    truth = own.truth.name if own.truth else ""
+    for name, value in engine_run.predicted.items():
+        found.rows.append(case.measurement("prediction", name, METRICS[name].unit, Judgement(value, "measured"), truth))
+    if engine_run.motion is not None:
+        found.trajectories[scene.name, label, dt] = engine_run.motion
+        found.settings.setdefault(label, {})[f"{scene.name} dt={dt:g}"] = engine_run.settings
+        earlier = found.claims[label].limitations if label in found.claims else ()
+        found.claims[label] = Claim(label, engine_run.order, engine_run.precision, (*earlier, *engine_run.limitations))
+    if engine_run.outcome is not None:
+        found.ensembles[scene.name, label, dt] = engine_run.outcome
+        for name, judgement in judge_means(scene, dt, engine_run.outcome):
+            found.rows.append(case.measurement("ensemble", name, ENSEMBLE_METRICS[name].unit, judgement))
+
+
+def _agreement(
+    own: StartPhase,
+    dt: float,
+    phases: Sequence[StartPhase],
+    first: tuple[EngineRun, Sequence[Comparison]],
+    second: tuple[EngineRun, Sequence[Comparison]],
+) -> Iterator[Measurement]:
+    """The differences between two engines that both have a motion."""
+    (one, cases), (other, other_cases) = first, second
+    if not (cases and other_cases):
+        return
+    scene = own.scene
+    case = Case(scene.name, one.label, dt, scene.steps(dt))
+    truths = [phase.truth for phase in phases]
+    for metric, judgement in judge_agreement(scene, own.truth, truths, cases, other_cases, (one.discretisation, other.discretisation)):
+        yield case.measurement("agreement", metric.name, metric.unit, judgement, other.label)
+    if one.outcome is not None and other.outcome is not None:
+        for name, judgement in judge_differences(one.outcome, other.outcome):
+            yield case.measurement("agreement", name, ENSEMBLE_METRICS[name].unit, judgement, other.label)
+
+
+def _with_convergence(scene: Scenario, found: _Collected, labels: Sequence[str], dts: Sequence[float]) -> list[Measurement]:
+    """All engines' measurements, each with its cause, followed by their orders and asymptotic errors."""
+    sufficient = is_sufficient(sorted(dts))
+    studies = {label: _studies(scene, claim, found.measured[label]) if sufficient else {} for label, claim in found.claims.items()}
+    rows: list[Measurement] = []
+    for label in labels:
+        own, twin = studies.get(label, {}), studies.get(calibrated_label(label) or "")
+        if twin is not None:
+            own = {name: attributed_to_setting(study, twin.get(name)) for name, study in own.items()}
+        measurements = [one.measurement for one in found.measured[label]]
+        rows += [_with_cause(one, own) for one in measurements]
+        rows += _study_rows(measurements, own)
+    return rows
+
+
+def _studies(scene: Scenario, claim: Claim, measured: Sequence[Measured]) -> dict[str, ConvergenceStudy]:
+    """The convergence of each metric of one engine, by metric."""
+    series: dict[str, list[SeriesPoint]] = {}
+    for row, average in measured:
+        if average is not None and row.metric not in ARTEFACTS:
+            series.setdefault(row.metric, []).append(SeriesPoint(row.dt, row.steps, average, row.tolerance))
+    return {name: study_convergence(scene, claim, METRICS[name], points) for name, points in series.items()}
+
+
+def _with_cause(row: Measurement, studies: Mapping[str, ConvergenceStudy]) -> Measurement:
+    """A measurement with the cause that its metric's convergence gives, if it has none yet."""
+    return row if row.cause or row.metric not in studies else replace(row, cause=studies[row.metric].cause)
+
+
+def _study_rows(measurements: Sequence[Measurement], studies: Mapping[str, ConvergenceStudy]) -> Iterator[Measurement]:
+    """Orders and asymptotic errors, metric by metric."""
+    for name, study in studies.items():
+        of = next(one for one in measurements if one.metric == name)
+        case = Case(of.scene, of.engine)
+        if study.order is not None:
+            yield case.measurement("order", name, "1", study.order, of.truth)
+        if study.asymptotic_error is not None:
+            yield case.measurement("asymptotic_error", name, of.unit, study.asymptotic_error, of.truth)

@@ -1,0 +1,144 @@
+"""dropspin: compare rigid-body engines with exact solutions. This module is the public interface and the console command.
+
+    import dropspin as ds
+
+    results = ds.run("drop-ball", "mujoco", dt=[4e-3, 2e-3, 1e-3])
+    results.table
+
+Names are imported on first use, so that `import dropspin` and `dropspin --help` load neither pandas nor an engine.
+"""
+
+import os
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from comparisons.calibration import Calibration as Calibration
+    from comparisons.calibration import calibrate as calibrate
+    from comparisons.conformance.checks import CheckResult as CheckResult
+    from comparisons.conformance.checks import conform as conform
+    from comparisons.engines.base import AsBuilt as AsBuilt
+    from comparisons.engines.base import BatchSimulation as BatchSimulation
+    from comparisons.engines.base import Diverged as Diverged
+    from comparisons.engines.base import Engine as Engine
+    from comparisons.engines.base import EngineMissing as EngineMissing
+    from comparisons.engines.base import KnownLimitation as KnownLimitation
+    from comparisons.engines.base import NumericOption as NumericOption
+    from comparisons.engines.base import Simulation as Simulation
+    from comparisons.engines.registry import engine as engine
+    from comparisons.engines.registry import engine_names as engine_names
+    from comparisons.measuring.metrics import METRICS as METRICS
+    from comparisons.regressions.baseline import Baseline as Baseline
+    from comparisons.regressions.baseline import accept as accept
+    from comparisons.regressions.baseline import load_baseline as load_baseline
+    from comparisons.regressions.baseline import write_baseline as write_baseline
+    from comparisons.regressions.checking import check as check
+    from comparisons.regressions.comparing import compare as compare
+    from comparisons.regressions.history import history as history
+    from comparisons.results.ensembles import ENSEMBLE_METRICS as ENSEMBLE_METRICS
+    from comparisons.results.measurement import Measurement as Measurement
+    from comparisons.results.results import Results as Results
+    from comparisons.results.store import load_results as load_results
+    from comparisons.robustness.study import RobustnessStudy as RobustnessStudy
+    from comparisons.robustness.study import find_limits as find_limits
+    from comparisons.running.processes import ResourceLimits as ResourceLimits
+    from comparisons.running.recording import simulate as simulate
+    from comparisons.running.run import DEFAULT_DTS as DEFAULT_DTS
+    from comparisons.running.run import measure as measure
+    from comparisons.running.run import run as run
+    from comparisons.sweeps.running import read_sweep as read_sweep
+    from comparisons.sweeps.running import run_sweep as run_sweep
+    from comparisons.sweeps.spec import load_sweep as load_sweep
+    from comparisons.tradeoff import TradeOff as TradeOff
+    from comparisons.tradeoff import tradeoff as tradeoff
+    from reports.run_folder import write_report as write_report
+    from reports.terminal.run_table import print_table as print_table
+    from scenarios.errors import DropspinError as DropspinError
+    from scenarios.errors import SceneError as SceneError
+    from scenarios.errors import UnknownName as UnknownName
+    from scenarios.loading import load as load
+    from scenarios.model import Scenario as Scenario
+    from scenarios.trajectory import Trajectory as Trajectory
+    from scenarios.truths import truth_for as truth_for
+    from scenarios.truths.truth import Truth as Truth
+
+_HOMES = {
+    "comparisons.calibration": ("Calibration", "calibrate"),
+    "comparisons.conformance.checks": ("CheckResult", "conform"),
+    "comparisons.engines.base": (
+        "AsBuilt",
+        "BatchSimulation",
+        "Diverged",
+        "Engine",
+        "EngineMissing",
+        "KnownLimitation",
+        "NumericOption",
+        "Simulation",
+    ),
+    "comparisons.engines.registry": ("engine", "engine_names"),
+    "comparisons.measuring.metrics": ("METRICS",),
+    "comparisons.regressions.baseline": ("Baseline", "accept", "load_baseline", "write_baseline"),
+    "comparisons.regressions.checking": ("check",),
+    "comparisons.regressions.comparing": ("compare",),
+    "comparisons.regressions.history": ("history",),
+    "comparisons.results.ensembles": ("ENSEMBLE_METRICS",),
+    "comparisons.results.measurement": ("Measurement",),
+    "comparisons.results.results": ("Results",),
+    "comparisons.results.store": ("load_results",),
+    "comparisons.robustness.study": ("RobustnessStudy", "find_limits"),
+    "comparisons.running.processes": ("ResourceLimits",),
+    "comparisons.running.recording": ("simulate",),
+    "comparisons.running.run": ("DEFAULT_DTS", "measure", "run"),
+    "comparisons.sweeps.running": ("read_sweep", "run_sweep"),
+    "comparisons.sweeps.spec": ("load_sweep",),
+    "comparisons.tradeoff": ("TradeOff", "tradeoff"),
+    "reports.run_folder": ("write_report",),
+    "reports.terminal.run_table": ("print_table",),
+    "scenarios.errors": ("DropspinError", "SceneError", "UnknownName"),
+    "scenarios.loading": ("load", ("scene_names", "names")),
+    "scenarios.model": ("Scenario",),
+    "scenarios.trajectory": ("Trajectory",),
+    "scenarios.truths": ("truth_for",),
+    "scenarios.truths.truth": ("Truth",),
+}
+_LOCATIONS = {
+    public: (module, home)
+    for module, names in _HOMES.items()
+    for public, home in ((name, name) if isinstance(name, str) else name for name in names)
+}
+"""Of each public name the module it is defined in, and its name there."""
+
+__all__ = sorted(_LOCATIONS)  # noqa: PLE0605 - a list of strings, computed
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use."""
+    if name not in _LOCATIONS:
+        raise AttributeError(f"module 'dropspin' has no attribute {name!r}")
+    module, home = _LOCATIONS[name]
+    globals()[name] = found = getattr(import_module(module), home)
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def main() -> None:
+    """Run the command line.
+
+    Installed packages come before the working directory and PYTHONPATH, so that a user's folders named `scenarios`, `reports` or
+    `comparisons` do not hide dropspin's own.
+    """
+    home = os.path.dirname(os.path.abspath(__file__))
+    named = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    last = [place for place in dict.fromkeys(map(os.path.abspath, [*named, os.getcwd()])) if place != home]
+    sys.path[:] = [place for place in sys.path if os.path.abspath(place) not in last] + last
+    from reports.commands.main import main as command_line
+
+    command_line()
+
+
+if __name__ == "__main__":
+    main()

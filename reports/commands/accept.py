@@ -1,0 +1,56 @@
+"""`dropspin accept`."""
+
+import click
+
+from reports.commands.options import as_json
+
+BASELINE = "dropspin-baseline.toml"
+
+
+@click.command("accept")
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True)
+@click.option("--reason", required=True, metavar="TEXT", help="Why these results are accepted; it is written to the file.")
+@click.option("--baseline", default=BASELINE, show_default=True, metavar="FILE", help="The baseline; a new file is made if there is none.")
+@click.option(
+    "--known-failures",
+    is_flag=True,
+    help="Accept failing checks as known failures: they do not fail as long as their results get no worse.",
+)
+@as_json
+def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_failures: bool, json_output: bool) -> None:
+    """Accept a run's results as the new baseline.
+
+    Results that have not moved beyond their tolerance stay unchanged in the file, as do those that RUN does not cover.
+    """
+    import datetime
+    import os
+    from pathlib import Path
+
+    import pandas as pd
+
+    from comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
+    from comparisons.results.store import load_results
+    from reports.terminal.rows import json_rows
+    from reports.views.check import accepted_sentences
+    from scenarios import DropspinError
+
+    if not reason.strip():
+        raise click.UsageError("--reason is empty; say why these results are accepted.")
+    if not reason.isprintable():
+        raise click.UsageError("--reason: contains control characters or more than one line; give one line of text.")
+    new = load_baseline(baseline) if os.path.exists(baseline) else Baseline()
+    changes, sentences = [], []
+    for run in runs:
+        results = load_results(Path(run), arrays=False)
+        new, found = accept(results, new, reason.strip(), datetime.date.today(), known_failures=known_failures)
+        changes.append(found)
+        sentences += accepted_sentences(results, found, known_failures)
+    if new.results.empty:
+        raise DropspinError(f"{', '.join(runs)}: there is nothing to accept, as no engine was measured; {baseline} is not written.")
+    write_baseline(new, baseline)
+    if json_output:
+        click.echo(json_rows(pd.concat(changes)))
+        return
+    for sentence in sentences:
+        click.echo(sentence)
+    click.echo(f"Written: {baseline}, {len(new.results):,} accepted results. Review the difference and commit it.")

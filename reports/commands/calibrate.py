@@ -1,0 +1,57 @@
+"""`dropspin calibrate`."""
+
+import json
+from typing import Literal
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import as_json
+
+
+@click.command("calibrate")
+@click.option("-e", "--engine", "engine_name", default="mujoco", show_default=True, metavar="ENGINE", help="The engine, with options.")
+@click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Speed after an impact over speed before.")
+@click.option("--dt", type=float, required=True, metavar="SECONDS", help="The time step.")
+@click.option("--friction", default="none", show_default=True, metavar="F", help="none, infinite or a coefficient.")
+@click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", show_default=True, help="The shape that falls.")
+@click.option("--as", "language", metavar="LANGUAGE", help="Print only the text to paste: python, mjcf or urdf.")
+@as_json
+def calibrate_command(
+    engine_name: str,
+    restitution: float,
+    dt: float,
+    friction: str,
+    shape: Literal["ball", "box"],
+    language: str | None,
+    json_output: bool,
+) -> None:
+    """Print the settings that give a restitution at a time step, ready to paste, and what was measured with them.
+
+    MuJoCo has two ways: a damper over one step, and with -e mujoco[spring_steps=20] a spring over that many steps.
+    """
+    from comparisons.calibration import calibrate
+    from comparisons.engines.registry import engine
+    from reports.terminal.progress import status
+    from reports.terminal.rows import print_rows
+    from reports.views import calibrate as view
+    from scenarios import UnknownName
+
+    if language is not None and json_output:
+        raise click.UsageError("--as prints one text and --json all of them; give one of the two.")
+    chosen = engine(engine_name)
+    with status(f"measuring {chosen.label}"):
+        found = calibrate(chosen, restitution, dt, view.friction(friction), shape)
+    stop_if_interrupted()
+    if language is not None:
+        if language not in found.programs:
+            raise UnknownName(f"{chosen.label}'s language", language, found.programs)
+        click.echo(found.programs[language], nl=False)
+        return
+    if json_output:
+        click.echo(json.dumps(view.as_data(found), indent=1, ensure_ascii=False))
+        return
+    print_rows(view.measured_rows(found), json_output=False)
+    print_rows(view.setting_rows(found), json_output=False)
+    for name, text in found.programs.items():
+        click.echo(f"To paste, as {name}:\n\n{text}")

@@ -1,0 +1,36 @@
+"""`dropspin compare`."""
+
+import json
+from pathlib import Path
+
+import click
+
+from reports.commands.options import as_json, summary_option, write_text
+
+
+@click.command("compare")
+@click.argument("old", metavar="OLD")
+@click.argument("new", metavar="NEW")
+@summary_option
+@as_json
+def compare_command(old: str, new: str, summary: str | None, json_output: bool) -> int:
+    """Show what changed between two runs, and what it is attributed to: the engine, its settings, dropspin, or the machine.
+
+    OLD and NEW are folders that dropspin run -o wrote. Accuracy is judged; speed is reported, not gated.
+
+    Exit code: 0 nothing is worse, 1 a result is worse, moved or gone, 2 bad input.
+    """
+    from comparisons.regressions.comparing import compare
+    from comparisons.results.store import load_results
+    from reports.markdown import compare_markdown
+    from reports.views import compare as view
+
+    changes = compare(load_results(Path(old), arrays=False), load_results(Path(new), arrays=False))
+    if summary is not None:
+        write_text(summary, compare_markdown(changes), append=True)
+    if json_output:
+        click.echo(json.dumps(view.as_data(changes), indent=1, ensure_ascii=False, allow_nan=False))
+    else:
+        for line in [*view.listed(changes), *view.sentences(changes)]:
+            click.echo(line)
+    return int(bool(len(changes.regressions)))

@@ -1,0 +1,16 @@
+"""`dropspin doctor`."""
+
+import click
+
+from reports.commands.options import as_json
+
+
+@click.command("doctor")
+@as_json
+def doctor_command(json_output: bool) -> None:
+    """Check this installation: versions, engines, processor, and whether each engine steps."""
+    from comparisons.engines.registry import engine_names
+    from reports.terminal.rows import print_rows
+    from reports.views import doctor
+
+    print_rows(doctor.rows(engine_names()), json_output)

@@ -1,0 +1,68 @@
+"""`dropspin history`."""
+
+import json
+import os
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import click
+
+from reports.commands.options import as_json
+
+
+@click.command("history")
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True)
+@click.option("-o", "--output", default="out/history", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
+@as_json
+def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> None:
+    """Follow each result over runs, commits and versions of engines, and find the runs in which some moved.
+
+    RUN is a folder that dropspin run -o wrote, or a folder of such folders; runs are sorted by the time they were started.
+    """
+    from comparisons.regressions.history import history
+    from reports.output import folder_made
+    from reports.study_files import write_history
+    from reports.terminal.progress import status
+    from reports.views import history as view
+
+    with folder_made(output) as folder:
+        with status("reading the runs"):
+            found = history(_load_runs(_find_runs(runs)))
+        with status("drawing"):
+            write_history(found, folder)
+    if json_output:
+        click.echo(json.dumps(view.rows(found), indent=1, ensure_ascii=False))
+        return
+    for line in [*view.listed(found), *view.sentences(found)]:
+        click.echo(line)
+    click.echo(f"Written: {os.path.join(output, 'history.md')}")
+
+
+def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
+    """The folders of runs at some places: each is one, or holds some.
+
+    Raises:
+        DropspinError: At one of them there is none.
+    """
+    from scenarios import DropspinError
+
+    found: dict[str, Path] = {}
+    for place in places:
+        path = Path(place)
+        here = [path] if (path / "run.json").is_file() else sorted(file.parent for file in path.glob("*/run.json"))
+        if not here:
+            raise DropspinError(
+                f"{place}: neither a run nor a folder of runs; give folders that dropspin run -o wrote, or a folder of them."
+            )
+        found |= {str(one): one for one in here}
+    return found
+
+
+def _load_runs(found: dict[str, Path]) -> dict[str, Any]:
+    """Their results, by the shortest names that are unique."""
+    from comparisons.results.store import load_results
+
+    short = {place: path.resolve().name for place, path in found.items()}
+    alike = Counter(short.values())
+    return {short[place] if alike[short[place]] == 1 else place: load_results(path, arrays=False) for place, path in found.items()}

@@ -1,0 +1,30 @@
+"""Ctrl-C and SIGTERM, handled wherever they arrive."""
+
+import signal
+import sys
+
+_interrupts: list[int] = []
+
+
+def handle_interrupts() -> None:
+    """Treat SIGTERM like Ctrl-C from now on, so that nothing unfinished is left behind; record both."""
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, _interrupt)
+    sys.unraisablehook = _report_unless_interrupted
+
+
+def stop_if_interrupted() -> None:
+    """Raise a recorded interrupt again: one that arrives in a callback of an engine or of the compiler is swallowed there."""
+    if _interrupts:
+        raise KeyboardInterrupt
+
+
+def _interrupt(number: int, frame: object) -> None:
+    _interrupts.append(number)
+    raise KeyboardInterrupt
+
+
+def _report_unless_interrupted(found: "sys.UnraisableHookArgs") -> None:
+    """Report an exception that cannot be raised, unless it is an interrupt, which `stop_if_interrupted` raises again."""
+    if not isinstance(found.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(found)

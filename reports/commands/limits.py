@@ -1,0 +1,76 @@
+"""`dropspin limits`."""
+
+import json
+import os
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import as_json, time_limit_option
+
+
+@click.command("limits")
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
+@click.option(
+    "--axis", "axes", multiple=True, metavar="AXIS", help="What to vary, such as spin; repeat for more. [default: all of a scene]"
+)
+@click.option("--dt", default=5e-3, show_default=True, type=float, metavar="SECONDS", help="The time step, where it is not what is varied.")
+@click.option(
+    "--within",
+    default=0.1,
+    show_default=True,
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="TOLERANCE",
+    help="The largest error that counts as sound: a ratio, or an angle in radians.",
+)
+@time_limit_option(60.0, "an engine may take at one point")
+@click.option("-o", "--output", default="out/limits", show_default=True, metavar="DIR", help="Folder for the tables and the figures.")
+@as_json
+def limits_command(
+    scenes: tuple[str, ...],
+    engines: tuple[str, ...],
+    axes: tuple[str, ...],
+    dt: float,
+    within: float,
+    time_limit: float,
+    output: str,
+    json_output: bool,
+) -> None:
+    """Find where engines break: steps, spins, heights, inertias, masses, restitutions, durations and sizes at their extremes.
+
+    Without arguments: five scenes (two spins, a ball, a box, a block) and the methods that differ on them; some minutes.
+    """
+    from comparisons.robustness.axes import AXES
+    from comparisons.robustness.study import SCENES, find_limits
+    from comparisons.running.processes import ResourceLimits
+    from reports.output import folder_made
+    from reports.study_files import write_limits
+    from reports.terminal.progress import share_bar
+    from reports.terminal.rows import print_rows
+    from reports.views import limits as view
+    from scenarios import load
+
+    loaded = [load(name) for name in scenes or SCENES]
+    if len({scene.name for scene in loaded}) < len(loaded):
+        raise click.UsageError("two scenes have the same name; a scene's name is its file's name, rename one.")
+    having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in {*axes} & AXES.keys())]
+    found = []
+    with folder_made(output) as folder:
+        for scene in having or loaded[:1]:  # find_limits says which axes it has
+            with share_bar(scene.name) as progress:
+
+                def on_progress(what: str, share: float) -> None:
+                    stop_if_interrupted()
+                    progress(what, share)
+
+                resources = ResourceLimits(processor_time=time_limit)
+                found.append(find_limits(scene, engines, axes, dt=dt, within=within, on_progress=on_progress, resources=resources))
+        write_limits(found, folder)
+    if json_output:
+        click.echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
+        return
+    for rows in (view.range_rows(found), view.step_rows(found)):
+        if rows:
+            print_rows(rows, json_output=False)
+    click.echo(f"Written: {os.path.join(output, 'limits.md')}")

@@ -1,0 +1,105 @@
+"""The command line: the group of commands, and what every error ends in."""
+
+import io
+import os
+import sys
+import traceback
+from importlib import import_module
+from typing import Any
+
+import click
+
+from reports.commands.interrupts import handle_interrupts
+
+COMMANDS = {
+    "accept": "Accept a run's results as the new baseline.",
+    "calibrate": "Print the settings that give a restitution at a time step.",
+    "check": "Judge a run: by what its scenes expect, and by a baseline.",
+    "compare": "Show what changed between two runs, and what it is attributed to.",
+    "conform": "Check an engine adapter against the protocol and reference motions.",
+    "doctor": "Check this installation.",
+    "history": "Follow each result over runs, commits and versions.",
+    "limits": "Find where engines break.",
+    "list": "List the scenes, the engines or the metrics.",
+    "replay": "Show the motion in 3D.",
+    "report": "Write the report of a run again.",
+    "run": "Run scenes with engines, side by side, and write the report.",
+    "show": "Show a scene, or an engine's settings for it.",
+    "sweep": "Run every job of a grid or random sample.",
+    "tradeoff": "Measure what accuracy costs.",
+}
+"""The commands, each in `reports/commands/NAME.py`, and their line in the help."""
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor the user's mistake
+
+
+def main() -> None:
+    """Run the command line; every expected mistake ends in one line and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that lacks a character gets a question mark, not a traceback
+    handle_interrupts()
+    try:
+        sys.exit(_run())
+    except (click.Abort, KeyboardInterrupt) as interrupt:
+        details = (interrupt.__cause__ or interrupt).args  # click wraps the interrupts of commands in its own
+        click.echo(f"dropspin: interrupted; {details[0] if details else 'nothing was written'}.", err=True)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # the reader has gone; Python would flush into the closed pipe at exit
+        sys.exit(INTERRUPTED)
+    except OSError as error:
+        click.echo(f"dropspin: {error}", err=True)
+        sys.exit(2)
+    except Exception:
+        click.echo("dropspin: internal error; please report what follows.", err=True)
+        traceback.print_exc()
+        sys.exit(INTERNAL_ERROR)
+
+
+def _run() -> int:
+    try:
+        return dropspin(standalone_mode=False) or 0
+    except click.ClickException as error:
+        error.show()
+        return 2
+    except Exception as error:
+        from scenarios import DropspinError
+
+        if not isinstance(error, DropspinError):
+            raise
+        click.echo(f"dropspin: {error}", err=True)
+        from comparisons.engines.base import EngineMissing
+
+        return 3 if isinstance(error, EngineMissing) else 2
+
+
+class _LazyGroup(click.Group):
+    """A group whose commands are imported when they are called, so that the help does not wait for them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = getattr(import_module(f"reports.commands.{cmd_name}"), f"{cmd_name}_command")
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+def _print_version(ctx: click.Context, parameter: click.Parameter, value: Any) -> None:
+    if value:
+        from importlib.metadata import version
+
+        click.echo(f"dropspin, version {version('dropspin')}")
+        ctx.exit()
+
+
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_print_version, help="Show the version and exit.")
+def dropspin() -> None:
+    """Run drop and spin scenes with rigid-body engines and compare them with exact solutions."""

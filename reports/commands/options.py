@@ -1,0 +1,41 @@
+"""Options that several commands have."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
+baseline_option = click.option("--baseline", metavar="FILE", help="Baseline to compare the run with, as dropspin accept wrote it.")
+summary_option = click.option("--summary", metavar="FILE", help="Append a Markdown summary to this file, such as $GITHUB_STEP_SUMMARY.")
+
+
+def write_text(path: str, text: str, *, append: bool = False) -> None:
+    """Write a text to a file, or append it."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with target.open("a" if append else "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def _finite(context: click.Context, parameter: click.Parameter, value: float) -> float:
+    if not math.isfinite(value):
+        raise click.BadParameter(f"{value} is not a finite number of seconds.", context, parameter)
+    return value
+
+
+def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
+    """The option `--time-limit` of an engine's process."""
+    return click.option(
+        "--time-limit",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=default,
+        show_default=True,
+        metavar="SECONDS",
+        callback=_finite,
+        help=f"Processor time that {of}.",
+    )

@@ -1,0 +1,70 @@
+"""`dropspin replay`."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import write_text
+
+
+@click.command("replay")
+@click.argument("run", metavar="RUN")
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option(
+    "--dt", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS", help="One of the run's time steps. [default: the coarsest]"
+)
+@click.option("-o", "--output", metavar="FILE", help="The page to write. [default: replay.html in the run's folder]")
+@click.option("--gif", metavar="FILE", help="Write an animated GIF of one scene instead.")
+@click.option(
+    "--speed", default=0.25, show_default=True, type=click.FloatRange(min=0.0, min_open=True), help="Speed of the GIF: 1 is real time."
+)
+@click.option("--open/--no-open", "opens", default=True, help="Show the page in a browser. [default: --open]")
+def replay_command(
+    run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, speed: float, opens: bool
+) -> None:
+    """Show the motion in 3D: a run's scenes, engines overlaid or side by side, the exact motion as a ghost.
+
+    Play, scrub, slow down, turn the view; contacts and impulses are shown where the floor acts. The page is one file and needs no network.
+    """
+    from comparisons.results.store import load_results
+    from reports.html.replay import replay_page
+    from reports.plots import time_figure
+    from reports.plots.svg import svg
+    from reports.replay import replay_of
+    from reports.replay.clip import write_clip
+    from reports.terminal.progress import share_bar
+    from scenarios import DropspinError
+
+    if gif is not None and Path(gif).suffix.lower() != ".gif":
+        raise click.UsageError(f"--gif {gif}: give the file the ending .gif.")
+    if gif is not None and output is not None:
+        raise click.UsageError(f"-o {output} is for the page, which is not written beside a GIF; leave it out.")
+    results = load_results(Path(run))
+    found = [replay_of(results, name, dt) for name in scenes or results.scenes]
+    shown = [one for one in found if one is not None]
+    if not shown:
+        raise DropspinError(f"{run}: no engine has a motion in these scenes; see report.html for the reasons.")
+    if gif is not None:
+        if len(shown) > 1:
+            raise click.UsageError(f"a GIF shows one scene; name it: {', '.join(one.scene.name for one in shown)}.")
+        with share_bar(gif) as progress:
+
+            def on_progress(share: float) -> None:
+                stop_if_interrupted()
+                progress("", share)
+
+            write_clip(shown[0], gif, speed, on_progress)
+        click.echo(f"Written: {gif}")
+        return
+    plots: dict[str, str] = {}
+    for one in shown:
+        at_this_step = {key: motion for key, motion in results.trajectories.items() if key[2] == one.dt}
+        figure = time_figure(replace(results, trajectories=at_this_step), one.scene.name)
+        plots[one.scene.name] = svg(figure, f"s{len(plots):02d}-time")
+    file = str(Path(run) / "replay.html") if output is None else output
+    write_text(file, replay_page(shown, plots))
+    click.echo(f"Written: {file}")
+    if opens:
+        click.launch(file)

@@ -1,0 +1,30 @@
+"""`dropspin report`."""
+
+import shutil
+from pathlib import Path
+
+import click
+
+
+@click.command("report")
+@click.argument("run", metavar="RUN")
+@click.option(
+    "--add", "studies", multiple=True, metavar="FOLDER", help="Add what dropspin tradeoff or limits wrote there; repeat for more."
+)
+@click.option("--png", is_flag=True, help="Write the plots as PNG too.")
+def report_command(run: str, studies: tuple[str, ...], png: bool) -> None:
+    """Write the report of a run again: with other studies, with plots as PNG, or after an update of dropspin.
+
+    Studies and PNGs are those asked for this time. A replay in the folder stays.
+    """
+    from comparisons.results.store import load_results
+    from reports.run_folder import fill, run_folder
+    from reports.sections import read_section
+
+    sections = [read_section(folder) for folder in dict.fromkeys(studies)]
+    results = load_results(Path(run))
+    with run_folder(run) as unfinished:
+        fill(results, unfinished, sections, png)
+        if (Path(run) / "replay.html").exists():
+            shutil.copy2(Path(run) / "replay.html", unfinished)
+    click.echo(f"Report: {Path(run) / 'report.html'}")

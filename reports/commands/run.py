@@ -1,0 +1,143 @@
+"""`dropspin run`."""
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import as_json, baseline_option, time_limit_option
+
+if TYPE_CHECKING:
+    from comparisons.regressions.checking import Checked
+    from comparisons.results.results import Results
+    from reports.views.check import BaselineFile
+    from scenarios import Scenario
+
+CORE_ENGINES = ("document", "mujoco", "pybullet")
+
+
+@click.command("run")
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option(
+    "-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, such as mujoco[integrator=rk4]; repeat for more."
+)
+@click.option(
+    "--dt", "dts", multiple=True, type=float, metavar="SECONDS", help="A time step; repeat for more. [default: 0.004, 0.002, 0.001]"
+)
+@click.option(
+    "-o",
+    "--output",
+    default="out/run",
+    show_default=True,
+    metavar="DIR",
+    help="Folder for the report and the data; an earlier run there is replaced.",
+)
+@time_limit_option(300.0, "an engine may take for one scene at one step")
+@baseline_option
+@click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that were measured are not run again.")
+@as_json
+def run_command(
+    scenes: tuple[str, ...],
+    engines: tuple[str, ...],
+    dts: tuple[float, ...],
+    output: str,
+    time_limit: float,
+    baseline: str | None,
+    resume: bool,
+    json_output: bool,
+) -> int:
+    """Run scenes with engines, side by side, and write the report.
+
+    SCENE is a name of the catalogue, the path of a TOML file, or core: the core catalogue. Without arguments: the core catalogue,
+    three engines, three time steps.
+
+    Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
+    """
+    from comparisons.regressions.baseline import load_baseline
+    from reports.commands.check import print_checked
+    from reports.terminal.rows import json_rows
+    from reports.terminal.run_table import print_table
+    from reports.views.check import BaselineFile
+    from reports.views.failures import failures
+    from scenarios import load
+
+    loaded = [scene for name in scenes or ["core"] for scene in (_core() if name == "core" else [load(name)])]
+    file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
+    results = _run(loaded, engines, dts, output, time_limit, resume, None if json_output else print_table)
+    checked = _checked(results, file, json_output)
+    if json_output:
+        click.echo(json_rows(checked.results.table))
+    else:
+        if file is not None:
+            print_checked(checked, file, [one for one in failures(checked.results, baseline) if one.accepted])
+        click.echo(f"Report: {os.path.join(output, 'report.html')}")
+    return checked.results.exit_code()
+
+
+def _run(
+    scenes: "list[Scenario]",
+    engines: tuple[str, ...],
+    dts: tuple[float, ...],
+    output: str,
+    time_limit: float,
+    resume: bool,
+    show: "Callable[[Results], None] | None",
+) -> "Results":
+    """Run, show and write; an interrupted run keeps the scenes that were measured."""
+    from comparisons.running.processes import ResourceLimits
+    from comparisons.running.run import DEFAULT_DTS, run
+    from reports.run_folder import MeasuredScenes, fill, run_folder
+    from reports.terminal.progress import progress_bar, status
+
+    measured, chosen, steps = MeasuredScenes(output), engines or CORE_ENGINES, dts or DEFAULT_DTS
+    try:
+        with run_folder(output) as folder:
+            if not resume:
+                measured.clear()
+            with progress_bar(len(scenes) * len(chosen) * len(steps)) as progress:
+
+                def on_progress(scene: str, engine: str, dt: float) -> None:
+                    stop_if_interrupted()
+                    progress(scene, engine, dt)
+
+                resources = ResourceLimits(processor_time=time_limit)
+                results = run(
+                    scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=measured.parts()
+                )
+            stop_if_interrupted()
+            results = replace(results, provenance={**results.provenance, "named": sorted({name.strip() for name in engines})})
+            if show is not None:
+                show(results)
+            with status("writing the report"):
+                fill(results, folder)
+    except KeyboardInterrupt:
+        kept = len(measured)
+        message = f"{kept} of {len(scenes)} scenes are kept; --resume continues the run" if kept else "nothing was written"
+        raise KeyboardInterrupt(message) from None
+    measured.clear()
+    return results
+
+
+def _checked(results: "Results", file: "BaselineFile | None", json_output: bool) -> "Checked":
+    """A run that was written, compared with the baseline; without anything to compare its rows are printed all the same."""
+    from comparisons.regressions.checking import NothingAccepted, check
+    from reports.terminal.rows import json_rows
+    from scenarios import DropspinError
+
+    try:
+        return check(results, None if file is None else file.baseline)
+    except NothingAccepted as error:
+        assert file is not None
+        if json_output:
+            click.echo(json_rows(results.table))
+        raise DropspinError(f"{file.path}: {error} The run is written: {file.run}.") from None
+
+
+def _core() -> "list[Scenario]":
+    """The scenes of the core catalogue."""
+    from scenarios import load, names
+
+    return [scene for scene in map(load, names()) if "core" in scene.tags]

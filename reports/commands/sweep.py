@@ -1,0 +1,53 @@
+"""`dropspin sweep`."""
+
+import json
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import as_json, time_limit_option
+
+
+@click.command("sweep")
+@click.argument("spec", metavar="SPEC.toml")
+@click.option(
+    "-o", "--output", default="out/sweep", show_default=True, metavar="DIR", help="Folder for the table, or a URL of an object store."
+)
+@click.option("--resume", is_flag=True, help="Resume an interrupted sweep: jobs that were written are not run again.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://host:8786.")
+@time_limit_option(60.0, "an engine may take for one job")
+@as_json
+def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, time_limit: float, json_output: bool) -> int:
+    """Run every job of a grid or random sample over scenes, engines, options, time steps and starts.
+
+    Each job is one row of a table in Parquet parts. An interrupted sweep keeps the parts that were written.
+
+    Exit code: 0 all jobs were run, 2 bad input, 3 an engine broke down in a job or is missing.
+    """
+    from comparisons.running.processes import ResourceLimits
+    from comparisons.sweeps.running import count, run_sweep
+    from comparisons.sweeps.spec import load_sweep
+    from reports.terminal.progress import jobs_bar
+    from reports.terminal.rows import print_rows
+    from reports.views import sweep as view
+
+    asked = load_sweep(spec)
+    try:
+        with jobs_bar(asked.size) as progress:
+
+            def on_progress(jobs: int) -> None:
+                stop_if_interrupted()
+                progress(jobs)
+
+            resources = ResourceLimits(processor_time=time_limit)
+            run_sweep(asked, output, resume=resume, scheduler=scheduler, resources=resources, on_progress=on_progress)
+        stop_if_interrupted()
+        found = view.tallies(output)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{count(output):,} of {asked.size:,} jobs are kept; --resume continues the sweep") from None
+    if json_output:
+        click.echo(json.dumps(view.summary_rows(found), indent=1, ensure_ascii=False))
+    else:
+        print_rows(view.formatted_rows(found), json_output=False)
+        click.echo(f"Written: {output}, {asked.size:,} jobs; from Python: dropspin.read_sweep({output!r})")
+    return view.exit_code(found)

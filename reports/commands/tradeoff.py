@@ -1,0 +1,60 @@
+"""`dropspin tradeoff`."""
+
+import json
+import os
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import as_json
+
+
+@click.command("tradeoff")
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
+@click.option("--metric", metavar="METRIC", help="The metric of the error. [default: the scene's leading metric]")
+@click.option(
+    "--within",
+    multiple=True,
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=(1e-3,),
+    show_default=True,
+    metavar="TOLERANCE",
+    help="The largest error allowed; repeat for more.",
+)
+@click.option("-o", "--output", default="out/tradeoff", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
+@as_json
+def tradeoff_command(
+    scenes: tuple[str, ...], engines: tuple[str, ...], metric: str | None, within: tuple[float, ...], output: str, json_output: bool
+) -> None:
+    """Measure what accuracy costs: error against time over a ladder of time steps, and the cheapest configuration within a tolerance.
+
+    Without arguments: the scene spin-asymmetric and the methods that differ on it.
+    """
+    from comparisons.tradeoff import tradeoff
+    from reports.output import folder_made
+    from reports.study_files import write_tradeoff
+    from reports.terminal.progress import share_bar
+    from reports.terminal.rows import print_rows
+    from reports.views import tradeoff as view
+    from scenarios import load
+
+    found = []
+    with folder_made(output) as folder:
+        for name in scenes or ("spin-asymmetric",):
+            with share_bar(name) as progress:
+
+                def on_progress(what: str, share: float) -> None:
+                    stop_if_interrupted()
+                    progress(what, share)
+
+                found.append(tradeoff(load(name), engines, metric, on_progress=on_progress))
+            if not json_output:
+                print_rows(view.front_rows(found[-1]), json_output=False)
+                for sentence in view.sentences(found[-1], within):
+                    click.echo(sentence)
+        write_tradeoff(found, within, folder)
+    if json_output:
+        click.echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
+    else:
+        click.echo(f"Written: {os.path.join(output, 'tradeoff.md')}")

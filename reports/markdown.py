@@ -1,0 +1,53 @@
+"""Markdown pages: the report of a run in short, summaries of checks and comparisons for a pull request, a history."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from comparisons.regressions.checking import Checked
+from comparisons.regressions.comparing import Changes
+from comparisons.results.provenance import versions_behind
+from comparisons.results.results import Results
+from reports.pages import page
+from reports.views import check, compare
+from reports.views.failures import Failure
+from reports.views.run import overview
+
+MOST_FAILURES = 100
+"""Failures listed in a summary; JUnit and JSON have them all."""
+
+
+def run_markdown(results: Results) -> str:
+    """The report of a run in short."""
+    return page("report.md", **overview(results))
+
+
+def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Sequence[Failure]) -> str:
+    """The outcome of a check."""
+    results = checked.results
+    return page(
+        "check.md",
+        sentences=check.sentences(checked, file),
+        failing=found[:MOST_FAILURES],
+        more=max(0, len(found) - MOST_FAILURES),
+        shown=check.MOST_FAILURES,
+        engines=results.engines,
+        tallies={engine: _tally(results.table[results.table["engine"] == engine]) for engine in results.engines},
+        versions=versions_behind(results.provenance),
+        cpu=results.provenance["cpu"],
+    )
+
+
+def compare_markdown(changes: Changes) -> str:
+    """What changed between two runs."""
+    return page("compare.md", held=not len(changes.regressions), tables=compare.tables(changes), sentences=compare.sentences(changes))
+
+
+def history_markdown(runs: int, sentences: Sequence[str], scenes: Sequence[str]) -> str:
+    """A history of runs, with a figure for each scene."""
+    return page("history.md", runs=runs, sentences=sentences, scenes=scenes)
+
+
+def _tally(rows: pd.DataFrame) -> dict[str, int]:
+    """How many checks of an engine passed, failed, and so on."""
+    return {str(verdict): int(count) for verdict, count in rows["verdict"].value_counts().items()}

@@ -1,0 +1,43 @@
+"""Pages from Jinja templates, HTML and Markdown; what stands in HTML is escaped."""
+
+import re
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+from reports.plots.svg import with_ids_of
+from reports.views import numbers
+
+
+def page(template: str, **content: Any) -> str:
+    """A page of one of the templates in `reports/templates/`."""
+    return _environment().get_template(template).render(content)
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("reports"),
+        autoescape=select_autoescape(enabled_extensions=("html",), disabled_extensions=("md",), default=True),
+        keep_trailing_newline=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted")}
+    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code, "ids_of": with_ids_of}
+    environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": numbers.MARKS}
+    return environment
+
+
+def _markdown_cell(text: str) -> str:
+    """Text that stays within its cell of a Markdown table and means nothing else there."""
+    return re.sub(r"([\\|`*_\[\]<>#])", r"\\\1", " ".join(str(text).split()))
+
+
+def _markdown_code(text: str) -> str:
+    """Text as code, whatever backticks it has."""
+    fence = "`" * (1 + max((len(found) for found in re.findall("`+", text)), default=0))
+    room = " " if len(fence) > 1 else ""
+    return f"{fence}{room}{text}{room}{fence}"

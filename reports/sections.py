@@ -1,0 +1,118 @@
+"""What a study has to tell, part by part: a Markdown page of its own, and a section in the report of a run."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from reports.plots.svg import svg
+from scenarios import DropspinError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FILE = "section.json"
+
+Part = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A title and the parts below it, in order.
+
+    Attributes:
+        title: The title.
+        parts: Each with its `kind`: `heading` and `text` (content), `list` (items), `table` (rows: texts by column) or `picture` (name, and
+            svg, an element).
+    """
+
+    title: str
+    parts: list[Part] = field(default_factory=list)
+
+    def add_heading(self, content: str) -> None:
+        """Begin a part of the section."""
+        self.parts.append({"kind": "heading", "content": content})
+
+    def add_text(self, content: str) -> None:
+        """Add a paragraph."""
+        self.parts.append({"kind": "text", "content": content})
+
+    def add_list(self, items: Sequence[str]) -> None:
+        """Add sentences, a line each; nothing if there are none."""
+        if items:
+            self.parts.append({"kind": "list", "items": list(items)})
+
+    def add_table(self, rows: Sequence[Mapping[str, str]]) -> None:
+        """Add a table; nothing if it has no rows."""
+        if rows:
+            self.parts.append({"kind": "table", "rows": [dict(row) for row in rows]})
+
+    def add_picture(self, name: str, figure: "Figure") -> None:
+        """Add a figure."""
+        self.parts.append({"kind": "picture", "name": name, "svg": svg(figure, name)})
+
+    def write(self, folder: Path, stem: str) -> None:
+        """Write the page, its pictures, and what the report of a run takes it from."""
+        (folder / FILE).write_text(json.dumps({"title": self.title, "parts": self.parts}, indent=1), encoding="utf-8")
+        pictures = [part for part in self.parts if part["kind"] == "picture"]
+        for picture in pictures:
+            (folder / f"{picture['name']}.svg").write_text(picture["svg"], encoding="utf-8")
+        told = "\n\n".join([f"# {self.title}", *map(_markdown, self.parts)])
+        (folder / f"{stem}.md").write_text(f"{told}\n", encoding="utf-8")
+
+
+class _Prose(BaseModel):
+    kind: Literal["heading", "text"]
+    content: str
+
+
+class _List(BaseModel):
+    kind: Literal["list"]
+    items: list[str]
+
+
+class _Table(BaseModel):
+    kind: Literal["table"]
+    rows: Annotated[list[dict[str, str]], Field(min_length=1)]
+
+
+class _Picture(BaseModel):
+    kind: Literal["picture"]
+    name: str
+    svg: str
+
+
+class _File(BaseModel):
+    title: str
+    parts: list[Annotated[_Prose | _List | _Table | _Picture, Field(discriminator="kind")]]
+
+
+def read_section(folder: str) -> Section:
+    """What a study has left in its folder.
+
+    Raises:
+        DropspinError: There is none, or it is damaged.
+    """
+    try:
+        return Section(**_File.model_validate_json((Path(folder) / FILE).read_bytes()).model_dump())
+    except (OSError, ValueError):
+        raise DropspinError(
+            f"{folder}: holds no study, or a damaged one; give a folder that dropspin tradeoff or dropspin limits wrote."
+        ) from None
+
+
+def _markdown(part: Part) -> str:
+    if part["kind"] == "heading":
+        return f"## {part['content']}"
+    if part["kind"] == "list":
+        return "\n".join(f"{number}. {item}" for number, item in enumerate(part["items"], 1))
+    if part["kind"] == "table":
+        heads = list(part["rows"][0])
+        lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row.values()] for row in part["rows"])]
+        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    if part["kind"] == "picture":
+        return f"![{part['name']}]({part['name']}.svg)"
+    return str(part["content"])

@@ -1,0 +1,55 @@
+"""The files of the studies: tables as CSV and JSON, a Markdown page, figures, and the section for the report of a run."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from comparisons.regressions.history import History
+from comparisons.robustness.study import RobustnessStudy
+from comparisons.tradeoff import TradeOff
+from reports.markdown import history_markdown
+from reports.output import write_table
+from reports.plots import history_figure, limits_figure, tradeoff_figure
+from reports.sections import Section
+from reports.views import history, limits, tradeoff
+
+
+def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
+    """Write `limits.csv`, `limits.json`, `limits.md` and a figure per scene."""
+    write_table(folder, "limits", limits.COLUMNS, [row for one in found for row in limits.rows(one)])
+    section = Section("Where engines break")
+    if steps := limits.step_rows(found):
+        section.add_heading("The largest steps")
+        section.add_table(steps)
+    for one in found:
+        section.add_heading(one.scene.name)
+        if one.scans:
+            section.add_picture(one.scene.name, limits_figure(one))
+            section.add_table(limits.range_rows([one]))
+        for engine, why in one.left_out.items():
+            section.add_text(f"Left out: {engine}, {why}.")
+    section.write(folder, "limits")
+
+
+def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: Path) -> None:
+    """`tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot for each scene."""
+    write_table(folder, "tradeoff", tradeoff.COLUMNS, [row for one in found for row in tradeoff.rows(one)])
+    section = Section("What accuracy costs")
+    for one in found:
+        section.add_heading(one.scene.name)
+        section.add_picture(one.scene.name, tradeoff_figure(one))
+        section.add_table(tradeoff.front_rows(one))
+        section.add_list(tradeoff.sentences(one, within))
+    section.write(folder, "tradeoff")
+
+
+def write_history(found: History, folder: Path) -> None:
+    """`history.csv` and `history.json` with every result of every run, `history.md`, and a plot for each scene."""
+    results = found.results.drop(columns="verdict").assign(run=[found.names[number] for number in found.results["run"]])
+    table = results.merge(found.stamps, on="run")
+    known = table.astype(object).where(table.notna(), None)  # JSON knows no NaN
+    records = [{str(key): value for key, value in row.items()} for row in known.to_dict("records")]
+    write_table(folder, "history", [str(name) for name in table], records)
+    scenes = list(dict.fromkeys(found.results["scene"]))
+    for scene in scenes:
+        history_figure(found, scene).savefig(folder / f"{scene}.svg")
+    (folder / "history.md").write_text(history_markdown(len(found.names), history.sentences(found), scenes), encoding="utf-8")

@@ -1,0 +1,116 @@
+"""Progress and status on a terminal, plain lines elsewhere; all of it on the standard error."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
+
+
+@contextmanager
+def progress_bar(total: int) -> Iterator[Callable[[str, str, float], None]]:
+    """A bar on a terminal; elsewhere one line a scene. All of it on the standard error."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        seen: set[str] = set()
+
+        def line(scene: str, engine: str, dt: float) -> None:
+            if scene not in seen:
+                seen.add(scene)
+                click.echo(f"running {scene}", err=True)
+
+        yield line
+        return
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting", total=total)
+
+        def advance(scene: str, engine: str, dt: float) -> None:
+            bar.update(task, advance=1, description=f"{scene} {engine} {dt:g} s")
+
+        yield advance
+
+
+@contextmanager
+def status(text: str) -> Iterator[None]:
+    """Say what is going on while it goes on."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        click.echo(text, err=True)
+        yield
+        return
+    with console.status(text):
+        yield
+
+
+@contextmanager
+def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
+    """A bar of a share of work done on a terminal; elsewhere one line. On the standard error."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        click.echo(f"running {title}", err=True)
+        yield lambda what, share: None
+        return
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda what, share: bar.update(task, completed=share, description=f"{title}: {what}")
+
+
+EVERY = 5.0  # s, between two lines
+
+
+@contextmanager
+def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
+    """A bar of jobs done, with their rate and the time left, on a terminal; elsewhere a line every few seconds. On the standard error.
+
+    What is told first was done before, and says nothing of the rate.
+    """
+    console = Console(stderr=True)
+    start, before, done, last = time.monotonic(), -1, 0, 0.0
+
+    def rate() -> float:
+        return (done - max(before, 0)) / max(time.monotonic() - start, 1e-9)
+
+    def count(jobs: int) -> None:
+        nonlocal before, done
+        done += jobs
+        before = done if before < 0 else before
+
+    if not console.is_terminal:
+
+        def line(jobs: int) -> None:
+            nonlocal last
+            count(jobs)
+            now = time.monotonic()
+            if jobs and (now - last >= EVERY or done == total):
+                last = now
+                left = f", {_duration((total - done) / rate())} left" if rate() > 0.0 else ""
+                click.echo(f"{done:,} of {total:,} jobs, {rate():,.0f} a second{left}", err=True)
+
+        yield line
+        return
+
+    class Rate(TextColumn):
+        """Jobs a second."""
+
+        def render(self, task: Task) -> Text:
+            return Text(f"{rate():,.0f}/s")
+
+    columns = (TextColumn("jobs"), BarColumn(), MofNCompleteColumn(), Rate(""), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("jobs", total=total)
+
+        def advance(jobs: int) -> None:
+            count(jobs)
+            bar.update(task, completed=done)
+
+        yield advance
+
+
+def _duration(seconds: float) -> str:
+    minutes, hours = seconds / 60.0, seconds / 3600.0
+    return f"{hours:.1f} h" if hours >= 1.0 else f"{minutes:.0f} min" if minutes >= 2.0 else f"{seconds:.0f} s"

@@ -1,0 +1,114 @@
+"""A run on a terminal: scene by scene, engines side by side."""
+
+import math
+from collections.abc import Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from comparisons.judging.agreement import NO_EVIDENCE
+from comparisons.measuring.metrics import METRICS
+from comparisons.results.results import Results
+from reports.views.failures import Failure, failures
+from reports.views.findings import finding_sentences, orders, verdict_sentence
+from reports.views.numbers import MARKS, formatted, trend, word
+
+NUMBER_WIDTH = 9  # as in -1.23e-04: a narrow terminal may fold names and split the table, never a number
+NAME_WIDTH, GAP = 20, 3
+STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diverged": "bold red", "timed_out": "bold red"}
+
+
+def print_table(results: Results, console: Console | None = None) -> None:
+    """Print a run at its finest time step: every metric of every engine, and the spread between independent engines."""
+    out = console or Console()
+    at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
+    for name, scene in results.scenes.items():
+        out.print(Text(name, style="bold").append(f"  {scene.summary}" if scene.summary else "", style="not bold"))
+        for first in range(0, len(results.engines), at_once):
+            out.print(_scene_table(results, name, results.engines[first : first + at_once]))
+        _print_trends(results, name, out)
+        _print_ensemble(results, name, out)
+        _print_remarks(results, name, out)
+        out.print()
+    found = [one for one in failures(results) if not one.broke_down]
+    print_failures(found, len(found), out)
+    for sentence in finding_sentences(results):
+        out.print(Text(sentence))
+    out.print(Text(verdict_sentence(results), style="bold"))
+
+
+def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
+    frame = results.table[results.table["scene"] == name]
+    finest = frame[frame["dt"] == frame["dt"].min()]
+    own = finest[finest["kind"].isin(["truth", "invariant"])]
+    pairs = finest[(finest["kind"] == "agreement") & ~finest["reason"].str.startswith(NO_EVIDENCE)]
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
+    for engine in engines:
+        table.add_column(Text(engine, overflow="fold"), justify="right", width=NUMBER_WIDTH + 2)
+    if not pairs.empty:
+        table.add_column("spread", justify="right", width=NUMBER_WIDTH)
+    for metric in own["metric"].unique():
+        unit = METRICS[metric].unit
+        cells: list[Text] = [Text(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))]
+        for engine in engines:
+            row = own[(own["metric"] == metric) & (own["engine"] == engine)]
+            cells.append(_cell(float(row["value"].iloc[0]), str(row["verdict"].iloc[0])) if len(row) else Text("–"))
+        if not pairs.empty:
+            spread = float(pairs.loc[pairs["metric"] == metric, "value"].abs().max())
+            cells.append(Text("" if math.isnan(spread) else formatted(spread)))
+        table.add_row(*cells)
+    return table
+
+
+def _cell(value: float, verdict: str) -> Text:
+    return Text(f"{formatted(value)} {MARKS[verdict]}", style=STYLES.get(verdict, ""))
+
+
+def _print_trends(results: Results, name: str, out: Console) -> None:
+    """For each engine the observed orders, and the errors that do not vanish as dt → 0."""
+    frame = results.table[results.table["scene"] == name]
+    for engine in results.engines:
+        mine = frame[frame["engine"] == engine]
+        found = orders(results, name, engine)
+        trends = (
+            []
+            if found is None
+            else [f"order {found[0]:.2f}" if found[1] - found[0] < 0.005 else f"orders {found[0]:.2f} to {found[1]:.2f}"]
+        )
+        wrong = mine[(mine["kind"] == "asymptotic_error") & mine["cause"].isin(["model", "setting"])]
+        trends += [
+            f"{metric.replace('_', ' ')} {trend(math.nan, value, cause)}"
+            for metric, value, cause in zip(wrong["metric"], wrong["value"], wrong["cause"], strict=True)
+        ]
+        if trends:
+            out.print(Text(f"as dt → 0, {engine}: {', '.join(trends)}", style="dim"))
+
+
+def _print_ensemble(results: Results, name: str, out: Console) -> None:
+    """The means over the scene's starts at the finest time step, each with half its confidence interval."""
+    frame = results.table[(results.table["scene"] == name) & (results.table["kind"] == "ensemble")]
+    finest = frame[frame["dt"] == frame["dt"].min()]
+    for metric, rows in finest.groupby("metric", sort=False):
+        unit = "" if rows["unit"].iloc[0] == "1" else f" {rows['unit'].iloc[0]}"
+        means = [f"{row.engine} {row.value:.3g} ± {row.upper - row.value:.1g}{unit}" for row in rows.itertuples()]
+        spread = results.scenes[name].ensemble
+        assert spread is not None
+        out.print(Text(f"over {spread.size} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
+
+
+def _print_remarks(results: Results, name: str, out: Console) -> None:
+    frame = results.table[(results.table["scene"] == name) & (results.table["metric"] == "")]
+    for row in frame.drop_duplicates(["engine", "verdict", "reason"]).to_dict("records"):
+        out.print(Text(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))
+
+
+def print_failures(found: Sequence[Failure], at_most: int, console: Console | None = None) -> None:
+    """Print failures, one line each, with the command that reproduces them."""
+    out = console or Console()
+    for one in found[:at_most]:
+        out.print(Text(f"✗ {one.sentence.rstrip('.')}. Reproduce: {one.reproduce}", style="red"), soft_wrap=True)  # a command is one line
+    if len(found) > at_most:
+        out.print(Text(f"✗ and {len(found) - at_most} more", style="red"))

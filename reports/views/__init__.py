@@ -1,0 +1,1 @@
+"""Data to words and rows, one command a file; no HTML, no terminal codes."""

@@ -1,0 +1,50 @@
+"""`dropspin calibrate` in words: settings and what was measured with them."""
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+from comparisons.calibration import Calibration, Measured
+from scenarios import DropspinError
+
+Rows = list[dict[str, str]]
+
+
+def friction(text: str) -> str | float:
+    """A floor's friction as it is written on the command line.
+
+    Raises:
+        DropspinError: It is none.
+    """
+    if text in ("none", "infinite"):
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise DropspinError(f"friction: got {text!r}; it is none, infinite or a number.") from None
+
+
+def measured_rows(found: Calibration) -> Rows:
+    """What a calibrated engine was measured to do."""
+    return [{"measured": one.name, "value": _with_unit(one), "how": one.how} for one in found.measured]
+
+
+def _with_unit(one: Measured) -> str:
+    if math.isnan(one.value):
+        return "–"
+    return f"{one.value:.4g}" if one.unit == "1" else f"{one.value:.4g} {one.unit}"
+
+
+def setting_rows(found: Calibration) -> Rows:
+    """What to set."""
+    return [{"set": name, "to": str(value), "why": found.reasons.get(name, "")} for name, value in found.settings.items()]
+
+
+def as_data(found: Calibration) -> dict[str, Any]:
+    """All of a calibration, as JSON has it."""
+    return {
+        "engine": found.engine,
+        "measured": [asdict(one) | {"value": None if math.isnan(one.value) else one.value} for one in found.measured],
+        "settings": dict(found.settings),
+        "programs": dict(found.programs),
+    }

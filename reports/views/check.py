@@ -1,0 +1,156 @@
+"""`dropspin check` and `accept` in words: sentences, and annotations for GitHub."""
+
+import os
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import pandas as pd
+
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES
+from comparisons.regressions.baseline import Baseline
+from comparisons.regressions.checking import KNOWN_FAILURE, SCENE_CHANGED, Checked
+from comparisons.regressions.values import broke_down, comparable_results, regressed
+from comparisons.results.provenance import versions_behind
+from comparisons.results.results import Results
+from reports.views.failures import Failure
+from reports.views.findings import counts, verdict_sentence
+
+MOST_FAILURES = 12
+"""Failures printed one by one; JUnit and JSON have them all."""
+JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
+MOST_ANNOTATIONS = 10
+"""As many as GitHub shows for one step."""
+
+
+class BaselineFile(NamedTuple):
+    """A baseline, its file, and the folder of the run that is compared with it, for the commands."""
+
+    baseline: Baseline
+    path: str
+    run: str
+
+    @property
+    def accept_command(self) -> str:
+        """The command that accepts the run's results."""
+        return shlex.join(["dropspin", "accept", self.run, "--baseline", self.path, "--reason"]) + ' "…"'
+
+
+def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
+    """The outcome of a check, the verdict last."""
+    own = _without_baseline(checked.results)
+    known = int(own.table["reason"].str.startswith(KNOWN_FAILURE).sum())
+    verdict = "" if known and not own.table["verdict"].isin(JUDGED).any() else verdict_sentence(own)
+    if file is None:
+        return [verdict]
+    table = checked.results.table
+    failed_rows = table[(table["kind"] == "baseline") & (table["verdict"] == "failed")]
+    listed = [_of_engine(str(engine), some, checked.changes) for engine, some in failed_rows.groupby("engine", sort=False)]
+    if len(failed_rows):
+        listed += _changed_versions(checked, file.baseline)
+    if not (broke_down(failed_rows, checked.results) & (failed_rows["metric"] == "")).all():
+        listed.append(f"If this change is intended: {file.accept_command}")
+    listed += _notes(checked, file, known)
+    return [*listed, _verdict(checked, failed_rows, verdict)]
+
+
+def _notes(checked: Checked, file: BaselineFile, known: int) -> list[str]:
+    """What a check says besides its failures."""
+    better, new = (checked.changes[checked.changes["change"] == change] for change in ("better", "new"))
+    notes = []
+    if len(better):
+        notes.append(f"{_results(len(better))} better than accepted; to accept the improvement: {file.accept_command}")
+    if len(new):
+        notes.append(f"{_results(len(new))} new and not yet accepted: {file.accept_command}")
+    if len(checked.not_run):
+        pairs = len(checked.not_run.drop_duplicates(["scene", "engine"]))
+        notes.append(
+            f"{len(checked.not_run):,} accepted results are not covered by this run ({pairs} scene–engine {'pair' if pairs == 1 else 'pairs'})."
+        )
+    if known:
+        notes.append(f"{known:,} known {'failure' if known == 1 else 'failures'}, not counted as failed.")
+    return notes
+
+
+def _verdict(checked: Checked, failed_rows: pd.DataFrame, own: str) -> str:
+    """The last sentence: the run's own verdict and that of the accepted results."""
+    failed = len(regressed(checked.changes))
+    judged = int(checked.changes["change"].isin(["same", "better"]).sum()) + failed
+    changed = failed_rows.loc[failed_rows["reason"].str.startswith(SCENE_CHANGED), "scene"].nunique()
+    scenes = f"{changed} {'scene has' if changed == 1 else 'scenes have'} changed since results were accepted. " if changed else ""
+    if failed or changed:
+        return f"{scenes}{failed:,} of {judged:,} accepted results fail. {own}".rstrip()
+    return f"{own} All {judged:,} accepted results hold.".lstrip() if judged else own
+
+
+def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bool) -> list[str]:
+    """What was accepted of a run, and what was not."""
+    changed = found["change"].value_counts()
+    changes = ", ".join(f"{changed[one]:,} {one}" for one in ("new", "worse", "moved", "better", "gone", "same") if one in changed)
+    scenes = f"{len(results.scenes)} {'scene' if len(results.scenes) == 1 else 'scenes'}"
+    listed = [f"Accepted for {scenes} with {', '.join(results.engines)}: {changes or 'no results'}."]
+    tally = counts(results)
+    if tally.failed and not known_failures:
+        listed.append(
+            f"{tally.failed:,} checks of this run fail, and dropspin check will fail, whatever is accepted; "
+            "--known-failures accepts them as known."
+        )
+    unknown = tally.failed - int(comparable_results(results)["verdict"].isin(FAILURES).sum())
+    if unknown and known_failures:
+        listed.append(f"{unknown:,} failing {'check has' if unknown == 1 else 'checks have'} no comparable result and cannot be accepted.")
+    if tally.broken:
+        listed.append(f"{tally.broken:,} engine runs broke down; what was accepted of them before stays.")
+    return listed
+
+
+def annotations(found: Sequence[Failure]) -> list[str]:
+    """Commands by which GitHub shows failures beside a run, where the check runs there."""
+    if os.environ.get("GITHUB_ACTIONS") != "true":
+        return []
+    return [
+        f"::error title={_escaped(f'{one.scene} {one.engine}', ':,')}::{_escaped(f'{one.sentence}. Reproduce: {one.reproduce}')}"
+        for one in found[:MOST_ANNOTATIONS]
+    ]
+
+
+def _without_baseline(results: Results) -> Results:
+    return replace(results, table=results.table[results.table["kind"] != "baseline"])
+
+
+def _of_engine(engine: str, rows: pd.DataFrame, changes: pd.DataFrame) -> str:
+    """Where accepted results of an engine fail, and what moved most."""
+    scenes = rows["scene"].nunique()
+    total = len({*changes.loc[changes["engine"] == engine, "scene"], *rows["scene"]})
+    measured = rows[rows["value"].notna()]
+    largest = ""
+    if len(measured):
+        metric = measured["metric"].iloc[0]
+        where = measured.loc[measured["metric"] == metric, "scene"].unique()
+        largest = f"; the largest change is in {metric.replace('_', ' ')} ({', '.join(where[:3])}{', …' if len(where) > 3 else ''})"
+    return f"{engine}: accepted results fail in {scenes} of {total} scenes{largest}."
+
+
+def _changed_versions(checked: Checked, baseline: Baseline) -> list[str]:
+    """The versions that changed since the failing results were accepted."""
+    now = versions_behind(checked.results.provenance)
+    moved = checked.changes[checked.changes["change"].isin(["worse", "moved", "gone"])]
+    differ = [
+        f"{name} {then} → {now[name]}"
+        for by in moved["by"].dropna().unique()
+        for name, then in baseline.acceptances[by].versions.items()
+        if name in now and now[name] != then
+    ]
+    listed = ", ".join(dict.fromkeys(differ))
+    return [f"Changed since they were accepted: {listed}."] if differ else []
+
+
+def _results(count: int) -> str:
+    return f"{count:,} {'result is' if count == 1 else 'results are'}"
+
+
+def _escaped(text: str, more: str = "") -> str:
+    """Text as GitHub's commands require it; % first."""
+    for sign in f"%\r\n{more}":
+        text = text.replace(sign, f"%{ord(sign):02X}")
+    return text

@@ -1,0 +1,116 @@
+"""`dropspin compare` in words: what changed between two runs, tables and sentences, and data for programs."""
+
+import math
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import pandas as pd
+
+from comparisons.regressions.comparing import Changes
+from comparisons.regressions.speed import SpeedChange
+from reports.views.numbers import formatted, subject
+
+TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
+"""The heading of each kind of change, worst first."""
+MOST_LINES = 12
+"""Lines of a table; JSON has them all."""
+
+
+def listed(changes: Changes) -> list[str]:
+    """The changes: under a heading for each kind, a line for each metric of an engine in a scene."""
+    listed = []
+    for title, lines in tables(changes):
+        listed.append(title)
+        listed += [
+            f"  {line['scene']} · {line['engine']}: {line['result']} at {line['step']} from {line['before']} to {line['now']}"
+            f"{'' if line['ratio'] == '–' else ', ' + line['ratio'] + ' times'}"
+            f"{'' if line['tolerances'] == '–' else ', ' + line['tolerances'] + ' times its tolerance away'}"
+            for line in lines
+        ]
+    return listed
+
+
+def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
+    """A title and rows for each kind of change that there is."""
+    found = []
+    for change, word in TITLES.items():
+        results = changes.of(change)
+        if len(results):
+            lines = _lines(results)
+            more = f", the first {MOST_LINES} of {len(lines)} kinds" if len(lines) > MOST_LINES else ""
+            found.append((f"{word}: {_count(len(results))}{more}", lines[:MOST_LINES]))
+    return found
+
+
+def sentences(changes: Changes) -> list[str]:
+    """What the changes are attributed to, what was not compared, the speeds, and the verdict last."""
+    found = [
+        f"{engine}: {_counted(changes, engine)}. {one.message[0].upper()}{one.message[1:]}." for engine, one in changes.attributions.items()
+    ]
+    if changes.surroundings and not changes.attributions:
+        found.append(f"No result has changed, though these differ: {', '.join(changes.surroundings)}.")
+    if changes.other_scenes:
+        found.append(f"Not compared, as these scenes have changed: {', '.join(changes.other_scenes)}.")
+    if changes.in_one_only:
+        found.append(f"In one of the runs only: {', '.join(changes.in_one_only)}.")
+    found += [_speed(change) for change in changes.speed]
+    regressed = changes.regressions
+    total = _count(len(changes.results))
+    verdict = f"{len(regressed):,} of {total} are worse, moved or gone" if len(regressed) else f"None of {total} is worse"
+    return [*found, f"{verdict}."]
+
+
+def as_data(changes: Changes) -> dict[str, Any]:
+    """The comparison for JSON; undefined numbers are None."""
+    differing = changes.results[changes.results["change"] != "same"]
+    results = [{str(key): _plain(value) for key, value in row.items()} for row in differing.to_dict("records")]
+    return {
+        "results": results,
+        "compared": len(changes.results),
+        "attributed_to": {engine: {"origin": one.origin, "message": one.message} for engine, one in changes.attributions.items()},
+        "surroundings": changes.surroundings,
+        "other_scenes": changes.other_scenes,
+        "in_one_only": changes.in_one_only,
+        "speed": [{key: _plain(value) for key, value in change._asdict().items()} for change in changes.speed],
+    }
+
+
+def _lines(results: pd.DataFrame) -> list[dict[str, str]]:
+    """A line for each metric of an engine in a scene: its largest change."""
+    return [_line(group.iloc[0].to_dict(), len(group)) for _, group in results.groupby(["engine", "scene", "metric", "kind"], sort=False)]
+
+
+def _line(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
+    before, after = row["before"], row["value"]
+    ratio = abs(after / before) if abs(before) > row["tolerance"] else math.inf  # a ratio of rounding errors is meaningless
+    return {
+        "scene": row["scene"],
+        "engine": row["engine"],
+        "result": subject(row["metric"], row["kind"]),
+        "step": "→ 0" if "," in row["steps"] else f"{1e3 * float(row['steps']):g} ms" + (f" and {count - 1} more" if count > 1 else ""),
+        "before": formatted(before),
+        "now": formatted(after),
+        "ratio": f"{ratio:.3g}" if math.isfinite(ratio) else "–",
+        "tolerances": "–" if math.isnan(row["in_tolerances"]) else f"{row['in_tolerances']:.3g}",
+    }
+
+
+def _counted(changes: Changes, engine: str) -> str:
+    mine = changes.results.loc[changes.results["engine"] == engine, "change"]
+    return ", ".join(f"{int((mine == change).sum()):,} {change}" for change in TITLES if (mine == change).any())
+
+
+def _speed(change: SpeedChange) -> str:
+    between = f"{change.least:.2f} to {change.most:.2f}" if math.isfinite(change.most) else "unbounded with so few cases"
+    return (
+        f"Speed (reported, not gated): {change.engine} relative to {change.other} takes {change.ratio:.2f} times as long as before "
+        f"(median of {change.cases} cases, 95 % interval {between})."
+    )
+
+
+def _count(count: int) -> str:
+    return f"{count:,} result{'' if count == 1 else 's'}"
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,38 @@
+"""`dropspin doctor` in words: versions, processor, and whether each engine steps."""
+
+import sys
+from collections.abc import Sequence
+
+from comparisons.engines.base import EngineMissing
+from comparisons.engines.registry import engine
+from comparisons.results.provenance import processor, versions
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import EngineEntry, engine_entry, simulate
+from scenarios import DropspinError, load
+
+Rows = list[dict[str, str]]
+
+
+def rows(engines: Sequence[str]) -> Rows:
+    """Versions, processor, and whether each engine steps."""
+    found = [{"what": package, "found": version or "not installed"} for package, version in versions().items()]
+    found += [{"what": "python", "found": sys.version.split()[0]}, {"what": "processor", "found": processor()}]
+    with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
+        found += [{"what": f"engine {name}", "found": _health(name, processes)} for name in engines]
+    return found
+
+
+def _health(name: str, processes: EngineProcesses) -> str:
+    """Whether an engine steps, tried in a process of its own."""
+    try:
+        return processes.call(engine_entry(engine(name)), _fall)
+    except EngineMissing as error:
+        return f"missing: {error}"
+    except (DropspinError, Failed) as error:
+        return f"broken: {error}"
+
+
+def _fall(entry: EngineEntry) -> str:
+    assert entry.engine is not None
+    motion = simulate(load("fall-spin"), entry.engine, 4e-3)
+    return f"works: box at {motion.position[-1, 1]:.4f} m after {motion.t[-1]:g} s"

@@ -1,0 +1,155 @@
+"""The findings of a run, counted and in words; terminal, HTML and Markdown share them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from comparisons.engines.base import calibrated_label
+from comparisons.judging.convergence import STUDIES
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
+from comparisons.results.results import Results
+
+NEGLIGIBLE = 1e-4
+"""Errors below this (relative to the scene's scale, in m or in rad) are not mentioned."""
+
+# Worst first: the verdict that represents a scene and an engine in the matrix.
+SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "limited", "no_truth", "passed", "measured")
+assert set(SEVERITY) == set(VERDICTS)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many checks passed and failed, how many of them are on orders and asymptotic errors, and how many rows broke down."""
+
+    passed: int
+    failed: int
+    of_studies: int
+    broken: int
+
+
+def counts(results: Results) -> Counts:
+    """The verdicts of a run, counted."""
+    verdicts = results.table["verdict"]
+    passed, failed = verdicts == "passed", verdicts.isin(FAILURES)
+    of_studies = (passed | failed) & results.table["kind"].isin(STUDIES)
+    return Counts(int(passed.sum()), int(failed.sum()), int(of_studies.sum()), int(verdicts.isin(BREAKDOWNS).sum()))
+
+
+def verdicts(results: Results) -> dict[tuple[str, str], list[str]]:
+    """For each scene and engine its verdicts, the worst first."""
+    own = results.table.loc[results.table["kind"] != "agreement", ["scene", "engine", "verdict"]].drop_duplicates()
+    by_engine = own.groupby(["scene", "engine"])["verdict"]
+    return {(str(scene), str(engine)): sorted(mine, key=SEVERITY.index) for (scene, engine), mine in by_engine}
+
+
+def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
+    """For each engine the scenes in which an error with this cause does not vanish as dt → 0, negligible ones left out."""
+    rows = results.asymptotic_errors(cause)
+    worth = rows[rows["value"].abs() > NEGLIGIBLE]
+    return {
+        engine: [scene for scene in results.scenes if ((worth["engine"] == engine) & (worth["scene"] == scene)).any()]
+        for engine in results.engines
+    }
+
+
+@dataclass(frozen=True)
+class ProfileComparison:
+    """An engine with default settings compared with the same engine, calibrated.
+
+    Attributes:
+        engine: Label of the engine with default settings.
+        calibrated: Label of the calibrated one.
+        rows: Errors of both at the finest step; `part` is the share of the first that the calibrated engine does not have.
+    """
+
+    engine: str
+    calibrated: str
+    rows: list[dict[str, Any]]
+
+    @property
+    def sentence(self) -> str:
+        """The comparison in one sentence."""
+        parts = sorted(row["part"] for row in self.rows)
+        half = parts[len(parts) // 2]
+        return (
+            f"{self.engine}: {sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest step are mostly "
+            f"setting errors; the median share is {100 * half:.1f} %."
+        )
+
+
+def profile_comparisons(results: Results) -> list[ProfileComparison]:
+    """For each engine that was run with default settings and calibrated: how much of the errors is due to settings."""
+    frame = results.measurements
+    truths = frame[(frame["kind"] == "truth") & frame["value"].notna()]
+    found = []
+    for engine in results.engines:
+        twin = calibrated_label(engine)
+        if twin not in results.engines:
+            continue
+        finest = truths[truths["dt"] == truths["dt"].min()].set_index(["scene", "metric"])
+        mine, other = (finest[finest["engine"] == label] for label in (engine, twin))
+        both = mine.join(other["value"].rename("calibrated"), how="inner")
+        worth = both[both["value"].abs() > NEGLIGIBLE].reset_index()
+        rows = [
+            {
+                "scene": row["scene"],
+                "metric": row["metric"],
+                "unit": row["unit"],
+                "default": row["value"],
+                "calibrated": row["calibrated"],
+                "part": max(0.0, 1.0 - abs(row["calibrated"]) / abs(row["value"])),
+            }
+            for row in worth.to_dict("records")
+        ]
+        if rows:
+            found.append(ProfileComparison(engine, twin, rows))
+    return found
+
+
+def orders(results: Results, scene: str, engine: str) -> tuple[float, float] | None:
+    """The smallest and the largest observed order of an engine's errors in a scene; None if there is none."""
+    frame = results.table
+    mine = frame[(frame["kind"] == "order") & (frame["scene"] == scene) & (frame["engine"] == engine)]
+    found = mine.loc[mine["cause"] == "discretisation", "value"].dropna()
+    return (float(found.min()), float(found.max())) if len(found) else None
+
+
+def verdict_sentence(results: Results) -> str:
+    """The outcome of the checks in one sentence."""
+    tally = counts(results)
+    judged = tally.passed + tally.failed
+    if tally.broken:
+        judgement = f"; {tally.failed} of {judged} checks fail" if judged else ""
+        return f"{tally.broken} engine {'run' if tally.broken == 1 else 'runs'} broke down{judgement}."
+    if tally.failed:
+        return f"{tally.failed} of {judged} checks fail."
+    if judged == 0:
+        set_at_all = any(scene.expect for scene in results.scenes.values())
+        none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
+        return f"{none}; {len(results.measurements):,} values were measured."
+    kinds = [f"{judged - tally.of_studies} expectations of the scenes", f"{tally.of_studies} orders and asymptotic errors"]
+    both = " and ".join(kind for kind in kinds if not kind.startswith("0 "))
+    return f"All {judged} checks pass: {both}."
+
+
+def finding_sentences(results: Results) -> list[str]:
+    """The main finding about each engine."""
+    missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine")
+    sentences = [f"{row.reason}" for row in missing.itertuples()]
+    models, settings = asymptotic_errors(results, "model"), asymptotic_errors(results, "setting")
+    limits = results.table[results.table["kind"] == "asymptotic_error"]
+    studied = limits.groupby("engine")["scene"].nunique()
+    for engine in results.engines:
+        stuck, total = models[engine], int(studied.get(engine, 0))
+        if stuck:
+            sentences.append(
+                f"{engine}: model error in {len(stuck)} of {total} scenes ({', '.join(stuck)}): an error that does not vanish as dt → 0."
+            )
+        if settings[engine]:
+            sentences.append(
+                f"{engine}: setting error in {len(settings[engine])} of {total} scenes ({', '.join(settings[engine])}): "
+                "an error that does not vanish as dt → 0, but that the calibrated profile does not have."
+            )
+        if total and not stuck and not settings[engine]:
+            where = f" in all {total} scenes" if total > 1 else ""
+            sentences.append(f"{engine}: errors above {NEGLIGIBLE:g} vanish as dt → 0{where}.")
+    return sentences + [comparison.sentence for comparison in profile_comparisons(results)]

@@ -1,0 +1,72 @@
+"""How numbers, bounds and verdicts are formatted, everywhere."""
+
+import math
+
+from comparisons.regressions.checking import ACCEPTED
+
+ACCEPTED_KINDS = {text: kind for kind, text in ACCEPTED.items()}
+MARKS = {
+    "passed": "✓",
+    "failed": "✗",
+    "measured": "·",
+    "limited": "!",
+    "diverged": "∞",
+    "crashed": "✗",
+    "timed_out": "⏱",
+    "declined": "–",
+    "missing": "?",
+    "no_truth": "·",
+}
+WORDS = {"timed_out": "timed out", "no_truth": "no exact solution"}
+
+
+def formatted(value: float) -> str:
+    """Three significant digits; an exact zero is 0, an undefined value is –."""
+    if math.isnan(value):
+        return "–"
+    return "0" if value == 0.0 else f"{value:.2e}"
+
+
+def bound(lower: float, upper: float) -> str:
+    """Bounds as an inequality; empty if there are none."""
+    if math.isnan(lower) and math.isnan(upper):
+        return ""
+    if math.isnan(lower):
+        return f"≤ {upper:.3g}"
+    if math.isnan(upper):
+        return f"≥ {lower:.3g}"
+    return f"± {upper:.3g}" if lower == -upper else f"{lower:.3g} … {upper:.3g}"
+
+
+def word(verdict: str) -> str:
+    """A verdict in words."""
+    return WORDS.get(verdict, verdict)
+
+
+def step(dt: float) -> str:
+    """A time step in seconds; → 0 for what several steps give together."""
+    return "→ 0" if math.isnan(dt) else f"{dt:g}"
+
+
+def in_ms(dt: float) -> str:
+    """A time step in milliseconds; → 0 for what several steps give together."""
+    return "→ 0" if math.isnan(dt) else f"{1e3 * dt:g} ms"
+
+
+def unit(of: str) -> str:
+    """A unit in brackets, to follow a name; empty for a ratio."""
+    return "" if of == "1" else f" [{of}]"
+
+
+def subject(metric: str, kind: str, truth: str = "") -> str:
+    """The subject of a row in words; for one of kind `baseline` its column `truth` says what was accepted."""
+    words = metric.replace("_", " ")
+    prefixed = {"order": f"order of {words}", "asymptotic_error": f"asymptotic {words}", "ensemble": f"mean {words}"}
+    return prefixed.get(ACCEPTED_KINDS.get(truth, kind), words)
+
+
+def trend(order: float, asymptotic_error: float, cause: str) -> str:
+    """What an error tends to as dt → 0."""
+    if cause == "discretisation":
+        return "→ 0" if math.isnan(order) else f"order {order:.2f}"
+    return {"model": f"→ {formatted(asymptotic_error)}", "setting": f"→ {formatted(asymptotic_error)}, a setting"}.get(cause, cause)

@@ -1,0 +1,217 @@
+"""Metrics on motions made up for the purpose: nothing for the truth itself, and exactly what was planted otherwise."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenarios
+from comparisons.measuring.comparison import Comparison, Unresolved
+from comparisons.measuring.metrics import METRICS
+from comparisons.running.run import measure
+from scenarios import Trajectory, truth_for
+from scenarios.rotations import about, multiply
+
+sys.path.insert(0, str(Path(__file__).parent))
+from engines_for_tests import QUICK
+
+DT = 1e-3
+FIELDS = ("position", "orientation", "velocity", "angular_velocity")
+
+
+def exact_motion(name, dt=DT, **changes):
+    scene = scenarios.load(name)
+    truth, t = truth_for(scene), dt * np.arange(scene.steps(dt) + 1)
+    motion = truth(t[truth.covers(t)])
+    return scene, Trajectory(**{field: changes.get(field, getattr(motion, field)) for field in motion.__dataclass_fields__})
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_truth_has_no_error(name):
+    """Every metric of the truth itself is 0, to 1e-12 of its scale; those of an impact to the speed that one step adds."""
+    scene, motion = exact_motion(name)
+    for metric, value in measure(scene, motion).items():
+        # Sampled rows are up to a step away from the impact: g dt / u.
+        near_impact = metric in ("restitution_error", "contact_momentum_error")
+        allowed = 2.5 * 9.8 * DT / 4 if near_impact else 1e-12
+        assert abs(value) <= allowed, (metric, value)
+
+
+def test_every_metric_is_used_by_the_catalogue():
+    """A metric that no scene has is not tested by the line above."""
+    used = set()
+    for name in QUICK:
+        used |= set(measure(*exact_motion(name)))
+    assert used == set(METRICS)
+
+
+@pytest.mark.parametrize("planted", [1e-12, 1e-6, 0.1])
+def test_planted_attitude(planted):
+    """A constant error of attitude is measured as itself, whatever the sign of the quaternion."""
+    scene, motion = exact_motion("spin-asymmetric")
+    turned = multiply(about(np.array([0.0, 0.6, 0.8]), np.array(planted))[None], motion.orientation)
+    for sign in (1, -1):
+        found = measure(scene, exact_motion("spin-asymmetric", orientation=sign * turned)[1])
+        assert found["orientation_error"] == pytest.approx(planted, rel=1e-3, abs=2e-15)
+
+
+def test_planted_position_energy_and_momentum():
+    """1e-9 m aside; 1e-6 more spin makes 1e-6 more L and 2e-6 more energy, with its sign."""
+    scene, motion = exact_motion("spin-asymmetric")
+    aside = exact_motion("spin-asymmetric", position=motion.position + np.array([0, 0, 1e-9]))[1]
+    assert measure(scene, aside)["position_error"] == pytest.approx(1e-9, rel=1e-6)
+    for sign in (1, -1):
+        faster = exact_motion("spin-asymmetric", angular_velocity=motion.angular_velocity * (1 + sign * 1e-6))[1]
+        found = measure(scene, faster)
+        assert found["angular_momentum_error"] == pytest.approx(1e-6, rel=1e-5)
+        assert found["angular_momentum_direction_error"] <= 1e-12
+        assert found["energy_error"] == pytest.approx(sign * 2e-6, rel=1e-5)
+
+
+def test_planted_direction_of_momentum():
+    """ω turned by 1e-7 about an axis square to L turns L by as much, for a ball."""
+    scene = scenarios.load(
+        {
+            "duration": 1.0,
+            "body": {"shape": "sphere", "radius": 1.0, "mass": 1.0},
+            "start": {"angular_velocity": [0.0, 3.0, 0.0]},
+        }
+    )
+    motion = truth_for(scene)(DT * np.arange(1001))
+    w = motion.angular_velocity @ np.array([[1, 0, 0], [1e-7, 1, 0], [0, 0, 1]])
+    turned = Trajectory(motion.t, motion.position, motion.orientation, motion.velocity, w)
+    assert measure(scene, turned)["angular_momentum_direction_error"] == pytest.approx(1e-7, rel=1e-6)
+
+
+def test_planted_restitution():
+    """A ball that bounces as with e = 0.51: bounce height e'² - e², restitution error 0.01, both positive."""
+    scene = scenarios.load("drop-ball")
+    lively = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": 0.51})})
+    motion = truth_for(lively)(DT * np.arange(scene.steps(DT) + 1))
+    found = measure(scene, motion)
+    assert found["bounce_height_error"] == pytest.approx(0.51**2 - 0.25, rel=1e-9)
+    assert found["restitution_error"] == pytest.approx(0.01, abs=2.5e-3)
+    assert found["energy_error"] == pytest.approx(0.51**2 - 0.25, rel=1e-9)
+
+
+def test_a_body_that_does_not_bounce_fails_where_the_truth_bounces():
+    """No flight of its own is needed to be found wanting."""
+    scene = scenarios.load("drop-ball")
+    dead = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": 0.0})})
+    found = measure(scene, truth_for(dead)(DT * np.arange(1501)))
+    assert found["bounce_height_error"] == pytest.approx(-0.25, rel=1e-9)
+    assert found["energy_error"] == pytest.approx(-0.25, rel=1e-9)
+    assert found["restitution_error"] == pytest.approx(-0.5, abs=2.5e-3)
+
+
+def test_a_body_that_falls_through_fails():
+    """No impact at all: restitution is not a number, depth is what it is, and the energy looks fine before the impact only."""
+    scene, _ = exact_motion("drop-ball")
+    t = DT * np.arange(1501)
+    free = scene.model_copy(update={"floor": None})
+    found = measure(scene, truth_for(free)(t))
+    assert np.isnan(found["restitution_error"])
+    assert found["penetration"] == pytest.approx(9.8 * 1.5**2 / 2 - 1.0, rel=1e-9)
+    assert found["energy_error"] == pytest.approx(0.75, rel=1e-9)  # after the first bounce; later it is out of step
+
+
+def test_staggered_velocity():
+    """Semi-implicit Euler's free fall: synchronised energy to 1e-13, raw energy off by -M g² h t/2 over M g H."""
+    scene = scenarios.load("drop-ball").model_copy(update={"floor": None, "duration": 0.4})
+    h, n = 1e-3, np.arange(401)
+    states = np.zeros((401, 13))
+    states[:, 1] = 1.1 - 9.8 * h**2 * n * (n + 1) / 2
+    states[:, 6] = 1.0
+    states[:, 8] = -9.8 * h * n
+    found = measure(scene, Trajectory.from_states(h * n, states, velocity_lag=h / 2))
+    scale = 0.5 * (9.8 * 0.4) ** 2
+    assert abs(found["energy_error"]) <= 1e-13
+    assert found["energy_error_raw"] == pytest.approx(-(9.8**2) * h * 0.4 / 2 / scale, rel=1e-9)
+
+
+def test_energy_gain_is_the_largest_rise():
+    """Down by 20 %, then up by 5 %, then down: the gain is 5 %, the drift is the end's."""
+    scene, motion = exact_motion("spin-principal")
+    factor = np.interp(motion.t, [0, 3, 6, 10], [1.0, 0.8, 0.85, 0.7])
+    found = measure(scene, exact_motion("spin-principal", angular_velocity=motion.angular_velocity * np.sqrt(factor)[:, None])[1])
+    assert found["energy_gain"] == pytest.approx(0.05, rel=1e-6)
+    assert found["energy_drift"] == pytest.approx(-0.3, rel=1e-9)
+
+
+def test_sideways_push_on_a_smooth_floor():
+    """1e-10 of horizontal momentum is seen."""
+    scene, motion = exact_motion("drop-ball")
+    pushed = motion.velocity + np.outer(motion.t > 0.45, [1e-10, 0, 0])
+    found = measure(scene, exact_motion("drop-ball", velocity=pushed)[1])
+    assert found["horizontal_momentum_error"] == pytest.approx(1e-10 / np.sqrt(2 * 9.8), rel=1e-9)
+
+
+def test_one_nan_is_seen():
+    """Wherever it is."""
+    _, motion = exact_motion("drop-ball")
+    assert motion.first_bad_row is None
+    position = motion.position.copy()
+    position[700, 2] = np.nan
+    assert exact_motion("drop-ball", position=position)[1].first_bad_row == 700
+
+
+def test_too_coarse_a_step_is_said_to_be():
+    """Two rows of flight say nothing about an apex."""
+    scene, motion = exact_motion("drop-ball", dt=0.1)
+    case = Comparison.with_truth(scene, motion, truth_for(scene))
+    with pytest.raises(Unresolved, match=r"too short for steps of 0\.1 s"):
+        METRICS["bounce_height_error"].average([case])
+
+
+def test_planted_landing():
+    """A box that keeps 1 % more of its angular speed at each landing is found to, to the last digits."""
+    scene, motion = exact_motion("rock-block")
+    landing = truth_for(scene).events[0].time
+    spin = motion.angular_velocity.copy()
+    spin[motion.t > landing] *= 1.01
+    _, planted = exact_motion("rock-block", angular_velocity=spin)
+    before, after = np.searchsorted(motion.t, landing) + np.array([-3, 3])
+    assert measure(scene, planted)["landing_error"] == pytest.approx(0.01 * spin[after, 2] / 1.01 / spin[before, 2], rel=1e-9)
+
+
+def test_planted_moment_about_the_contact():
+    """An impact that adds ΔL about the point of contact: found as ΔL over M |r| |v|, whatever the direction."""
+    scene, motion = exact_motion("drop-ball")
+    landing = truth_for(scene).events[0]
+    for push in ([1e-6, 0.0, 0.0], [0.0, -1e-6, 0.0], [0.0, 0.6e-6, 0.8e-6]):
+        spin = motion.angular_velocity + np.where(motion.t[:, None] > landing.time, push, 0.0)
+        _, planted = exact_motion("drop-ball", angular_velocity=spin)
+        expected = 0.4 * 0.1**2 * 1e-6 / (0.1 * 9.8 * DT * int(landing.time / DT))  # I ω over R and the last speed before
+        assert measure(scene, planted)["contact_momentum_error"] == pytest.approx(expected, rel=1e-9)
+    # A force at the contact itself, in any direction, is none.
+    sideways = np.where(motion.t[:, None] > landing.time, [0.3, 0.0, 0.4], 0.0)
+    spin = np.cross([0.0, -0.1, 0.0], sideways) / (0.4 * 0.1**2)
+    _, planted = exact_motion("drop-ball", velocity=motion.velocity + sideways, angular_velocity=motion.angular_velocity + spin)
+    assert measure(scene, planted)["contact_momentum_error"] == pytest.approx(0.0, abs=1e-14)
+
+
+def test_planted_unrest():
+    """A body that comes to rest and is kicked again for a while: the time of its last motion and the rms of its last tenth."""
+    scene, motion = exact_motion("drop-ball-dull")
+    assert scene.duration == pytest.approx(motion.t[-1])
+    kicked = motion.velocity.copy()
+    late = motion.t >= 0.95 * scene.duration
+    kicked[late, 1] = 0.3
+    found = measure(*exact_motion("drop-ball-dull", velocity=kicked))
+    last_tenth = motion.t >= 0.9 * scene.duration
+    assert found["rest_jitter"] == pytest.approx(0.3 * np.sqrt(late.sum() / last_tenth.sum()), rel=1e-12)
+    still = np.flatnonzero(0.5 * motion.velocity[:, 1] ** 2 > max(2 * (9.8 * DT) ** 2, 1e-6 * 9.8 * 0.1))[-1] * DT
+    assert found["rest_time_error"] == pytest.approx((scene.duration - still) / still, rel=1e-9)
+
+
+def test_flights_end_where_the_body_is_desynchronised():
+    """After the second flight; a body whose every flight is 4 % longer is held against the truth's own flights only while it can be."""
+    scene, motion = exact_motion("drop-ball-lively")
+    late = truth_for(scene)(motion.t / 1.04)
+    slow = Comparison.with_truth(scene, Trajectory(motion.t, *(getattr(late, f) for f in FIELDS)), truth_for(scene))
+    sound = Comparison.with_truth(scene, motion, truth_for(scene))
+    assert len(sound.flights) == 7
+    assert 2 <= len(slow.flights) < 6
+    frozen = Trajectory.from_states(motion.t, np.tile(scene.initial_state, (len(motion), 1)))
+    assert len(Comparison.with_truth(scene, frozen, truth_for(scene)).flights) == 2

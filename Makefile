@@ -18,7 +18,7 @@ test-slow: $(VENV)/.installed-dev     ## the studies that take minutes
 	$(BIN)/python -m pytest -m slow
 
 faults: $(VENV)/.installed-dev        ## engines with one planted fault each against the core catalogue: docs/faults.md
-	$(BIN)/python tests/fault_suite.py
+	$(BIN)/python tests/support/fault_suite.py
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py

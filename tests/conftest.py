@@ -1,9 +1,48 @@
-"""Settings that all tests share."""
+"""Settings and fixtures that all tests share."""
 
 import os
+from collections.abc import Callable
+from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # Numerical properties are cheap but not uniform in time; a deadline would test the machine.
 settings.register_profile("default", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
+
+
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], None]], Path]:
+    """Call it with a name and a function that fills a folder: the folder is filled once a session, for all workers of pytest-xdist."""
+    from filelock import FileLock
+
+    base = tmp_path_factory.getbasetemp()
+    root = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"
+    root.mkdir(exist_ok=True)
+
+    def folder(name: str, make: Callable[[Path], None]) -> Path:
+        path, done = root / name, root / f"{name}.done"
+        with FileLock(root / f"{name}.lock"):
+            if not done.exists():
+                path.mkdir(exist_ok=True)
+                make(path)
+                done.touch()
+        return path
+
+    return folder
+
+
+@pytest.fixture(scope="session")
+def core_run(shared) -> Path:
+    """The folder of a run of the quick catalogue with the three engines at the default time steps, data only; `load_results` reads it."""
+
+    def make(folder: Path) -> None:
+        from support.engines import QUICK
+
+        from comparisons.results.store import save
+        from comparisons.running.run import run
+
+        save(run(QUICK, ["document", "mujoco", "pybullet"]), folder)
+
+    return shared("core-run", make)

@@ -1,12 +1,7 @@
 """The subtlest of the planted faults are caught, and a sound engine is left alone; `make faults` runs all of them."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-import fault_suite
+from support import fault_suite
 
 NUMBERS = {engine.title: number for number, engine in enumerate([*fault_suite.FAULTS, *fault_suite.SOUND])}
 

@@ -1,16 +1,11 @@
 """The compiled kernels against a plain transcription of the note."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.transcription import update
 
 import reference_impl
 from reference_impl import Body, Floor, World
-
-sys.path.insert(0, str(Path(__file__).parent))
-from transcription import update
 
 GRAVITY = np.array([0.0, -9.8, 0.0])
 STEPS = 50

@@ -1,20 +1,15 @@
 """Damped flight against 40 digits by other ways: mpmath's own formula for the path, Taylor series of Euler's equations for the turning."""
 
-import sys
-from pathlib import Path
-
 import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
+from support.taylor import free_rotor as taylor_rotor
 
 from scenarios import load, truth_for
 from scenarios.rotations import angle_between_orientations, unrotate
-
-sys.path.insert(0, str(Path(__file__).parent))
-from taylor import free_rotor as taylor_rotor
 
 TIMES = [0.0, 1e-3, 0.5, 2.0, 10.0]
 

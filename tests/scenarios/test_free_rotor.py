@@ -1,20 +1,15 @@
 """The free rotor's closed form against Taylor series with 40 digits, against invariants, and against simpler truths."""
 
-import sys
-from pathlib import Path
-
 import mpmath
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from support import taylor
 
 from scenarios.rotations import angle_between_orientations, multiply, rotate, unrotate
 from scenarios.truths.free_rotor import AsymmetricTop, free_rotor, principal_spin
-
-sys.path.insert(0, str(Path(__file__).parent))
-import taylor
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 TILTED = np.array([0.5, 0.5, 0.5, 0.5])  # a unit quaternion that doubles hold exactly, and that only permutes axes

@@ -1,8 +1,5 @@
 """One impulse at one point, by every law, against 40 digits: momentum balances and what the law says, as one system of linear equations."""
 
-import sys
-from pathlib import Path
-
 import mpmath
 import numpy as np
 import pytest
@@ -10,14 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mpmath import mp, mpf
+from support.taylor import free_rotor as taylor_rotor
 
 from scenarios import load, truth_for
 from scenarios.model import Floor
 from scenarios.truths import LAWS
 from scenarios.truths.impact_laws import law_of, velocities_after
-
-sys.path.insert(0, str(Path(__file__).parent))
-from taylor import free_rotor as taylor_rotor
 
 vectors = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
 INERTIA, MASS = np.diag([0.3, 0.5, 0.6]), 1.3

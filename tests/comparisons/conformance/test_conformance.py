@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import engines as made
 
 import comparisons
 from comparisons.conformance import conform
@@ -13,9 +14,6 @@ from comparisons.engines.pybullet_engine import PyBullet
 from comparisons.engines.registry import engine
 from scenarios import load
 from scenarios.errors import UnknownName
-
-sys.path.insert(0, str(Path(__file__).parent))
-import engines_for_tests as made
 
 PAGE = Path(__file__).parents[2] / "docs" / "bring-your-engine.md"
 ADAPTER = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]

@@ -2,21 +2,17 @@
 
 import math
 import re
-import sys
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.engines import QUICK
 
 import scenarios
 from comparisons.engines.registry import engine, engine_names
 from comparisons.running.recording import simulate
 from comparisons.running.verification import verify_build
 from scenarios import DropspinError, UnknownName
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engines_for_tests import QUICK
 
 ENGINES = [
     "document", "mujoco", "mujoco[integrator=rk4]", "mujoco[integrator=implicitfast]", "mujoco[profile=default]",

@@ -1,17 +1,13 @@
 """Causes, orders and limits of engines whose faults are known."""
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support import engines as made
 
 import comparisons
 import scenarios
-
-sys.path.insert(0, str(Path(__file__).parent))
-import engines_for_tests as made
 
 STEPS = [8e-3, 4e-3, 2e-3]
 

@@ -1,10 +1,8 @@
 """Metrics on motions made up for the purpose: nothing for the truth itself, and exactly what was planted otherwise."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.engines import QUICK
 
 import scenarios
 from comparisons.measuring.comparison import Comparison, Unresolved
@@ -12,9 +10,6 @@ from comparisons.measuring.metrics import METRICS
 from comparisons.running.run import measure
 from scenarios import Trajectory, truth_for
 from scenarios.rotations import about, multiply
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engines_for_tests import QUICK
 
 DT = 1e-3
 FIELDS = ("position", "orientation", "velocity", "angular_velocity")

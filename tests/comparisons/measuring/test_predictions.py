@@ -1,18 +1,13 @@
 """Predicted errors against measured ones: in flight to six digits, in a flat bounce as finely as 32 start phases tell."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from support.engines import QUICK
 
 import comparisons
 import scenarios
 from scenarios import discrete_flight, load
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engines_for_tests import QUICK
 
 ENGINES = ["document", "document[rotation=exact]", "mujoco", "pybullet"]
 FREE = [name for name in QUICK if load(name).floor is None]

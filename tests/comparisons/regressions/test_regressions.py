@@ -8,13 +8,13 @@ import sys
 import tomllib
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import engines as made
 
 import comparisons
 import scenarios
@@ -30,9 +30,6 @@ from comparisons.regressions.history import history
 from comparisons.regressions.speed import speed_changes
 from comparisons.regressions.values import KEY, changes, figures
 from scenarios import DropspinError
-
-sys.path.insert(0, str(Path(__file__).parent))
-import engines_for_tests as made
 
 TODAY = datetime.date(2026, 3, 1)
 SCENES = [scenarios.load(name) for name in ("drop-ball", "drop-ball-backspin", "drop-box-corner", "fall-spin", "spin-asymmetric")]

@@ -2,13 +2,12 @@
 
 import math
 import os
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.engines import Exact, ExactSimulation, FrozenSimulation
 
 from comparisons.engines.registry import engine
 from comparisons.robustness import AXES, AxisScan, RobustnessStudy, limits, surprises
@@ -19,9 +18,6 @@ from comparisons.robustness.scan import Point
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import engine_entry
 from scenarios import DropspinError, Trajectory, load, truth_for
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engines_for_tests import Exact, ExactSimulation, FrozenSimulation
 
 DT = 5e-3
 SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")

@@ -1,11 +1,9 @@
 """Ensembles through engines: the same starts for all, means with honest intervals, and a bad member that costs its row."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy import stats
+from support import engines as made
 
 import comparisons
 from comparisons.engines.base import Engine
@@ -13,9 +11,6 @@ from comparisons.engines.registry import engine
 from comparisons.results.store import restore, save
 from comparisons.running.ensembles import ENSEMBLE_METRICS, Outcome, difference_rows, ensemble_rows, outcome_of
 from scenarios import load, members
-
-sys.path.insert(0, str(Path(__file__).parent))
-import engines_for_tests as made
 
 SCENE = load("drop-box-anyhow")
 FEW = SCENE.model_copy(update={"ensemble": SCENE.ensemble.model_copy(update={"size": 5}), "expect": (), "duration": 0.6})

@@ -11,13 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import engines as made
 
 import comparisons
 from comparisons.running.processes import ResourceLimits
 from scenarios import load
-
-sys.path.insert(0, str(Path(__file__).parent))
-import engines_for_tests as made
 
 BALL = load("drop-ball")
 SPIN = load("fall-spin")

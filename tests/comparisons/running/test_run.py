@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import engines as made
 
 import comparisons
 import scenarios
 from comparisons.results.results import COLUMNS, KEY
 from scenarios import DropspinError, SceneError
-
-sys.path.insert(0, str(Path(__file__).parent))
-import engines_for_tests as made
 
 BALL = scenarios.load("drop-ball")
 

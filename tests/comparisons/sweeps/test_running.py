@@ -15,15 +15,13 @@ import fsspec
 import numpy as np
 import pandas as pd
 import pytest
+from support import engines as made
 
 from comparisons.engines.base import Diverged
 from comparisons.running.processes import Closed, Failed, ResourceLimits
 from comparisons.sweeps import load_sweep, read, run_sweep
 from comparisons.sweeps.work import Work
 from scenarios import DropspinError
-
-sys.path.insert(0, str(Path(__file__).parent))
-import engines_for_tests as made
 
 DROPSPIN = Path(sys.executable).with_name("dropspin")
 SPEC = {

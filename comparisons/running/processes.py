@@ -113,7 +113,7 @@ class EngineProcesses:
                     raise Failed("crashed", "its process ended by itself, as if all were well")
             result: Result = task.result()
         except OutOfTime:
-            raise Failed("timed_out", f"not done after {BACKSTOP * self._limits.processor_time:g} s by the clock") from None
+            raise Failed("timed_out", f"not done after {BACKSTOP * self._limits.processor_time:g} s of wall time") from None
         except ProcessExpired as end:
             raise Failed(*self._verdict(end.exitcode)) from None
         return result

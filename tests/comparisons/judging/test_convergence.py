@@ -1,4 +1,4 @@
-"""Causes, orders and limits of engines whose faults are known."""
+"""Causes, orders and asymptotic errors of engines whose faults are known."""
 
 import math
 
@@ -6,20 +6,18 @@ import numpy as np
 import pytest
 from support import engines as made
 
-import comparisons
-import scenarios
+import dropspin as ds
 
 STEPS = [8e-3, 4e-3, 2e-3]
 
 
 def study(results, metric, kind):
-    frame = results.table
-    rows = frame[(frame["metric"] == metric) & (frame["kind"] == kind)]
+    rows = results.table[(results.table["metric"] == metric) & (results.table["kind"] == kind)]
     return rows.iloc[0] if len(rows) else None
 
 
 def run(scene, engine, dts=STEPS):
-    return comparisons.run([scenarios.load(scene)], [engine], dts)
+    return ds.run(scene, engine, dts)
 
 
 @pytest.mark.parametrize(
@@ -37,8 +35,8 @@ def run(scene, engine, dts=STEPS):
         ("document[rotation=exact]", "rounding", None),
     ],
 )
-def test_attitude_of_the_asymmetric_brick(engine, cause, order):
-    """The cause that each method's theory gives, and its order within .1 (measured within .03)."""
+def test_cause_and_order_of_the_attitude_error_are_those_of_the_method(engine, cause, order):
+    """An asymmetric brick in free flight: the cause that theory gives for each method, and its order within .1 (measured within .03)."""
     found = run("spin-asymmetric", engine, [6.4e-2, 3.2e-2, 1.6e-2] if order == 4 else [8e-3, 4e-3, 2e-3])
     limit, observed = study(found, "orientation_error", "asymptotic_error"), study(found, "orientation_error", "order")
     assert limit["cause"] == cause
@@ -50,18 +48,18 @@ def test_attitude_of_the_asymmetric_brick(engine, cause, order):
         assert abs(limit["value"]) <= limit["upper"]
 
 
-def test_lively_ball_converges_at_first_order_after_averaging_phases():
+def test_bounce_converges_at_first_order_after_averaging_start_phases():
     """With e = .9 all three engines: apex and restitution, at order 1 or at rounding."""
-    found = comparisons.run([scenarios.load("drop-ball-lively")], ["document", "mujoco", "pybullet"])
+    found = ds.run("drop-ball-lively", ["document", "mujoco", "pybullet"])
     orders = found.table[(found.table["kind"] == "order") & found.table["metric"].isin(["bounce_height_error", "restitution_error"])]
     assert len(orders) == 5  # PyBullet's restitution is exact
     np.testing.assert_allclose(orders["value"], 1.0, atol=0.02)
-    assert found.lasting_errors("model").empty
+    assert found.asymptotic_errors("model").empty
 
 
 @pytest.mark.parametrize("more", [1.01, 1.003, 0.997])
-def test_restitution_that_is_a_little_wrong_is_a_model_error(more):
-    """1 % and .3 % of restitution, in an engine of first order; no bound of the scene is needed."""
+def test_small_restitution_fault_is_a_model_error(more):
+    """1 % and .3 % of restitution in a first-order engine are found without any bound of the scene."""
 
     class TooLively(made.Exact):
         name = "too-lively"
@@ -73,14 +71,14 @@ def test_restitution_that_is_a_little_wrong_is_a_model_error(more):
             floor = scene.floor.model_copy(update={"restitution": restitution})
             return made.ExactSimulation(scene.model_copy(update={"floor": floor}), dt)
 
-    found = run("drop-ball", TooLively(), comparisons.DEFAULT_DTS)
+    found = run("drop-ball", TooLively(), ds.DEFAULT_DTS)
     limit = study(found, "restitution_error", "asymptotic_error")
     assert (limit["cause"], limit["verdict"]) == ("model", "failed")
     assert abs(limit["value"] - (more - 1) * 0.5) <= limit["upper"]
     assert limit["upper"] < 7e-4  # measured 6.2e-4: the samples next to the impact are off by a part of a step
 
 
-def test_restitution_that_vanishes_with_the_step_is_a_model_error():
+def test_restitution_that_vanishes_with_dt_is_a_model_error():
     """An engine that loses its bounce as the step shrinks."""
 
     class Vanishing(made.Exact):
@@ -95,7 +93,7 @@ def test_restitution_that_vanishes_with_the_step_is_a_model_error():
 
 
 class WithError(made.Exact):
-    """Exact but for an attitude that is off by so much at each step."""
+    """Exact except for an attitude error that depends on the time step."""
 
     name = "with-error"
     error = staticmethod(lambda dt: 0.0)
@@ -119,25 +117,25 @@ def with_error(order, error):
         (None, lambda dt: dt, "measured"),
     ],
 )
-def test_an_order_below_the_claimed_one_fails(claimed, error, verdict):
-    """First order where fourth, or exactness, is claimed; without a claim any order will do."""
+def test_order_below_the_claimed_one_fails(claimed, error, verdict):
+    """First order fails where second, fourth or exactness is claimed; without a claim any order passes."""
     found = run("spin-principal", with_error(claimed, error))
     assert study(found, "orientation_error", "order")["verdict"] == verdict
 
 
-def test_exactness_is_rounding():
-    """An exact engine's errors have no order, and a claim of exactness holds."""
+def test_exact_engine_has_rounding_errors_only():
+    """Errors within rounding have no order, and a claim of exactness passes."""
     found = run("spin-principal", made.Exact())
     assert study(found, "orientation_error", "order") is None
     assert study(found, "orientation_error", "asymptotic_error")["cause"] == "rounding"
     assert found.exit_code() == 0
 
 
-def test_a_known_fault_passes_for_the_engine_it_is_known_of_alone():
-    """The note's plateau is expected of `document`; the same plateau of a stranger fails."""
+def test_known_fault_is_allowed_for_the_named_engine_only():
+    """The plateau is expected of `document`; the same plateau of another engine fails."""
     known = study(run("spin-asymmetric", "document"), "angular_momentum_direction_error", "asymptotic_error")
     assert (known["cause"], known["verdict"]) == ("model", "passed")
     assert "fault of the note" in known["reason"]
-    stranger = run("spin-asymmetric", with_error(None, lambda dt: 0.7))
-    assert study(stranger, "orientation_error", "asymptotic_error")["verdict"] == "failed"
-    assert stranger.exit_code() == 1
+    other = run("spin-asymmetric", with_error(None, lambda dt: 0.7))
+    assert study(other, "orientation_error", "asymptotic_error")["verdict"] == "failed"
+    assert other.exit_code() == 1

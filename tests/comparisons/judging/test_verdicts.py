@@ -1,11 +1,12 @@
-"""Bounds and who they are for."""
+"""Expectations: which of them bind an engine at a step, and the bounds they give."""
 
 import math
 
 import pytest
 
 import scenarios
-from comparisons.judging.verdicts import judge
+from comparisons.engines.base import KnownLimitation
+from comparisons.judging.verdicts import Judgement, judge, verify_expectations, with_limitations
 from comparisons.measuring.metrics import METRICS
 
 
@@ -18,8 +19,8 @@ def verdict(scene, value, metric="energy_error", engine="mine", dt=1e-3):
     return judge(scene, engine, dt, METRICS[metric], value).verdict
 
 
-def test_below_bounds_the_size():
-    """Of a signed metric on both sides; the bound itself is allowed; NaN never is."""
+def test_below_bounds_a_signed_metric_on_both_sides():
+    """The bound itself is allowed; NaN is not."""
     scene = scene_that_expects({"metric": "energy_error", "below": 0.1})
     values = {0.1: "passed", -0.1: "passed", 0.11: "failed", -0.11: "failed", math.nan: "failed", math.inf: "failed"}
     assert {value: verdict(scene, value) for value in values} == values
@@ -28,15 +29,15 @@ def test_below_bounds_the_size():
 
 
 def test_above_and_within_bound_the_value():
-    """With its sign."""
+    """`above` and `within` apply to the signed value."""
     scene = scene_that_expects({"metric": "energy_error", "above": 0.1})
     assert [verdict(scene, v) for v in (0.2, 0.05, -0.2, math.nan)] == ["passed", "failed", "failed", "failed"]
     scene = scene_that_expects({"metric": "energy_error", "within": [-0.2, -0.1]})
     assert [verdict(scene, v) for v in (-0.15, 0.15, -0.3, math.nan)] == ["passed", "failed", "failed", "failed"]
 
 
-def test_nothing_expected_is_measured():
-    """Another metric's bound is nobody's."""
+def test_metric_without_expectation_is_measured():
+    """An expectation on another metric does not apply."""
     assert verdict(scene_that_expects({"metric": "penetration", "below": 1}), 5.0) == "measured"
 
 
@@ -44,8 +45,8 @@ def test_nothing_expected_is_measured():
     ("engine", "dt", "limit"),
     [("mine", 2e-3, 4), ("mine", 1e-3, 3), ("known", 2e-3, 2), ("known", 1e-3, 1), ("known[option=x]", 2e-3, 4)],
 )
-def test_the_narrowest_expectation_binds(engine, dt, limit):
-    """Engine and step, then engine, then step, then all; an option makes another engine."""
+def test_narrowest_expectation_binds(engine, dt, limit):
+    """Engine and step come first, then engine, then step, then all; an engine with an option is another engine."""
     scene = scene_that_expects(
         {"metric": "energy_error", "below": 4},
         {"metric": "energy_error", "below": 3, "dt": 1e-3},
@@ -55,8 +56,37 @@ def test_the_narrowest_expectation_binds(engine, dt, limit):
     assert judge(scene, engine, dt, METRICS["energy_error"], 0.0).upper == limit
 
 
-def test_two_equally_narrow_ones_both_bind():
-    """The tighter end of each."""
+def test_equally_narrow_expectations_both_bind():
+    """The tighter bound of each side counts."""
     scene = scene_that_expects({"metric": "energy_error", "below": 4}, {"metric": "energy_error", "within": [-9, 1]})
     judgement = judge(scene, "mine", 1e-3, METRICS["energy_error"], 0.0)
     assert (judgement.lower, judgement.upper) == (-4, 1)
+
+
+def test_known_limitation_excuses_failures_of_its_metric_and_size_only():
+    """A failed value within the explained error is limited; a larger one, another metric and NaN stay failed."""
+    limitation = KnownLimitation("contacts slip", {"position_error": 0.02})
+
+    def excused(value, metric="position_error", verdict="failed"):
+        return with_limitations(Judgement(value, verdict, reason="too large"), metric, [limitation])
+
+    assert (excused(-0.02).verdict, excused(0.02).reason) == ("limited", "contacts slip; too large")
+    assert [excused(0.021).verdict, excused(math.nan).verdict, excused(0.01, "energy_error").verdict] == ["failed"] * 3
+    assert excused(0.01, verdict="passed").reason == "too large"
+
+
+@pytest.mark.parametrize(
+    ("expectation", "message"),
+    [
+        ({"metric": "energy_eror"}, r"expect\[0\]\.metric: got 'energy_eror'; no such metric\..*energy_error"),
+        ({"metric": "restitution_error"}, r"restitution_error'; it needs a truth with an impact, which this scene does not have"),
+        ({"metric": "energy_error", "engine": "mujocco"}, r"expect\[0\]\.engine: got 'mujocco'; no such engine\..*mujoco"),
+        ({"metric": "energy_error", "engine": "mujoco[integrator=euler]"}, r"write it as 'mujoco', as the results do"),
+        ({"metric": "energy_error", "engine": "document[law=nune]"}, r"document\[law=nune\]'; .*nune"),
+    ],
+)
+def test_expectation_that_cannot_be_judged_is_refused(expectation, message):
+    """The message names the key, the value and what is allowed."""
+    scene = scene_that_expects(expectation | {"below": 1.0})
+    with pytest.raises(scenarios.SceneError, match=message):
+        verify_expectations(scene, scenarios.truth_for(scene), [])

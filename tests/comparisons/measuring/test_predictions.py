@@ -5,7 +5,7 @@ import pytest
 from mpmath import mp, mpf
 from support.engines import QUICK
 
-import comparisons
+import dropspin as ds
 import scenarios
 from scenarios import discrete_flight, load
 
@@ -15,7 +15,7 @@ FLAT = [name for name in QUICK if scenarios.truth_for(load(name)).name == "bounc
 
 
 def measured_and_predicted(names, dts):
-    found = comparisons.run([load(name) for name in names], ENGINES, dts).table
+    found = ds.run([load(name) for name in names], ENGINES, dts).table
     keys = ["scene", "engine", "dt", "metric"]
     measured = found[found["kind"].isin(["truth", "invariant"])].set_index(keys)["value"]
     predicted = found[found["kind"] == "prediction"].set_index(keys)["value"]
@@ -77,11 +77,11 @@ def test_nothing_is_predicted_where_nothing_is_known():
     """A tumbling body but for the note, oblique impacts, Runge-Kutta, and steps in which Bullet turns too little."""
     tumble, corner, fast = load("spin-asymmetric"), load("drop-box-corner"), load("spin-principal-500")
     for name in ("document[rotation=exact]", "mujoco", "pybullet"):
-        assert comparisons.engine(name).predicted_error(tumble, scenarios.truth_for(tumble), "orientation_error", 1e-3) is None
+        assert ds.engine(name).predicted_error(tumble, scenarios.truth_for(tumble), "orientation_error", 1e-3) is None
     for name in ENGINES:
-        assert comparisons.engine(name).predicted_error(corner, scenarios.truth_for(corner), "restitution_error", 1e-3) is None
-    rk4 = comparisons.engine("mujoco[integrator=rk4]")
+        assert ds.engine(name).predicted_error(corner, scenarios.truth_for(corner), "restitution_error", 1e-3) is None
+    rk4 = ds.engine("mujoco[integrator=rk4]")
     assert rk4.predicted_error(fast, scenarios.truth_for(fast), "position_error", 1e-3) is None
-    bullet = comparisons.engine("pybullet")
+    bullet = ds.engine("pybullet")
     assert bullet.predicted_error(fast, scenarios.truth_for(fast), "orientation_error", 1e-3) is not None
     assert bullet.predicted_error(fast, scenarios.truth_for(fast), "orientation_error", 2e-3) is None

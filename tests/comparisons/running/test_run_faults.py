@@ -1,0 +1,162 @@
+"""Runs: broken engines cost their own row, and planted faults are caught."""
+
+import math
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from support import engines as made
+
+import dropspin as ds
+
+BALL = ds.load("drop-ball")
+
+
+@pytest.mark.parametrize(
+    ("engine", "verdict", "reason", "code"),
+    [
+        (made.Crashing(), "crashed", "RuntimeError: no such thing as a floor", 3),
+        (made.GivingUp(), "diverged", "step 3: a number beyond 1e10", 3),
+        (made.Declining(), "declined", "I do not bounce", 0),
+        (made.engine_with("nan", made.nan_after_half_a_second), "diverged", "the state is not finite at t = 0.50", 3),
+        (made.HeavyInertia(), "crashed", "BuildMismatch: inertia is", 3),
+        (made.WrongStart(), "crashed", "BuildMismatch: position at the start is", 3),
+    ],
+    ids=lambda case: getattr(case, "label", ""),
+)
+def test_broken_engine_costs_its_own_rows(engine, verdict, reason, code):
+    """The row gives the reason, and the other engine is measured as usual."""
+    found = ds.run(BALL, [engine, "pybullet"], 4e-3)
+    [row] = found.table[found.table["engine"] == engine.label].to_dict("records")
+    assert row["verdict"] == verdict
+    assert row["reason"].startswith(reason)
+    assert found.exit_code() == code
+    assert found.table[found.table["engine"] == "pybullet"]["value"].notna().all()
+
+
+# The fault, the scene that must detect it and one metric that must fail; each distortion acts on the exact motion.
+FAULTS = {
+    "restitution vanishes": (
+        "drop-ball", "restitution_error",
+        lambda s, t: np.concatenate([[0, 0.1, 0], s[3:7], np.zeros(6)]) if t > 0.452 else s,
+    ),
+    "swapped components of the quaternion": (
+        "spin-asymmetric", "orientation_error", lambda s, t: s[[0, 1, 2, 4, 3, 5, 6, 7, 8, 9, 10, 11, 12]],
+    ),
+    "wxyz for xyzw": ("spin-asymmetric", "orientation_error", lambda s, t: s[[0, 1, 2, 6, 3, 4, 5, 7, 8, 9, 10, 11, 12]]),
+    "attitude 2 degrees off": ("spin-asymmetric", "orientation_error", made.turned_by(math.radians(2))),
+    "sideways push": ("drop-box-corner", "horizontal_momentum_error", lambda s, t: s + 1e-5 * np.eye(13)[7]),
+    "1 % less spin": (
+        "spin-dzhanibekov", "angular_momentum_error", lambda s, t: np.concatenate([s[:10], 0.99 * s[10:]]),
+    ),
+    "frozen attitude": ("spin-principal", "orientation_error", lambda s, t: np.concatenate([s[:3], [0, 0, 0, 1], s[7:]])),
+    "sinks a centimetre": ("drop-box-flat", "penetration", lambda s, t: s - 0.01 * np.eye(13)[1]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_are_caught(fault):
+    """Each fault, planted in an exact engine, fails the metric that measures it."""
+    scene, metric, distort = FAULTS[fault]
+    engine = made.engine_with("planted", distort)
+    found = ds.run(scene, engine, 1e-3)
+    failed = found.table[found.table["verdict"] == "failed"]
+    assert metric in set(failed["metric"]), found.table[["metric", "value", "verdict"]].to_string()
+    assert found.exit_code() == 1
+
+
+def test_one_per_cent_of_restitution_is_caught():
+    """A ball with 1 % more restitution than the scene: 2 e² of that, 5e-3, in the apex."""
+    found = ds.run([BALL], [made.TooLively()], [1e-3])
+    failed = found.table[found.table["verdict"] == "failed"]
+    assert {"bounce_height_error", "energy_error"} <= set(failed["metric"])
+
+
+@pytest.mark.parametrize("package", ["mujoco", "pybullet"])
+def test_missing_engine_costs_its_row_and_fails_only_if_named(package):
+    """Its row says how to install it, and the rest runs."""
+    program = (
+        f"import sys; sys.modules[{package!r}] = None\n"
+        "from dataclasses import replace\n"
+        "import dropspin as ds\n"
+        f"found = ds.run('drop-ball', ['document', {package!r}], 4e-3)\n"
+        f"[row] = found.table[found.table['engine'] == {package!r}].to_dict('records')\n"
+        "print(row['verdict'], row['reason'])\n"
+        f"print(found.exit_code(), replace(found, provenance={{**found.provenance, 'named': [{package!r}]}}).exit_code())\n"
+        "print((found.table['engine'] == 'document').sum())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    first, codes, rows = done.stdout.splitlines()
+    assert first.startswith(f"missing {package} is not installed: pip install {package}")
+    assert codes == "0 3"
+    assert int(rows) > 5
+
+
+class Short(made.Exact):
+    """Returns five rows, whatever is asked for."""
+
+    name = "short"
+
+    def prepare(self, scene, dt):
+        simulation = made.ExactSimulation(scene, dt)
+        simulation.record = lambda steps, every=1: made.ExactSimulation(scene, dt).record(4)
+        return simulation
+
+
+class Narrow(made.Exact):
+    """Returns twelve columns."""
+
+    name = "narrow"
+
+    def prepare(self, scene, dt):
+        simulation = made.ExactSimulation(scene, dt)
+        whole = simulation.record
+        simulation.record = lambda steps, every=1: whole(steps, every)[:, :12]
+        return simulation
+
+
+@pytest.mark.parametrize(
+    ("engine", "reason"),
+    [
+        (Short(), r"the record has shape \(5, 13\); 2501 states"),
+        (Narrow(), r"the record has shape \(2501, 12\)"),
+        (made.engine_with("zero-q", lambda s, t: np.concatenate([s[:3], np.zeros(4), s[7:]])), "has length 0; an orientation has length 1"),
+        (made.engine_with("long-q", lambda s, t: np.concatenate([s[:3], 1.05 * s[3:7], s[7:]])), "has length 1.05"),
+        (made.engine_with("complex", lambda s, t: s + 0j), "complex numbers"),
+    ],
+    ids=lambda case: getattr(case, "label", ""),
+)
+def test_malformed_record_is_refused(engine, reason):
+    """Too few rows, too few columns, no orientation: the row gives the reason."""
+    found = ds.run("spin-principal", engine, 4e-3)
+    [row] = found.table.to_dict("records")
+    assert row["verdict"] == "crashed"
+    assert re.search(reason, row["reason"])
+
+
+@pytest.mark.parametrize("dt", [4e-3, 2e-3, 1e-3])
+@pytest.mark.parametrize("scene", ["drop-ball", "drop-ball-lively", "drop-box-flat", "drop-box-corner", "drop-box-sticking"])
+def test_falling_through_the_floor_fails_at_every_step(scene, dt):
+    """The missing contact fails restitution, and penetration or bounce height."""
+
+    class NoFloor(made.Exact):
+        name = "no-floor"
+
+        def prepare(self, scene, dt):
+            return made.ExactSimulation(scene.model_copy(update={"floor": None}), dt)
+
+    found = ds.run(scene, NoFloor(), dt)
+    failed = set(found.table[found.table["verdict"] == "failed"]["metric"])
+    assert failed & {"penetration", "bounce_height_error"}
+    assert "restitution_error" in failed
+    assert found.exit_code() == 1
+
+
+def test_engine_that_never_moves_fails_restitution():
+    """Restitution is undefined without an impact; the other engine is not affected."""
+    found = ds.run([BALL], [made.Frozen(), "pybullet"], [4e-3])
+    [row] = found.table[(found.table["engine"] == "frozen") & (found.table["metric"] == "restitution_error")].to_dict("records")
+    assert (row["verdict"], row["reason"]) == ("failed", "restitution error is undefined: what it measures did not happen")
+    assert found.table[found.table["engine"] == "pybullet"]["value"].notna().all()

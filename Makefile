@@ -3,19 +3,19 @@ PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: report test test-browser test-slow faults bench examples docs lint clean
+.PHONY: report test test-browser test-all faults bench examples docs lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
 
-test: $(VENV)/.installed-dev          ## set up, run the whole test suite
+test: $(VENV)/.installed-dev          ## set up, run the test suite
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 test-browser: $(VENV)/.installed-browser  ## the report and the replay in a real browser; needs Chromium
 	$(BIN)/python -m pytest tests/browser
 
-test-slow: $(VENV)/.installed-dev     ## the studies that take minutes
-	$(BIN)/python -m pytest -m slow
+test-all: lint test test-browser docs ## everything, and the studies that take minutes
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
 
 faults: $(VENV)/.installed-dev        ## engines with one planted fault each against the core catalogue: docs/faults.md
 	$(BIN)/python tests/support/fault_suite.py

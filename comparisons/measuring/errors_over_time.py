@@ -1,4 +1,4 @@
-"""Errors at each moment of a motion; of most of them a metric takes the largest."""
+"""Errors at each time of a motion; a metric is usually the largest of them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ def angular_momentum_error(case: Comparison) -> Array:
     exact = case.exact_angular_momentum
     scale = np.max(length(exact))
     if scale == 0.0:
-        raise Unresolved("the angular momentum is too small to be a number")
+        raise Unresolved("the angular momentum is 0 in double precision")
     sizes: Array = length(case.angular_momentum - exact) / scale
     return sizes
 
@@ -40,13 +40,13 @@ def position_error(case: Comparison) -> Array:
 
 
 def orientation_error(case: Comparison) -> Array:
-    """Angle of the rotation that takes the truth's attitude to the engine's [rad]."""
+    """Angle of the rotation from the truth's attitude to the engine's [rad]."""
     return angle_between_orientations(case.compared.orientation, case.exact.orientation)
 
 
 @dataclass(frozen=True)
 class ErrorOverTime:
-    """An error at each moment: from a comparison to its values, and whether it can be told in flight only."""
+    """An error at each time: the function from a comparison to its values, and whether it is defined in flight only."""
 
     at_each_row: Callable[[Comparison], Array]
     in_flight: bool
@@ -59,4 +59,4 @@ ERRORS = {
     "position_error": ErrorOverTime(position_error, in_flight=False),
     "orientation_error": ErrorOverTime(orientation_error, in_flight=False),
 }
-"""By the name of the metric that takes the largest of each."""
+"""By the name of the metric that is the largest of each."""

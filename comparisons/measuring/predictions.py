@@ -3,7 +3,7 @@
 Free flight: semi-implicit Euler has an exact discrete solution (`scenarios.discrete_flight`), whose metrics are measured.
 A body that falls flat, over the drop's height H, with u its impact speed, averaged over start phases:
 
-    impact detected late, v⁺ = -e v⁻ - s g h        bounce height  -(1 - e)/2 u h/H,          restitution  -s g h/u
+    impact detected late, v⁺ = -e v⁻ - s g h     bounce height  -(1 - e)/2 u h/H,          restitution  -s g h/u
     gravity before the impact, as in the note    bounce height  (2e - 1)(1 + e)/2 u h/H,   restitution  e g h/u
 
 Source: expansion of one step about the impact, to first order in the step h.
@@ -21,13 +21,13 @@ from scenarios.mechanics import angular_momentum
 
 
 def flight_error(scene: Scenario, truth: Truth | None, metric: str, dt: float, *, exact_rotation: bool) -> float | None:
-    """The error of semi-implicit Euler in free flight; None where the rotation is not that simple, or the scene no free flight."""
+    """The error of semi-implicit Euler in free flight; None if the rotation is not that simple, or the scene is not a free flight."""
     if truth is None or scene.floor is not None or scene.damping is not None or (exact_rotation and not spins_steadily(scene)):
         return None
     return _measured(metric, _flight(scene, truth, dt, exact_rotation))
 
 
-@lru_cache(maxsize=4)  # every metric of a scene asks for it
+@lru_cache(maxsize=4)  # every metric of a scene needs it
 def _flight(scene: Scenario, truth: Truth, dt: float, exact_rotation: bool) -> Comparison:
     return Comparison.with_truth(scene, discrete_flight(scene, dt, exact_rotation=exact_rotation), truth)
 
@@ -42,8 +42,8 @@ def bounce_error(
         truth: Its truth.
         metric: Name of the metric.
         dt: Time step [s].
-        gravity_first: Whether gravity acts in a step before the impact does, as in the note.
-        restitution_lost: s, the share of a step's gravity that the rebound is slower by.
+        gravity_first: Whether gravity acts before the impact within a step, as in the note.
+        restitution_lost: s, the share of a step's gravity by which the rebound is slower.
     """
     if truth is None or truth.name != "bounce-ladder" or not truth.events or not scene.starts_above_floor:
         return None

@@ -1,12 +1,12 @@
-"""How far a figure may move before it says that something has changed: a tolerance for each, from how it was measured.
+"""Tolerances: how far a result may move between two runs before it counts as changed, derived from how it was measured.
 
-    metrics    rounding over so many steps, and what sampling_noise may do: one of the start phases falling into the neighbouring step, and,
-               where the body starts on the floor, or there is one start only, what starts that are moved by some ulp make of it
-    orders     what becomes of them when the errors that they were found from move by their tolerances
-    limits     the same, and no less than their own uncertainty
-    means      of ensembles: the confidence interval of the difference between two draws
+    metrics              rounding over the steps, and sampling noise: one of the start phases may fall into the neighbouring step; where the
+                         body starts on the floor, or there is one start only, the effect of perturbing the starts by some ulp
+    orders               the change when the errors that they were fitted to move by their tolerances
+    asymptotic errors    the same, and at least their own uncertainty
+    ensemble means       the confidence interval of the difference between two draws
 
-No tolerance is a share of the figure: an engine that is exact to 1e-12 is held to 1e-12.
+No tolerance is a share of the value: an engine that is exact to 1e-12 is compared to 1e-12.
 """
 
 import math
@@ -20,45 +20,45 @@ from scenarios import Scenario
 Array = NDArray[np.float64]
 
 NEGLIGIBLE = 3e-8
-"""Errors as small as this, of the metric's own scale, are put down to rounding and to the residues of iterative solvers."""
-ULPS_A_STEP = 16.0
+"""Errors below this, relative to the metric's scale, are attributed to rounding and to the residuals of iterative solvers."""
+ULPS_PER_STEP = 16.0
 PERTURBATION = 16.0
-"""By how many ulp of the engine's precision each number of a start is moved, up or down, to see what becomes of rounding."""
+"""By how many ulp of the engine's precision each number of a start is perturbed, to see the effect of rounding."""
 _FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
 SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
-"""Which of them up, which down: two ways, and their opposites."""
+"""The signs of the perturbations: two random sets and their opposites."""
 FEW_DRAWS = 10.0
-"""What a few nudges have moved a figure by tells what others would by its order of magnitude only."""
-TRUTH = 1e-12
-"""How far truths may be from each other that are computed with other libraries."""
+"""A few perturbations give the effect of others to an order of magnitude only."""
+TRUTH_ACCURACY = 1e-12
+"""How far exact solutions may differ that are computed with other versions of libraries."""
 OF_TWO_DRAWS = math.sqrt(2.0)
-"""The interval of a difference between two means, of one mean's."""
+"""The interval of a difference between two means, relative to the interval of one mean."""
 
 
 def rounding(scene: Scenario, unit: str, precision: type, steps: Array) -> Array:
-    """What rounding alone may bring about in so many steps of an engine, solvers' residues included, in a metric's unit."""
-    rounded: Array = _scale(scene, unit) * (NEGLIGIBLE + ULPS_A_STEP * float(np.finfo(precision).eps) * steps)
+    """The largest error that rounding, solvers' residuals included, may cause in a number of steps, in a metric's unit."""
+    rounded: Array = _scale(scene, unit) * (NEGLIGIBLE + ULPS_PER_STEP * float(np.finfo(precision).eps) * steps)
     return rounded
 
 
 def tolerance(scene: Scenario, unit: str, precision: type, steps: int, sampling_noise: float) -> float:
-    """How far a metric may move: by sampling_noise, and by rounding that goes now up, now down; without a floor no solver leaves a residue."""
-    residue = 0.0 if scene.floor is None else NEGLIGIBLE
-    rounded = ULPS_A_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
-    return sampling_noise + _scale(scene, unit) * (residue + TRUTH + rounded)
+    """How far a metric may move: by sampling noise, and by rounding of random sign; without a floor no solver leaves a residual."""
+    residual = 0.0 if scene.floor is None else NEGLIGIBLE
+    rounded = ULPS_PER_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
+    return sampling_noise + _scale(scene, unit) * (residual + TRUTH_ACCURACY + rounded)
 
 
 def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
-    """A scene's starts, moved by a few ulp, set by set; none where there are many starts and none touches the floor.
+    """A scene's starts perturbed by a few ulp, set by set; empty where there are many starts and none touches the floor.
 
-    A body that touches the floor stays at its height, but for ulps of double precision: those of single would put it somewhere else.
-    Whether it touches is then rounding's to say, for all starts alike; so for each set there is one that goes the other way.
+    A body that touches the floor is perturbed by ulps of double precision, as those of single precision would lift or sink it. Rounding
+    then decides whether it touches, for all starts alike; so each set has one of the opposite sign.
     """
     if len(starts) == 1:
         return [[_moved(scene, signs, precision)] for signs in SIGNS]
     if scene.floor is None or scene.starts_above_floor:
         return []
-    # It rolls about its corner: by ulps of single precision it would slip, and be another scene.
+    # It rolls about its corner: perturbed by ulps of single precision it would slip, which is another motion.
     return [[_moved(start, signs, np.float64) for start in starts] for signs in SIGNS[:2]]
 
 
@@ -70,7 +70,7 @@ def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:
 
 
 def _scale(scene: Scenario, unit: str) -> float:
-    """What rounding is relative to: the scene's own lengths, speeds and duration; 1 for ratios and angles."""
+    """The scale of rounding errors: the scene's lengths, speeds and duration; 1 for ratios and angles."""
     length = scene.body.size + float(np.linalg.norm(scene.start.position))
     if unit == "m/s":
         return math.sqrt(float(np.linalg.norm(scene.acceleration)) * length) + float(np.linalg.norm(scene.start.velocity))

@@ -1,8 +1,8 @@
-"""Engines kept apart: each runs in a process of its own, so that whatever it does costs its own row and nothing else.
+"""A process for each engine, so that a crash, a hang or a leak costs the engine's own row and nothing else.
 
-A segmentation fault ends the engine's process, not the run; an endless loop ends at a limit of processor time, which a loaded machine does
-not use up; a leak ends at a limit of memory; what an engine prints is dropped. A process that has ended is replaced for the next piece of
-work. One engine works at a time, so that nobody's timing is disturbed.
+A segmentation fault ends the engine's process, not the run; an endless loop ends at a limit of processor time, which other load on the
+machine does not use up; a leak ends at a limit of memory; output of an engine is dropped. A process that ended is replaced for the next
+piece of work. One engine runs at a time, so that timings are not disturbed.
 """
 
 import ctypes
@@ -31,18 +31,18 @@ Given = TypeVarTuple("Given")
 Result = TypeVar("Result")
 
 PROCESSES = Path("/proc")
-POLL, GRACE = 0.5, 2.0  # s, between looks at a process, and for the pool to tell of its end
-BACKSTOP = 10.0
-"""Wall time over processor time: an engine that sleeps for ever uses no processor."""
+POLL, GRACE = 0.5, 2.0  # s, between checks of a process, and for the pool to report its end
+WALL_TIME_FACTOR = 10.0
+"""Wall time allowed over processor time allowed: an engine that sleeps forever uses no processor time."""
 
 
 @dataclass(frozen=True)
 class ResourceLimits:
-    """What an engine may use for one scene at one step, start phases and ensemble included.
+    """What an engine may use for one scene at one time step, start phases and ensemble included.
 
     Attributes:
-        processor_time: [s]; ten times as much by the clock on the wall.
-        memory: Beyond what its process takes when it starts [bytes].
+        processor_time: Processor time [s]; ten times as much wall time is allowed.
+        memory: Memory beyond what its process takes when it starts [bytes].
     """
 
     processor_time: float = 300.0
@@ -50,7 +50,7 @@ class ResourceLimits:
 
 
 class Failed(Exception):
-    """Work that did not come to an end; its verdict, and why."""
+    """Work that did not finish: the verdict and the reason."""
 
     def __init__(self, verdict: Verdict, reason: str) -> None:
         super().__init__(verdict, reason)
@@ -61,21 +61,21 @@ class Failed(Exception):
 
 
 class Closed(Exception):
-    """Nobody waits for this work any more."""
+    """Another thread has abandoned this work."""
 
 
 class EngineProcesses:
     """One process for each engine; a context manager.
 
     Args:
-        limits: What each may use.
-        start_method: How processes start, a word of `multiprocessing`. None: forked, if the system can do that.
+        resources: What each may use.
+        start_method: A start method of `multiprocessing`; None to fork where the system can.
     """
 
-    def __init__(self, limits: ResourceLimits, start_method: str | None = None) -> None:
-        # A forked process has the engine already, whatever it is made of; and no script of a user's is run again.
+    def __init__(self, resources: ResourceLimits, start_method: str | None = None) -> None:
+        # A forked process has the engine already, even one that cannot be pickled, and does not run the user's script again.
         self._start_method = start_method or ("fork" if "fork" in get_all_start_methods() else "spawn")
-        self._limits = limits
+        self._resources = resources
         self._pools: dict[str, ProcessPool] = {}
         self._processes: dict[str, ctypes.c_long] = {}
         self._closed = False
@@ -90,11 +90,11 @@ class EngineProcesses:
             return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
 
     def call(self, entry: EngineEntry, work: Callable[[EngineEntry, *Given], Result], *given: *Given) -> Result:
-        """Do some work in an engine's process; `work` gets the entry first.
+        """Call a function in an engine's process; its first argument is the entry.
 
         Raises:
-            Failed: It ended the process, ran out of time or memory, or raised.
-            Closed: Another thread has abandoned it meanwhile.
+            Failed: The call ended the process, ran out of time or memory, or raised.
+            Closed: Another thread has abandoned it.
         """
         if self._closed:
             raise Closed
@@ -102,24 +102,24 @@ class EngineProcesses:
             self._pools[entry.label] = self._pool(entry)
         self._processes[entry.label].value = 0
         task = self._pools[entry.label].schedule(
-            _work_here, args=[work, given, self._limits.processor_time], timeout=BACKSTOP * self._limits.processor_time
+            _call, args=[work, given, self._resources.processor_time], timeout=WALL_TIME_FACTOR * self._resources.processor_time
         )
         try:
             while not wait([task], timeout=POLL).done:
                 if self._closed:
                     raise Closed
-                if self._has_left(entry.label) and not wait([task], timeout=GRACE).done:
+                if self._has_exited(entry.label) and not wait([task], timeout=GRACE).done:
                     self.renew(entry)
-                    raise Failed("crashed", "its process ended by itself, as if all were well")
+                    raise Failed("crashed", "its process exited with code 0 before the work was done")
             result: Result = task.result()
         except OutOfTime:
-            raise Failed("timed_out", f"not done after {BACKSTOP * self._limits.processor_time:g} s of wall time") from None
+            raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * self._resources.processor_time:g} s of wall time") from None
         except ProcessExpired as end:
             raise Failed(*self._verdict(end.exitcode)) from None
         return result
 
-    def _has_left(self, label: str) -> bool:
-        """Whether the process that took up the work has ended; one that says all is well on its way out is not told of by the pool."""
+    def _has_exited(self, label: str) -> bool:
+        """Whether the process that does the work has ended; the pool does not report one that exits with code 0."""
         process = self._processes[label].value
         if not process or not PROCESSES.exists():
             return False
@@ -129,24 +129,24 @@ class EngineProcesses:
             return True
 
     def renew(self, entry: EngineEntry) -> None:
-        """Give an engine a new process for its next piece of work."""
+        """Start a new process for an engine's next piece of work."""
         pool = self._pools.pop(entry.label)
         pool.stop()  # type: ignore[no-untyped-call]  # pebble's has no types
         pool.join()
 
     def _verdict(self, exit_code: int | None) -> tuple[Verdict, str]:
-        """The verdict on an engine whose process has ended, and the reason."""
+        """The verdict and the reason for an engine whose process ended."""
         if exit_code == -signal.SIGXCPU:
-            return "timed_out", f"not done after {self._limits.processor_time:g} s of processor time"
+            return "timed_out", f"not done after {self._resources.processor_time:g} s of processor time"
         if exit_code is not None and exit_code < 0:
             return "crashed", f"its process was ended by {signal.Signals(-exit_code).name}"
         return "crashed", f"its process ended with exit code {exit_code}"
 
     def _pool(self, entry: EngineEntry) -> ProcessPool:
         context = get_context(self._start_method)
-        # Without a lock: a process that is killed while it holds one would have the parent wait for ever.
+        # Without a lock: the parent would wait forever for a process that is killed while it holds one.
         self._processes[entry.label] = process = context.RawValue("l", 0)
-        return ProcessPool(max_workers=1, initializer=_move_in, initargs=[entry, self._limits.memory, process], context=context)
+        return ProcessPool(max_workers=1, initializer=_start_process, initargs=[entry, self._resources.memory, process], context=context)
 
     def __enter__(self) -> Self:
         return self
@@ -159,7 +159,7 @@ class EngineProcesses:
             pool.join()
 
     def abandon(self) -> None:
-        """End the engines' processes at once, and any call that waits for them in another thread."""
+        """End the engines' processes at once, and with them any call that waits for them in another thread."""
         self._closed = True
         for process in list(self._processes.values()):
             if process.value:
@@ -167,23 +167,23 @@ class EngineProcesses:
                     os.kill(process.value, signal.SIGKILL)
 
 
-_at_work: list["ctypes.c_long"] = []
-"""Where this process says that it is at work."""
-_residents: list[EngineEntry] = []
-"""The engine whose process this is; empty in the parent."""
+_busy: list["ctypes.c_long"] = []
+"""The shared number in which this process writes its process id while it works."""
+_entry: list[EngineEntry] = []
+"""The engine of this process; empty in the parent."""
 
 
-def _move_in(entry: EngineEntry, memory: int, process: "ctypes.c_long") -> None:
-    """Begin a process's life: keep quiet, leave interrupts to the parent, and take no more memory than allowed."""
-    _residents.append(entry)
-    _at_work.append(process)
+def _start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long") -> None:
+    """Start a process: drop its output, leave interrupts to the parent, limit its memory."""
+    _entry.append(entry)
+    _busy.append(process)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, whatever the parent does at one itself
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, even if the parent handles its own
     faulthandler.disable()
-    nowhere = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
+    null = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
     for stream in (1, 2):
-        os.dup2(nowhere.fileno(), stream)
-    sys.stdout = sys.stderr = nowhere
+        os.dup2(null.fileno(), stream)
+    sys.stdout = sys.stderr = null
     if sys.platform == "linux":
         import resource
 
@@ -197,12 +197,12 @@ PR_SET_PDEATHSIG = 1
 
 
 def _end_with_parent() -> None:
-    """Have the system end this process when the one that started it is killed: processes of many engines would keep each other waiting."""
+    """Have the system end this process when its parent is killed: the processes of several engines would wait for each other."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _work_here(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
-    _at_work[0].value = os.getpid()
+def _call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
+    _busy[0].value = os.getpid()
     if sys.platform == "linux":
         import resource
 
@@ -210,8 +210,8 @@ def _work_here(work: Callable[..., Any], given: Sequence[Any], processor_time: f
         until = int(used.ru_utime + used.ru_stime + processor_time) + 1
         resource.setrlimit(resource.RLIMIT_CPU, (until, resource.RLIM_INFINITY))
     try:
-        return work(_residents[0], *given)
+        return work(_entry[0], *given)
     except Exception as error:  # an engine is somebody else's code
         raise Failed("crashed", f"{type(error).__name__}: {error}") from None
-    except BaseException as error:  # one that says sys.exit() or raises an interrupt is none of the user's
+    except BaseException as error:  # sys.exit() or an interrupt that an engine raises is not the user's
         raise Failed("crashed", type(error).__name__) from None

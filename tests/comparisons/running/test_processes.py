@@ -33,7 +33,7 @@ def _compiled():
         (breaking.loop, "timed_out", "not done after 1 s of processor time"),
         (breaking.allocate, "crashed", "MemoryError"),
         (breaking.leave, "crashed", "its process ended with exit code 7"),
-        (breaking.leave_well, "crashed", "its process ended by itself, as if all were well"),
+        (breaking.leave_well, "crashed", "its process exited with code 0 before the work was done"),
         (breaking.interrupt, "crashed", "KeyboardInterrupt"),
         (breaking.fail, "crashed", "RuntimeError: no"),
     ],

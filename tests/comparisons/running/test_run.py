@@ -141,7 +141,9 @@ def test_each_pair_of_engines_is_compared_once(core):
 
 def test_exact_engine_passes_everywhere():
     """An engine without any error fails no expectation."""
-    found = ds.run(made.QUICK, made.Exact(), 2e-3)
+    # The means over an ensemble have no exact value to compare with, and its exact motions take most of the time.
+    scenes = [ds.load(name).model_copy(update={"ensemble": None}) for name in made.QUICK]
+    found = ds.run(scenes, made.Exact(), 2e-3)
     failed = found.table[found.table["verdict"] == "failed"]
     assert failed.empty, failed.to_string()
 

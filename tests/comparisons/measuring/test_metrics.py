@@ -23,8 +23,8 @@ def exact_motion(name, dt=DT, **changes):
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_the_truth_has_no_error(name):
-    """Every metric of the truth itself is 0, to 1e-12 of its scale; those of an impact to the speed that one step adds."""
+def test_exact_solution_has_no_error(name):
+    """Every metric of the exact solution is 0 to 1e-12 of its scale; metrics of an impact to the speed that one step adds."""
     scene, motion = exact_motion(name)
     for metric, value in measure(scene, motion).items():
         # Sampled rows are up to a step away from the impact: g dt / u.
@@ -33,8 +33,8 @@ def test_the_truth_has_no_error(name):
         assert abs(value) <= allowed, (metric, value)
 
 
-def test_every_metric_is_used_by_the_catalogue():
-    """A metric that no scene has is not tested by the line above."""
+def test_catalogue_uses_every_metric():
+    """The test above does not cover a metric that no scene has."""
     used = set()
     for name in QUICK:
         used |= set(measure(*exact_motion(name)))
@@ -42,7 +42,7 @@ def test_every_metric_is_used_by_the_catalogue():
 
 
 @pytest.mark.parametrize("planted", [1e-12, 1e-6, 0.1])
-def test_planted_attitude(planted):
+def test_planted_attitude_error_is_measured(planted):
     """A constant error of attitude is measured as itself, whatever the sign of the quaternion."""
     scene, motion = exact_motion("spin-asymmetric")
     turned = multiply(about(np.array([0.0, 0.6, 0.8]), np.array(planted))[None], motion.orientation)
@@ -51,8 +51,8 @@ def test_planted_attitude(planted):
         assert found["orientation_error"] == pytest.approx(planted, rel=1e-3, abs=2e-15)
 
 
-def test_planted_position_energy_and_momentum():
-    """1e-9 m aside; 1e-6 more spin makes 1e-6 more L and 2e-6 more energy, with its sign."""
+def test_planted_position_energy_and_momentum_errors_are_measured():
+    """1e-9 m of position; 1e-6 more spin gives 1e-6 more L and 2e-6 more energy, with its sign."""
     scene, motion = exact_motion("spin-asymmetric")
     aside = exact_motion("spin-asymmetric", position=motion.position + np.array([0, 0, 1e-9]))[1]
     assert measure(scene, aside)["position_error"] == pytest.approx(1e-9, rel=1e-6)
@@ -64,7 +64,7 @@ def test_planted_position_energy_and_momentum():
         assert found["energy_error"] == pytest.approx(sign * 2e-6, rel=1e-5)
 
 
-def test_planted_direction_of_momentum():
+def test_planted_direction_of_angular_momentum_is_measured():
     """ω turned by 1e-7 about an axis square to L turns L by as much, for a ball."""
     scene = scenarios.load(
         {
@@ -79,7 +79,7 @@ def test_planted_direction_of_momentum():
     assert measure(scene, turned)["angular_momentum_direction_error"] == pytest.approx(1e-7, rel=1e-6)
 
 
-def test_planted_restitution():
+def test_planted_restitution_is_measured():
     """A ball that bounces as with e = 0.51: bounce height e'² - e², restitution error 0.01, both positive."""
     scene = scenarios.load("drop-ball")
     lively = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": 0.51})})
@@ -90,8 +90,8 @@ def test_planted_restitution():
     assert found["energy_error"] == pytest.approx(0.51**2 - 0.25, rel=1e-9)
 
 
-def test_a_body_that_does_not_bounce_fails_where_the_truth_bounces():
-    """No flight of its own is needed to be found wanting."""
+def test_body_without_a_bounce_fails_bounce_height():
+    """The flights of the exact solution say where to measure."""
     scene = scenarios.load("drop-ball")
     dead = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": 0.0})})
     found = measure(scene, truth_for(dead)(DT * np.arange(1501)))
@@ -100,8 +100,8 @@ def test_a_body_that_does_not_bounce_fails_where_the_truth_bounces():
     assert found["restitution_error"] == pytest.approx(-0.5, abs=2.5e-3)
 
 
-def test_a_body_that_falls_through_fails():
-    """No impact at all: restitution is not a number, depth is what it is, and the energy looks fine before the impact only."""
+def test_body_that_falls_through_the_floor_fails():
+    """Restitution is undefined, penetration is the depth, and the energy error is 0 before the impact only."""
     scene, _ = exact_motion("drop-ball")
     t = DT * np.arange(1501)
     free = scene.model_copy(update={"floor": None})
@@ -111,7 +111,7 @@ def test_a_body_that_falls_through_fails():
     assert found["energy_error"] == pytest.approx(0.75, rel=1e-9)  # after the first bounce; later it is out of step
 
 
-def test_staggered_velocity():
+def test_synchronised_energy_accounts_for_the_velocity_lag():
     """Semi-implicit Euler's free fall: synchronised energy to 1e-13, raw energy off by -M g² h t/2 over M g H."""
     scene = scenarios.load("drop-ball").model_copy(update={"floor": None, "duration": 0.4})
     h, n = 1e-3, np.arange(401)
@@ -134,16 +134,16 @@ def test_energy_gain_is_the_largest_rise():
     assert found["energy_drift"] == pytest.approx(-0.3, rel=1e-9)
 
 
-def test_sideways_push_on_a_smooth_floor():
-    """1e-10 of horizontal momentum is seen."""
+def test_sideways_push_on_a_frictionless_floor_is_measured():
+    """Down to 1e-10 of the momentum."""
     scene, motion = exact_motion("drop-ball")
     pushed = motion.velocity + np.outer(motion.t > 0.45, [1e-10, 0, 0])
     found = measure(scene, exact_motion("drop-ball", velocity=pushed)[1])
     assert found["horizontal_momentum_error"] == pytest.approx(1e-10 / np.sqrt(2 * 9.8), rel=1e-9)
 
 
-def test_one_nan_is_seen():
-    """Wherever it is."""
+def test_one_nan_makes_the_metrics_nan():
+    """At any row."""
     _, motion = exact_motion("drop-ball")
     assert motion.first_bad_row is None
     position = motion.position.copy()
@@ -151,16 +151,16 @@ def test_one_nan_is_seen():
     assert exact_motion("drop-ball", position=position)[1].first_bad_row == 700
 
 
-def test_too_coarse_a_step_is_said_to_be():
-    """Two rows of flight say nothing about an apex."""
+def test_too_coarse_a_step_raises_unresolved():
+    """Two rows of a flight do not give an apex."""
     scene, motion = exact_motion("drop-ball", dt=0.1)
     case = Comparison.with_truth(scene, motion, truth_for(scene))
     with pytest.raises(Unresolved, match=r"too short for steps of 0\.1 s"):
         METRICS["bounce_height_error"].average([case])
 
 
-def test_planted_landing():
-    """A box that keeps 1 % more of its angular speed at each landing is found to, to the last digits."""
+def test_planted_landing_error_is_measured():
+    """A box that keeps 1 % more of its angular speed at each landing."""
     scene, motion = exact_motion("rock-block")
     landing = truth_for(scene).events[0].time
     spin = motion.angular_velocity.copy()
@@ -170,8 +170,8 @@ def test_planted_landing():
     assert measure(scene, planted)["landing_error"] == pytest.approx(0.01 * spin[after, 2] / 1.01 / spin[before, 2], rel=1e-9)
 
 
-def test_planted_moment_about_the_contact():
-    """An impact that adds ΔL about the point of contact: found as ΔL over M |r| |v|, whatever the direction."""
+def test_planted_moment_about_the_contact_point_is_measured():
+    """An impact that adds ΔL about the contact point measures ΔL over M |r| |v| in every direction."""
     scene, motion = exact_motion("drop-ball")
     landing = truth_for(scene).events[0]
     for push in ([1e-6, 0.0, 0.0], [0.0, -1e-6, 0.0], [0.0, 0.6e-6, 0.8e-6]):
@@ -186,7 +186,7 @@ def test_planted_moment_about_the_contact():
     assert measure(scene, planted)["contact_momentum_error"] == pytest.approx(0.0, abs=1e-14)
 
 
-def test_planted_unrest():
+def test_planted_motion_after_rest_is_measured():
     """A body that comes to rest and is kicked again for a while: the time of its last motion and the rms of its last tenth."""
     scene, motion = exact_motion("drop-ball-dull")
     assert scene.duration == pytest.approx(motion.t[-1])
@@ -201,7 +201,7 @@ def test_planted_unrest():
 
 
 def test_flights_end_where_the_body_is_desynchronised():
-    """After the second flight; a body whose every flight is 4 % longer is held against the truth's own flights only while it can be."""
+    """A body whose flights are 4 % longer is compared with the exact flights only while both are in the same flight."""
     scene, motion = exact_motion("drop-ball-lively")
     late = truth_for(scene)(motion.t / 1.04)
     slow = Comparison.with_truth(scene, Trajectory(motion.t, *(getattr(late, f) for f in FIELDS)), truth_for(scene))

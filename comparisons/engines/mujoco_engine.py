@@ -27,7 +27,7 @@ from comparisons.engines.mujoco_contact import IMPEDANCE, contact
 from comparisons.engines.mujoco_versions import SIDE_BY_SIDE, flight_of, numbers_of, refusal, refusal_of_boxes, solver
 from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.measuring.predictions import bounce_error, flight_error
-from reference_impl.simulate import usable_cores
+from reference_impl.threads import usable_cores
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
 from scenarios.mechanics import is_diagonal, principal_axes

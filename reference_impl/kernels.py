@@ -1,7 +1,7 @@
 """Compiled loops over `step.advance`, one for each choice of methods and parts, cached on disk.
 
-numba invalidates its cache by the file of the compiled function alone, so an edit elsewhere in this package would leave stale kernels in use.
-The cache is therefore a folder named after a hash of everything that goes into the kernels.
+numba invalidates its cache by the file of the compiled function alone, so an edit elsewhere in this package would leave stale kernels in
+use. The cache is therefore a folder named after a hash of everything that goes into the kernels.
 """
 
 import hashlib
@@ -26,11 +26,11 @@ from reference_impl import lanes, sources
 from reference_impl.methods import COLLIDE, CORRECTIONS, LAWS, ROTATIONS, Methods
 from reference_impl.parameters import (
     STEP_SIZE,
-    read_nothing,
     read_body,
     read_damping,
     read_floor,
     read_gravity,
+    read_nothing,
     read_quaternion,
     read_vector,
 )

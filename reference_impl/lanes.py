@@ -1,7 +1,7 @@
 """SIMD lanes: `WIDTH` bodies in one processor register, for the ensemble kernel.
 
-`Lanes` is a number to numba and a vector of doubles to LLVM. The kernels, written for one number, compile for it unchanged. Each operation is
-the IEEE operation in each lane, so a body in an ensemble has the same bits as alone. Nothing in this module runs in plain Python.
+`Lanes` is a number to numba and a vector of doubles to LLVM. The kernels, written for one number, compile for it unchanged. Each operation
+is the IEEE operation in each lane, so a body in an ensemble has the same bits as alone. Nothing in this module runs in plain Python.
 
 It is longer than other modules because numba must be given each operator, function and memory access of the new type.
 """

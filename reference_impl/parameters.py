@@ -163,7 +163,7 @@ def _decay(rates: Array, step_sizes: Array) -> Array:
 
 
 def _principal(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments, shape (B, 3), the one that differs most from the others last; rotations from their frames to the bodies', (B, 4)."""
+    """Principal moments, shape (B, 3), the most different one last, and rotations from their frames to the bodies', shape (B, 4)."""
     different, which = np.unique(inertia.reshape(-1, 9), axis=0, return_inverse=True)
     found = [_principal_of_one(matrix.reshape(3, 3)) for matrix in different]
     return np.array([moments for moments, _ in found])[which], np.array([axes for _, axes in found])[which]

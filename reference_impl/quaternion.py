@@ -59,8 +59,8 @@ def rotation_matrix(q):
 def to_world(q, a):
     """R a, from the body's frame to the world's.
 
-    Divided by q·q, which rounding leaves off 1, always to the same side: without the division, a spin that is transformed to the body and back
-    at every step would drift.
+    Divided by q·q, which rounding leaves off 1, always to the same side: without the division, a spin that is transformed to the body and
+    back at every step would drift.
     """
     return (rotation_matrix(q) @ a) / _square(q)
 

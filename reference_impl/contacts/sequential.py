@@ -3,14 +3,14 @@
 Each submerged vertex is to separate at e times its approach speed. Impulses accumulate, only push, and stay within the friction cone.
 
 Order: none claimed (see the package's docstring).
-Keeps: no submerged vertex approaches faster than `TOLERANCE` after a step that converged. At restitution above 0 it can add a little energy:
-a vertex that was separating does not limit the restitution of its neighbours.
+Keeps: no submerged vertex approaches faster than `TOLERANCE` after a step that converged. At restitution above 0 it can add a little
+energy: a vertex that was separating does not limit the restitution of its neighbours.
 Stops: the number of sweeps is limited, and a step that did not converge is reported. With friction of about 1 and above at several vertices
 a solution need not exist.
 Lanes: none. Each body needs its own number of sweeps, so the bodies of an ensemble run one after the other.
 Cost: about ten to a few hundred sweeps over the vertices a step.
-Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); M. Jean, The non-smooth contact dynamics method,
-CMAME 177 (1999).
+Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); M. Jean, The non-smooth contact dynamics
+method, CMAME 177 (1999).
 """
 
 import math

@@ -1,7 +1,7 @@
 """`correction=projection`: after the step, lift a body that has sunk below the floor; its velocities do not change.
 
-Wang's method corrects no position, so a body with restitution 0 sinks. The lift leaves the lowest vertex `PENETRATION_LEFT` below the floor,
-so that the strict inequality of eq 10 still detects the contact.
+Wang's method corrects no position, so a body with restitution 0 sinks. The lift leaves the lowest vertex `PENETRATION_LEFT` below the
+floor, so that the strict inequality of eq 10 still detects the contact.
 
 Order: none claimed; the lift is as large as the penetration that contact detection left.
 Keeps: a penetration of at most 1e-7 m at rest. Lifting adds potential energy, M g times the depth.

@@ -6,7 +6,8 @@
 Order: infinite; each step is exact to the rounding of its restart.
 Keeps: energy and L.
 Valid for: any |ω| dt.
-Lanes: none. The branches and iterations of the elliptic functions differ from body to body, so the bodies of an ensemble run one after the other.
+Lanes: none. The branches and iterations of the elliptic functions differ from body to body, so the bodies of an ensemble run one after the
+other.
 Cost: one set of elliptic functions, two integrals R_F and two to four R_J a step, by far the most of all rotations.
 Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; E. T. Whittaker, Analytical Dynamics, section 69; Carlson's integrals.
 """

@@ -2,8 +2,8 @@
 
     T = (m₁² + m₂²)/2I₁ + m₃²/2I₃   +   m₂²/2 (1/I₂ - 1/I₁)
 
-Order: 4, by Strang's splitting five times with Suzuki's steps. Exact for a symmetric body, because the axes are ordered so that I₁ and I₂ are
-the closest.
+Order: 4, by Strang's splitting five times with Suzuki's steps. Exact for a symmetric body, because the axes are ordered so that I₁ and I₂
+are the closest.
 Keeps: L in space, to rounding; energy oscillates and does not drift.
 Valid for: |ω| dt up to about 1.6.
 Cost: twenty turns about an axis a step, each with sines and cosines.

@@ -28,7 +28,7 @@ from comparisons.engines.registry import engine
 from comparisons.results.provenance import processor, versions
 from reference_impl import lanes
 from reference_impl.methods import ROTATIONS
-from reference_impl.simulate import usable_cores
+from reference_impl.threads import usable_cores
 
 Array = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """The method of Huamin Wang's lecture note "Rigid Body Dynamics", executable: arrays in, arrays out.
 
-It knows no scene and no engine. README.md beside this file is the ledger: equation, function, test.
+This package knows no scene and no engine. README.md in this folder lists for each equation its function and its test.
 """
 
 from reference_impl import sources  # noqa: F401  # isort: skip  # before anything that is compiled from them

@@ -1,4 +1,4 @@
-"""What moves and what acts on it: the public description, and the form that kernels take it in."""
+"""The body and the world that acts on it: the public description, and the form in which kernels take it."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,13 +15,13 @@ Array = NDArray[np.float64]
 class Body:
     """A rigid body: its mass, its inertia and the vertices that may touch the floor.
 
-    In an ensemble of B any of them may differ from body to body, given with one more axis, first, of length B.
+    In an ensemble of B bodies each attribute may have one more axis, first, of length B.
 
     Attributes:
         mass: M [kg], or shape (B,).
         inertia: I_body about the centre of mass, in the body frame [kg m²], shape (3, 3) or (B, 3, 3).
         points: Vertices from the centre of mass, in the body frame [m], shape (n, 3) or (B, n, 3).
-        radius: Rounding of the vertices [m], or shape (B,): 0 for the note's own; a ball is one point at its centre, rounded by R.
+        radius: Rounding radius of the vertices [m], or shape (B,): 0 in the lecture note; a ball is one point at its centre, rounded by R.
     """
 
     mass: float | Array
@@ -31,24 +31,24 @@ class Body:
 
 
 class Floor(NamedTuple):
-    """What the floor y = 0 does to a vertex that hits it. Each may differ from body to body, shape (B,)."""
+    """Contact parameters of the floor y = 0. Each is a number or of shape (B,)."""
 
     restitution: float | Array
-    """The note's µ, the field's e: separation speed over approach speed."""
+    """Separation speed over approach speed: µ in the lecture note, e elsewhere."""
     friction: float | Array
-    """Coulomb's coefficient: 0 for a frictionless floor (eq 15), infinity for one that sticks (eq 17)."""
+    """Coulomb's coefficient: 0 for a frictionless floor (eq 15), infinity for sticking (eq 17)."""
     rest_speed: float | Array = 0.0
-    """Normal speed [m/s] below which restitution counts as 0 (section 3.2); 0 switches the rule off."""
+    """Normal speed [m/s] below which restitution is 0 (section 3.2); 0 switches the rule off."""
 
 
 @dataclass(frozen=True)
 class World:
-    """What acts on a body. A part that is None is not modelled and costs nothing.
+    """The world that acts on a body. A part that is None is not modelled and costs nothing.
 
     Attributes:
         gravity: g [m/s²], shape (3,) or (B, 3).
         floor: The floor y = 0.
-        damping: Decay rates of velocity and angular velocity [1/s], each a number or of shape (B,); Algorithm 1's factors are
+        damping: Decay rates of velocity and angular velocity [1/s], each a number or of shape (B,); the factors of Algorithm 1 are
             c = exp(-rate dt).
     """
 
@@ -70,11 +70,11 @@ class KernelBody(NamedTuple):
     points: Array
     radius: float
     reach: float
-    """No part of the body is farther from its centre than this [m]."""
+    """Radius of a sphere about the centre that contains the body [m]."""
 
 
 class KernelDamping(NamedTuple):
-    """Algorithm 1's factors."""
+    """The damping factors of Algorithm 1."""
 
     linear: float
     angular: float

@@ -7,8 +7,8 @@ import math
 
 from reference_impl.vectors import compiled
 
-TINY = 1e-100  # where sn is as small as this it is its own tangent, and the square of cn/sn would overflow
-MOST_ROUNDS = 40  # each round gains a factor of 4 in accuracy; arguments 1e-300 and 1e300 apart take 500 halvings of the exponent
+SMALLEST_SINE = 1e-100  # below it sn equals its argument, and the square of cn/sn would overflow
+MAX_MEANS = 40  # of the arithmetic-geometric mean, which converges quadratically: a dozen suffice for m₁ down to 1e-300
 
 
 @compiled
@@ -17,12 +17,12 @@ def sn_cn_dn(u, m1):
     a, b = 1.0, math.sqrt(m1)
     c = 0.5 * (a + b)
     rounds = 0
-    while abs(a - b) > 1e-8 * a and rounds < MOST_ROUNDS:
+    while abs(a - b) > 1e-8 * a and rounds < MAX_MEANS:
         a, b = c, math.sqrt(a * b)
         c = 0.5 * (a + b)
         rounds += 1
     sine, cosine = math.sin(c * u), math.cos(c * u)
-    if abs(sine) < TINY:
+    if abs(sine) < SMALLEST_SINE:
         return sine / c, cosine, 1.0
     ratio, dn = cosine / sine, 1.0
     c = c * ratio
@@ -37,7 +37,7 @@ def sn_cn_dn(u, m1):
 
 @compiled
 def _means(m1, rounds):
-    """The arithmetic and geometric mean after some rounds; done again each time, because a kernel keeps no list."""
+    """The arithmetic and geometric mean after some rounds; recomputed on each call, because a kernel keeps no list."""
     a, b = 1.0, math.sqrt(m1)
     for _ in range(rounds):
         a, b = 0.5 * (a + b), math.sqrt(a * b)
@@ -46,11 +46,11 @@ def _means(m1, rounds):
 
 @compiled
 def r_f(x, y, z):
-    """Carlson's R_F of arguments of which one at most is 0."""
+    """Carlson's R_F; at most one argument is 0."""
     mean = (x + y + z) / 3.0
     off = max(abs(mean - x), abs(mean - y), abs(mean - z))
     fourth, mean0, x0, y0 = 1.0, mean, x, y
-    while off * fourth > 2.5e-3 * abs(mean):  # the series below is of sixth order: 2.5e-3^6 is rounding
+    while off * fourth > 2.5e-3 * abs(mean):  # the series below is of sixth order, and 2.5e-3^6 is below rounding
         root = math.sqrt(x * y) + math.sqrt(y * z) + math.sqrt(z * x)
         x, y, z, mean = 0.25 * (x + root), 0.25 * (y + root), 0.25 * (z + root), 0.25 * (mean + root)
         fourth *= 0.25
@@ -72,7 +72,7 @@ def r_c1(y):
 
 @compiled
 def r_j(x, y, z, p):
-    """Carlson's R_J for p > 0 and arguments of which one at most is 0."""
+    """Carlson's R_J for p > 0; at most one of x, y and z is 0."""
     mean = (x + y + z + 2.0 * p) / 5.0
     delta = (p - x) * (p - y) * (p - z)
     off = max(abs(mean - x), abs(mean - y), abs(mean - z), abs(mean - p))

@@ -1,4 +1,4 @@
-"""Mass and inertia: the note's eq 2 and 8, and the solids that engines build from a shape."""
+"""Mass and inertia: eq 2 and 8 of the lecture note, and the solids that engines build from a shape."""
 
 import math
 
@@ -14,7 +14,7 @@ def total_mass(masses: NDArray[np.float64]) -> float:
 def vertex_inertia(points: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Eq 8 with its masses: I_body = Σ mᵢ (pᵢᵀpᵢ 1 − pᵢpᵢᵀ).
 
-    The note prints the formula without mᵢ; masses of 1 give it as printed, whatever the body weighs.
+    The lecture note prints the formula without mᵢ; masses of 1 give it as printed, whatever mass the body has.
 
     Args:
         points: Vertices in the body frame, from the centre of mass [m], shape (n, 3).

@@ -1,7 +1,7 @@
 """Compiled loops over `step.advance`, one for each choice of methods and parts, cached on disk.
 
-numba's own cache looks at the file of the compiled function alone and would serve old physics after an edit elsewhere in this package.
-So kernels are kept in a folder named after everything that goes into them.
+numba invalidates its cache by the file of the compiled function alone, so an edit elsewhere in this package would leave stale kernels in
+use. The cache is therefore a folder named after a hash of everything that goes into the kernels.
 """
 
 import hashlib
@@ -23,14 +23,14 @@ from numba.core import config as numba_config
 from numpy.typing import NDArray
 
 from reference_impl import lanes, sources
-from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS, Methods
+from reference_impl.methods import COLLIDE, CORRECTIONS, LAWS, ROTATIONS, Methods
 from reference_impl.parameters import (
     STEP_SIZE,
-    nothing,
     read_body,
     read_damping,
     read_floor,
     read_gravity,
+    read_nothing,
     read_quaternion,
     read_vector,
 )
@@ -40,12 +40,12 @@ from reference_impl.vectors import compiled
 Array = NDArray[np.float64]
 config: Any = numba_config  # numba sets its attributes at run time, which its type hints do not know
 COMPILER_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "CPU_NAME", "CPU_FEATURES", "ENABLE_AVX", "DEBUGINFO_DEFAULT")
-KEPT_FOLDERS = 8
+MAX_CACHE_FOLDERS = 8
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What there is to model; what there is not is left out of the compiled step."""
+    """The parts that are modelled; the others are left out of the compiled step."""
 
     gravity: bool
     forces: bool
@@ -56,17 +56,18 @@ class Parts:
 
 @cache
 def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[..., int]:
-    """The loop that records each `every`-th state of the bodies of some blocks, and counts the steps whose contact was not solved.
+    """The loop that records each `every`-th state of the bodies of some blocks, and counts the steps whose contact did not converge.
 
-    Its arrays hold `width` bodies to a block, as `blocks` puts them: one (a number is then a float), or `lanes.WIDTH`.
+    Its arrays hold `width` bodies to a block, as `blocks` arranges them: one (a number is then a float), or `lanes.WIDTH`.
     """
-    gravity_of = read_gravity if parts.gravity else nothing
-    damping_of = read_damping if parts.damping else nothing
-    floor_of = read_floor if parts.floor else nothing
-    turn = ROTATIONS[methods.rotation] if parts.turning else None
-    law = LAWS[methods.law]
-    collide = CONTACTS[methods.contact][methods.law]
-    correct = CORRECTIONS[methods.correction]
+    gravity_of = read_gravity if parts.gravity else read_nothing
+    damping_of = read_damping if parts.damping else read_nothing
+    floor_of = read_floor if parts.floor else read_nothing
+    turn = ROTATIONS[methods.rotation].turn if parts.turning else None
+    law = LAWS[methods.law].impulse
+    collide = COLLIDE[methods.contact][methods.law]
+    correction = CORRECTIONS[methods.correction]
+    correct = None if correction is None else correction.correct
     load, rows_of, record = (_load, _rows_of, _record) if width == 1 else (lanes.load, lanes.rows_of, lanes.record)
     forces_of = rows_of if parts.forces else _no_forces
 
@@ -87,15 +88,15 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
             record(recorded, block, 0, x, q, v, w)
             for row in range(1, recorded.shape[1]):
                 for _ in range(every):
-                    x, q, v, w, solved = advance(x, q, v, w, dt, body, gravity, on_vertices, damping, floor, turn, collide, law, correct)
-                    unsolved += not solved
+                    x, q, v, w, converged = advance(x, q, v, w, dt, body, gravity, on_vertices, damping, floor, turn, collide, law, correct)
+                    unsolved += not converged
                 record(recorded, block, row, x, q, v, w)
         return unsolved
 
     return compile_cached(fill)
 
 
-# A body alone: its block is itself, its numbers are floats.
+# A block of one body, whose numbers are floats.
 
 
 @compiled
@@ -123,19 +124,19 @@ def _record(recorded, block, row, x, q, v, w):
 
 
 def blocks(array: Array, width: int) -> Array:
-    """The numbers of bodies, shape (B, …), as a kernel of that width takes them."""
+    """An array of shape (B, …), arranged as a kernel of that width takes it."""
     return np.ascontiguousarray(array) if width == 1 else lanes.side_by_side(array)
 
 
 def compile_cached(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a kernel: IEEE rules (1/0 is inf), no reassociation, Python's lock let go, kept on disk where that can be written."""
+    """Compile a kernel: IEEE rules (1/0 is inf), no reassociation, without the GIL, cached on disk where that is writable."""
     with _cache_folder() as writable:
         return njit(nogil=True, error_model="numpy", cache=writable)(function)
 
 
 @contextmanager
 def _cache_folder() -> Iterator[bool]:
-    """Point numba at this package's own folder while a kernel is declared; the user's setting is left as it was."""
+    """Set numba's cache directory to this package's folder while a kernel is declared, then restore the user's setting."""
     with _declaring:
         kept = config.CACHE_DIR
         base = Path(kept) if kept else sources.PACKAGE / "__pycache__"
@@ -150,16 +151,16 @@ def _cache_folder() -> Iterator[bool]:
             config.CACHE_DIR = kept
 
 
-_declaring = threading.Lock()  # numba's setting is one for all threads
+_declaring = threading.Lock()  # all threads share numba's setting
 
 
 def _make_room(folder: Path) -> None:
-    """Make the folder, and remove those of sources and settings that have gone out of use."""
+    """Make the folder, and remove the oldest folders of other sources and settings."""
     if folder.is_dir():
         return
     folder.mkdir(parents=True)
     others = sorted(folder.parent.glob("dropspin-*"), key=lambda path: path.stat().st_mtime)
-    for stale in others[:-KEPT_FOLDERS]:
+    for stale in others[:-MAX_CACHE_FOLDERS]:
         shutil.rmtree(stale, ignore_errors=True)
 
 

@@ -1,7 +1,9 @@
 """SIMD lanes: `WIDTH` bodies in one processor register, for the ensemble kernel.
 
-`Lanes` is a number to numba and a vector of doubles to LLVM. The physics, written for one number, compiles for it unchanged: each
-operation is the IEEE one, lane by lane, so a body in an ensemble gets the bits it gets alone. Nothing here runs in plain Python.
+`Lanes` is a number to numba and a vector of doubles to LLVM. The kernels, written for one number, compile for it unchanged. Each operation
+is the IEEE operation in each lane, so a body in an ensemble has the same bits as alone. Nothing in this module runs in plain Python.
+
+It is longer than other modules because numba must be given each operator, function and memory access of the new type.
 """
 
 import math
@@ -26,7 +28,7 @@ Array = NDArray[np.float64]
 
 FEATURES = cpu_target.target_context.codegen().magic_tuple()[2].split(",")  # of the processor that numba compiles for
 WIDTH = 16 if "+avx512f" in FEATURES else 8 if "+avx" in FEATURES else 4
-"""Two registers full: while one operation is under way, the next can start."""
+"""Two registers: while one operation is in progress, the next can start."""
 
 
 class LanesType(NumberLike):
@@ -85,7 +87,7 @@ class _LaneRowsModel(models.StructModel):
         super().__init__(manager, numba_type, [("data", types.CPointer(types.float64)), ("count", types.intp)])
 
 
-# Numbers among lanes: a constant of the physics holds for every body.
+# Conversion of numbers to lanes: a constant applies to every body.
 
 
 def _splat(builder: ir.IRBuilder, value: ir.Value, vector: ir.VectorType) -> ir.Value:
@@ -114,11 +116,11 @@ def _vector_to_lanes(context: Any, builder: Any, source: Any, target: Any, value
     return context.make_tuple(builder, target, [_splat(builder, component, VECTOR) for component in cgutils.unpack_tuple(builder, value)])
 
 
-# Operators, one instruction each.
+# Operators, of one instruction each.
 
 
-def _teach(symbol: Callable[..., Any], operands: int, operand: Any, result: Any, build: Callable[..., ir.Value]) -> None:
-    """Let compiled code use `symbol` on lanes or masks, mixed with numbers as need be."""
+def _register_operator(symbol: Callable[..., Any], operands: int, operand: Any, result: Any, build: Callable[..., ir.Value]) -> None:
+    """Make compiled code accept the operator `symbol` on lanes or masks, mixed with numbers."""
 
     class Template(AbstractTemplate):
         def generic(self, arguments: tuple[types.Type, ...], keywords: dict[str, types.Type]) -> Any:
@@ -137,18 +139,18 @@ def _comparison(sign: str) -> Callable[..., ir.Value]:
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
-_teach(operator.add, 2, LANES, LANES, lambda builder, a, b: builder.fadd(a, b))
-_teach(operator.sub, 2, LANES, LANES, lambda builder, a, b: builder.fsub(a, b))
-_teach(operator.mul, 2, LANES, LANES, lambda builder, a, b: builder.fmul(a, b))
-_teach(operator.truediv, 2, LANES, LANES, lambda builder, a, b: builder.fdiv(a, b))
-_teach(operator.neg, 1, LANES, LANES, lambda builder, a: builder.fneg(a))
-_teach(operator.lt, 2, LANES, MASK, _comparison("<"))
-_teach(operator.le, 2, LANES, MASK, _comparison("<="))
-_teach(operator.gt, 2, LANES, MASK, _comparison(">"))
-_teach(operator.ge, 2, LANES, MASK, _comparison(">="))
-_teach(operator.eq, 2, LANES, MASK, _comparison("=="))
-_teach(operator.and_, 2, MASK, MASK, lambda builder, a, b: builder.and_(a, b))
-_teach(operator.or_, 2, MASK, MASK, lambda builder, a, b: builder.or_(a, b))
+_register_operator(operator.add, 2, LANES, LANES, lambda builder, a, b: builder.fadd(a, b))
+_register_operator(operator.sub, 2, LANES, LANES, lambda builder, a, b: builder.fsub(a, b))
+_register_operator(operator.mul, 2, LANES, LANES, lambda builder, a, b: builder.fmul(a, b))
+_register_operator(operator.truediv, 2, LANES, LANES, lambda builder, a, b: builder.fdiv(a, b))
+_register_operator(operator.neg, 1, LANES, LANES, lambda builder, a: builder.fneg(a))
+_register_operator(operator.lt, 2, LANES, MASK, _comparison("<"))
+_register_operator(operator.le, 2, LANES, MASK, _comparison("<="))
+_register_operator(operator.gt, 2, LANES, MASK, _comparison(">"))
+_register_operator(operator.ge, 2, LANES, MASK, _comparison(">="))
+_register_operator(operator.eq, 2, LANES, MASK, _comparison("=="))
+_register_operator(operator.and_, 2, MASK, MASK, lambda builder, a, b: builder.and_(a, b))
+_register_operator(operator.or_, 2, MASK, MASK, lambda builder, a, b: builder.or_(a, b))
 
 
 # Functions.
@@ -183,8 +185,8 @@ def _any(typingctx: Any, mask: Any) -> Any:
     return types.boolean(MASK), build
 
 
-def _teach_function(symbol: Callable[..., Any], name: str) -> None:
-    """Let compiled code call LLVM's function of that name; sine and cosine become a call of the C library for each lane."""
+def _register_function(symbol: Callable[..., Any], name: str) -> None:
+    """Make compiled code call LLVM's function of that name; sine and cosine become one call of the C library for each lane."""
 
     @intrinsic
     def call(typingctx: Any, a: Any) -> Any:
@@ -200,10 +202,10 @@ def _teach_function(symbol: Callable[..., Any], name: str) -> None:
         return (lambda a: call(a)) if a is LANES else None
 
 
-_teach_function(math.sqrt, "llvm.sqrt")
-_teach_function(math.sin, "llvm.sin")
-_teach_function(math.cos, "llvm.cos")
-_teach_function(abs, "llvm.fabs")
+_register_function(math.sqrt, "llvm.sqrt")
+_register_function(math.sin, "llvm.sin")
+_register_function(math.cos, "llvm.cos")
+_register_function(abs, "llvm.fabs")
 
 
 @overload(max)
@@ -225,7 +227,7 @@ def _float_lanes(a):
 
 
 def side_by_side(array: Array) -> Array:
-    """Rows of bodies, shape (B, …, k), as blocks of lanes, shape (blocks, …, k * WIDTH); the last body fills up the last block."""
+    """Rows of bodies, shape (B, …, k), as blocks of lanes, shape (blocks, …, k * WIDTH); copies of the last body fill the last block."""
     blocks = -(-len(array) // WIDTH)
     filled = array if blocks * WIDTH == len(array) else array[np.minimum(np.arange(blocks * WIDTH), len(array) - 1)]
     lanes_last = filled.reshape(blocks, WIDTH, *array.shape[1:]).transpose(0, *range(2, array.ndim + 1), 1)
@@ -246,7 +248,7 @@ def rows_of(array, block):
 
 @compiled
 def record(recorded, block, row, x, q, v, w):
-    """Write the states of a block's bodies, recorded of shape (B, n, 13), B not always a multiple of the width."""
+    """Write the states of the bodies of a block to `recorded`, shape (B, n, 13); B need not be a multiple of the width."""
     bodies = min(WIDTH, recorded.shape[0] - block * WIDTH)
     first = (block * WIDTH * recorded.shape[1] + row) * 13
     _scatter(recorded, first, recorded.shape[1] * 13, bodies, (x.x, x.y, x.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z))

@@ -1,4 +1,4 @@
-"""What may differ from body to body: checked, packed into rows of numbers, and read back by the kernels."""
+"""Parameters that may differ from body to body: checked, packed into rows of numbers, and read by the kernels."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -14,34 +14,34 @@ from reference_impl.vectors import Mat3, Quat, Vec3, compiled
 Array = NDArray[np.float64]
 Test = Callable[[Array], NDArray[np.bool_]]
 
-# The first column of each quantity: `pack` writes them in this order, the readers at the end of this file read them.
+# The first column of each quantity: `pack` writes them in this order, the functions at the end of this file read them.
 STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, RADIUS, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 36
 FRICTION = FLOOR + 1
 
 
 class Parameters(NamedTuple):
-    """Bodies in their worlds, at their step sizes: one row for all, or one for each."""
+    """Bodies in their worlds with their time steps: one row for all, or one for each."""
 
     columns: Array
     """Shape (1, 37) or (B, 37)."""
     points: Array
     """Vertices [m], shape (1, n, 3) or (B, n, 3)."""
     is_ensemble: bool
-    """Whether anything was given for each body, even if B is 1."""
+    """Whether any argument was given for each body, even if B is 1."""
 
 
 def pack(body: Body, world: World, dt: float | Array) -> Parameters:
     """A body in a world, or an ensemble of them.
 
     Raises:
-        ValueError: A number is out of its range, a shape does not fit, or two quantities are of ensembles of different size.
+        ValueError: A number is out of range, a shape is wrong, or two arguments are for ensembles of different size.
     """
     quantities = _quantities(body, world, dt)
     given = {name: checked(name, *quantity) for name, quantity in quantities.items()}
     is_ensemble = any(np.ndim(values) > len(shape) for values, shape, *_ in quantities.values())
     size = ensemble_size(given)
     points = given.pop("points")
-    # The margin covers the rounding of R: a vertex must never reach the floor before the bounding sphere does.
+    # The margin covers the rounding of R: no vertex may reach the floor before the bounding sphere does.
     reach = (np.sqrt(np.max(np.sum(points**2, axis=2), axis=1)) + given["radius"]) * (1.0 + 1e-12)
     inertia = given["inertia"]
     moments, axes = _principal(inertia)
@@ -66,7 +66,7 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
 
 
 def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]]:
-    """What was given, the shape of one body's, what is allowed, in words and as a test."""
+    """Each argument with the shape for one body, the allowed values in words, and a test for them."""
     floor = world.floor or Floor(0.0, 0.0)
     gravity = np.zeros(3) if world.gravity is None else world.gravity
     if world.damping is not None and len(world.damping) != 2:
@@ -90,7 +90,7 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
 
 
 def is_finite(values: Array) -> NDArray[np.bool_]:
-    """Whether all numbers of a body are, for each body."""
+    """Whether all numbers of a body are finite, for each body."""
     return np.logical_and.reduce(np.isfinite(values).reshape(len(values), -1), axis=1)
 
 
@@ -102,24 +102,25 @@ def _is_not_negative(values: Array) -> NDArray[np.bool_]:
     return is_finite(values) & (values >= 0.0)
 
 
-SINGULAR = 1e-13
-"""Moments this much smaller than the largest are the rounding of 0: points on one line have none about it."""
-SMALLEST = 1e-290  # kg m²; the inverse must be a number too
+MIN_MOMENT_RATIO = 1e-13
+"""Least moment over the largest: a smaller one is 0 but for rounding, as about the line of collinear points."""
+MIN_LARGEST_MOMENT = 1e-290  # kg m²; so that the inverse is finite too
+MAX_ASYMMETRY = 1e-12  # of the largest entry
 
 
 def _is_inertia(matrices: Array) -> NDArray[np.bool_]:
     usable = np.where(is_finite(matrices)[:, np.newaxis, np.newaxis], matrices, -np.eye(3))
     lowest = np.linalg.eigvalsh(usable)[:, 0]
-    lopsided = np.abs(usable - usable.transpose(0, 2, 1)).max(axis=(1, 2))
+    asymmetry = np.abs(usable - usable.transpose(0, 2, 1)).max(axis=(1, 2))
     highest = np.abs(usable).max(axis=(1, 2))
-    return (lowest > SINGULAR * highest) & (highest > SMALLEST) & (lopsided <= 1e-12 * highest)
+    return (lowest > MIN_MOMENT_RATIO * highest) & (highest > MIN_LARGEST_MOMENT) & (asymmetry <= MAX_ASYMMETRY * highest)
 
 
 def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, holds: Test) -> Array:
-    """What was given for one body (of that shape) or for each (one more axis, first), as an array with that axis, shape (1 or B, …).
+    """An argument for one body (of that shape) or for each (one more axis, first) as an array with that axis, shape (1 or B, …).
 
     Raises:
-        ValueError: It has another shape, or is not as allowed; of an ensemble the text says whose.
+        ValueError: The shape or a value is not allowed; in an ensemble the text names the body.
     """
     given = _numbers(name, values, allowed)
     array = given[np.newaxis] if given.ndim == len(shape) else given
@@ -133,7 +134,7 @@ def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, 
 
 
 def _numbers(name: str, values: ArrayLike, allowed: str) -> Array:
-    """A copy of what was given, so that what becomes of the caller's array does not matter."""
+    """A copy of the argument, so that later changes of the caller's array have no effect."""
     try:
         given = np.asarray(values)
     except ValueError:  # rows of different length
@@ -144,25 +145,25 @@ def _numbers(name: str, values: ArrayLike, allowed: str) -> Array:
 
 
 def ensemble_size(quantities: Mapping[str, Array]) -> int:
-    """The number of bodies that quantities of shape (1, …) or (B, …) are for.
+    """The number of bodies B of arguments of shape (1, …) or (B, …).
 
     Raises:
-        ValueError: There are two numbers. The text names both.
+        ValueError: Two arguments have different B. The text names both.
     """
     sizes = {len(values): name for name, values in quantities.items() if len(values) > 1}
     if len(sizes) > 1:
         listed = " but ".join(f"{size} of {name}" for size, name in sizes.items())
-        raise ValueError(f"ensemble: got {listed}; what differs from body to body must be given for each of the same number of bodies")
+        raise ValueError(f"ensemble: got {listed}; all arguments that differ from body to body must be for the same number of bodies")
     return next(iter(sizes), 1)
 
 
 def _decay(rates: Array, step_sizes: Array) -> Array:
-    """Algorithm 1's factors. By `math`, whose last bit does not depend on the length of an array as NumPy's may."""
+    """Algorithm 1's factors, by `math`, because the last bit of NumPy's exponential may depend on the length of the array."""
     return np.array([math.exp(-rate * dt) for rate, dt in zip(*np.broadcast_arrays(rates, step_sizes), strict=True)])
 
 
 def _principal(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments, the odd one out last, shape (…, 3), and the rotations from their frames to the bodies', shape (…, 4)."""
+    """Principal moments, shape (B, 3), the most different one last, and rotations from their frames to the bodies', shape (B, 4)."""
     different, which = np.unique(inertia.reshape(-1, 9), axis=0, return_inverse=True)
     found = [_principal_of_one(matrix.reshape(3, 3)) for matrix in different]
     return np.array([moments for moments, _ in found])[which], np.array([axes for _, axes in found])[which]
@@ -176,17 +177,17 @@ def _principal_of_one(inertia: Array) -> tuple[Array, Quat]:
     inverse = 1.0 / moments
     gaps = [abs(inverse[(axis + 1) % 3] - inverse[(axis + 2) % 3]) for axis in range(3)]
     odd = int(np.argmin(gaps))
-    order = [(odd + 1) % 3, (odd + 2) % 3, odd]  # a cyclic permutation: no axis changes its sense
+    order = [(odd + 1) % 3, (odd + 2) % 3, odd]  # a cyclic permutation keeps the axes right-handed
     axes = axes[:, order] * np.linalg.det(axes)
     return moments[order], from_matrix(Mat3(*(Vec3(*map(float, row)) for row in axes)))
 
 
-# Reading, by a `load(columns, block, column)` that gives a number, or the lanes of many bodies.
+# Reading, by a `load(columns, block, column)` that returns a number, or the lanes of many bodies.
 
 
 @compiled
 def read_body(load, columns, points, block):
-    """The body, or bodies, of a block."""
+    """The body, or the bodies, of a block."""
     return KernelBody(
         load(columns, block, MASS),
         _read_matrix(load, columns, block, INERTIA),
@@ -207,7 +208,7 @@ def read_gravity(load, columns, block):
 
 @compiled
 def read_damping(load, columns, block):
-    """The factors of a step."""
+    """Algorithm 1's damping factors."""
     return KernelDamping(load(columns, block, DAMPING), load(columns, block, DAMPING + 1))
 
 
@@ -219,13 +220,13 @@ def read_floor(load, columns, block):
 
 @compiled
 def read_vector(load, columns, block, first):
-    """Three columns."""
+    """The vector in three columns."""
     return Vec3(load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2))
 
 
 @compiled
 def read_quaternion(load, columns, block, first):
-    """Four columns."""
+    """The quaternion in four columns."""
     return Quat(
         load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2), load(columns, block, first + 3)
     )
@@ -241,6 +242,6 @@ def _read_matrix(load, columns, block, first):
 
 
 @compiled
-def nothing(load, columns, block):
+def read_nothing(load, columns, block):
     """A part that the world does not have."""
     return None

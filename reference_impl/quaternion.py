@@ -1,4 +1,4 @@
-"""Orientation: the quaternion algebra of the note's section 2.1 (eq 3 to 5)."""
+"""Orientation: the quaternion algebra of section 2.1 of the lecture note (eq 3 to 5)."""
 
 import math
 
@@ -18,13 +18,13 @@ def product(a, b):
 
 @compiled
 def conjugate(q):
-    """The rotation the other way round."""
+    """The inverse rotation, for a unit quaternion."""
     return Quat(-q.x, -q.y, -q.z, q.w)
 
 
 @compiled
 def normalise(q):
-    """Eq 3: back to unit length."""
+    """Eq 3: the quaternion of unit length."""
     return q / math.sqrt(_square(q))
 
 
@@ -59,7 +59,8 @@ def rotation_matrix(q):
 def to_world(q, a):
     """R a, from the body's frame to the world's.
 
-    Divided by q·q, which rounding leaves a little off 1, always to the same side: a spin that went to and fro at every step would drift.
+    Divided by q·q, which rounding leaves off 1, always to the same side: without the division, a spin that is transformed to the body and
+    back at every step would drift.
     """
     return (rotation_matrix(q) @ a) / _square(q)
 

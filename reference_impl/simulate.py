@@ -1,11 +1,8 @@
-"""The Python boundary: flat float64 arrays in and out, value types in between."""
+"""The Python interface: arguments are checked, converted and given to a kernel; flat float64 arrays in and out."""
 
 import math
 import operator
-import os
 import warnings
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
@@ -16,12 +13,14 @@ from reference_impl.body import Body, World
 from reference_impl.kernels import Parts, blocks, config, recording_kernel
 from reference_impl.methods import Methods
 from reference_impl.parameters import FRICTION, checked, ensemble_size, is_finite, pack
+from reference_impl.state import ORIENTATION, SPIN
+from reference_impl.threads import share_out
 
 Array = NDArray[np.float64]
 
 
 class UnsolvedContact(RuntimeWarning):
-    """Some steps ended before the impulses of `contact=sequential` had settled."""
+    """In some steps the impulses of `contact=sequential` did not converge."""
 
 
 def step(
@@ -32,22 +31,22 @@ def step(
     forces: ArrayLike | None = None,
     methods: Methods | None = None,
 ) -> Array:
-    """Advance one state, or an ensemble of them, by one step of the note's Algorithm 1.
+    """Advance one state, or an ensemble of them, by one step of Algorithm 1 of the lecture note.
 
     Args:
-        states: Position [m], orientation [x, y, z, w] (brought to length 1), velocity [m/s], angular velocity [rad/s], shape (13,) or
-            (B, 13).
+        states: Position [m], orientation [x, y, z, w] (of any length; it is normalised), velocity [m/s], angular velocity [rad/s],
+            shape (13,) or (B, 13).
         body: The body, or an ensemble of B.
         world: What acts on it.
-        dt: Time step [s], one for all or shape (B,).
-        forces: Force on each vertex, in the world frame [N], shape (n, 3) or (B, n, 3) (eq 9). None: none.
-        methods: What stands in place of the note's parts. None: the note, literally.
+        dt: Time step [s], a number or shape (B,).
+        forces: Force on each vertex, in the world frame [N], shape (n, 3) or (B, n, 3) (eq 9). None: no forces.
+        methods: The method at each place of the algorithm. None: those of the lecture note.
 
     Returns:
         The next states, shape (13,) or (B, 13).
 
     Raises:
-        ValueError: An argument is no number, has the wrong shape, or describes no body. The text says which.
+        ValueError: An argument is not a number, has the wrong shape, or describes no possible body. The text names it.
 
     Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithms 1 and 2.
     """
@@ -69,19 +68,19 @@ def simulate(
 ) -> Array:
     """Advance one state, or an ensemble of them, by many steps, recording each `every`-th.
 
-    Whatever is given for each of B bodies (states, masses, step sizes, …) makes it an ensemble of B; what is given once holds for all. A
-    body moves in an ensemble as it does alone, to the last bit, for any number of threads.
+    An argument that is given for each of B bodies (states, masses, time steps, …) makes it an ensemble of B; an argument that is given
+    once applies to all. A body moves in an ensemble exactly as it does alone, to the last bit, for any number of threads.
 
     Args:
         states: As in `step`, shape (13,) or (B, 13).
         body: The body, or an ensemble of B.
         world: What acts on it.
-        dt: Time step [s], one for all or shape (B,).
+        dt: Time step [s], a number or shape (B,).
         steps: Number of steps.
-        every: Steps between two rows of the result. Left-over steps at the end are not taken.
+        every: Steps between two rows of the result. A remainder of steps at the end is not taken.
         methods: As in `step`.
-        threads: How many threads share an ensemble. None: as many as this process may use processors, where that saves time. Ctrl-C
-            takes effect between blocks of bodies; one body runs to its end.
+        threads: Number of threads that share an ensemble. None: as many as this process may use processors, where that saves time.
+            Ctrl-C takes effect between blocks of bodies; one body runs to its end.
 
     Returns:
         The states, the start first, shape (1 + steps // every, 13) or (B, 1 + steps // every, 13).
@@ -99,10 +98,10 @@ def simulate(
 
 
 class Simulator:
-    """Bodies in a world, checked and converted once, for who simulates them many times over.
+    """Bodies in a world, checked and converted once, for many simulations.
 
     Attributes:
-        unsolved_steps: In how many steps so far the impulses of `contact=sequential` had not settled.
+        unsolved_steps: Number of steps so far in which the impulses of `contact=sequential` did not converge.
 
     Raises:
         ValueError: As in `step`.
@@ -114,12 +113,12 @@ class Simulator:
         if world.floor is not None:
             _assert_law_fits(self._methods, self._parameters.columns[:, FRICTION])
         self._world = world
-        self._upright_ball = _falls_upright(body, world)
+        self._can_fall_without_turning = _can_fall_without_turning(body, world)
         self._packed: dict[int, list[Array]] = {}
         self.unsolved_steps = 0
 
     def run(self, states: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None, threads: int | None = None) -> Array:
-        """States from `states` on: the arguments of `simulate`, and the forces of `step`; shape (…, 1 + steps // every, 13)."""
+        """The states from `states` on, shape (…, 1 + steps // every, 13); arguments as in `simulate`, and `forces` as in `step`."""
         columns, points, is_ensemble = self._parameters
         starts = checked("state", states, (13,), "finite numbers, the orientation not the zero quaternion", _is_state)
         on_vertices = None if forces is None else checked("forces", forces, points.shape[1:], "finite numbers, in N", is_finite)
@@ -130,44 +129,19 @@ class Simulator:
         starts = _with_unit_orientation(starts)
         if len(starts) < size:
             starts = np.broadcast_to(starts, (size, 13))
-        turning = on_vertices is not None or not (self._upright_ball and _is_without_spin(starts, self._world))
+        turning = on_vertices is not None or not (self._can_fall_without_turning and _is_without_spin(starts, self._world))
         world = self._world
         parts = Parts(world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning)
-        width = lanes.WIDTH if size > 1 and self._methods.go_side_by_side and not config.DISABLE_JIT else 1
+        width = lanes.WIDTH if size > 1 and self._methods.runs_in_lanes and not config.DISABLE_JIT else 1
         recorded = np.empty((size, 1 + steps // every, 13))
         if width not in self._packed:
             self._packed[width] = [blocks(columns, width), blocks(points, width)]
         packed = (blocks(starts, width), *self._packed[width], None if on_vertices is None else blocks(on_vertices, width))
         kernel = recording_kernel(self._methods, parts, width)
         work = steps * width
-        self.unsolved_steps += _share_out(partial(kernel, recorded, *packed, every), -(-size // width), work, threads)
+        self.unsolved_steps += share_out(partial(kernel, recorded, *packed, every), -(-size // width), work, threads)
         is_alone = not is_ensemble and np.ndim(states) == 1 and (forces is None or np.ndim(forces) == 2)
         return recorded[0] if is_alone else recorded
-
-
-def usable_cores() -> int:
-    """How many processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-AT_A_TIME = 3_000_000
-"""Steps, of all its bodies, that a thread takes at a time: few enough to share the work evenly, and to stop soon at Ctrl-C."""
-WORTH_A_THREAD = 300_000
-"""Steps, of all bodies, below which starting threads takes longer than they save."""
-
-
-def _share_out(fill: Callable[[int, int], int], count: int, work: int, threads: int | None) -> int:
-    """Fill all blocks, each of so much work, some at a time, and add up what the kernel counted."""
-    if count == 1:
-        return fill(0, 1)
-    threads = threads or (usable_cores() if count * work > WORTH_A_THREAD else 1)
-    each = min(max(1, AT_A_TIME // max(work, 1)), -(-count // threads))
-    firsts = range(0, count, each)
-    lasts = [min(first + each, count) for first in firsts]
-    if threads == 1:
-        return sum(map(fill, firsts, lasts))
-    with ThreadPoolExecutor(threads) as pool:
-        return sum(pool.map(fill, firsts, lasts))
 
 
 def _warn_if_unsolved(simulator: Simulator, recorded: Array, steps: int) -> None:
@@ -178,17 +152,17 @@ def _warn_if_unsolved(simulator: Simulator, recorded: Array, steps: int) -> None
 
 
 def _is_state(states: Array) -> NDArray[np.bool_]:
-    return is_finite(states) & states[:, 3:7].any(axis=1)
+    return is_finite(states) & states[:, ORIENTATION].any(axis=1)
 
 
 def _with_unit_orientation(states: Array) -> Array:
-    """The states with quaternions of length 1; those that are, to rounding, stay as they are to the last bit."""
-    q = states[:, 3:7]
+    """The states with quaternions of length 1; quaternions that have it to rounding do not change by a bit."""
+    q = states[:, ORIENTATION]
     if (np.abs(np.einsum("ij,ij->i", q, q) - 1.0) < 1e-14).all():
         return states
-    largest = np.abs(q).max(axis=1, keepdims=True)  # first, so that no square is beyond what a number holds
+    largest = np.abs(q).max(axis=1, keepdims=True)  # scaled first, so that no square overflows
     scaled = q / largest
-    states[:, 3:7] = scaled / np.sqrt(np.sum(scaled * scaled, axis=1, keepdims=True))
+    states[:, ORIENTATION] = scaled / np.sqrt(np.sum(scaled * scaled, axis=1, keepdims=True))
     return states
 
 
@@ -204,19 +178,19 @@ def _whole(name: str, value: int, least: int) -> int:
 
 def _assert_law_fits(methods: Methods, friction: Array) -> None:
     between = np.extract((friction > 0.0) & np.isfinite(friction), friction)
-    if len(between) and methods.law not in ("normal", "coulomb"):
-        raise ValueError(f"law {methods.law!r} knows friction 0 and infinity, got {between[0]:g}; use law='coulomb'")
+    if len(between) and not methods.takes_any_friction:
+        raise ValueError(f"friction: got {between[0]:g}; law {methods.law!r} takes 0 and infinity only; use law='coulomb'")
 
 
-def _falls_upright(body: Body, world: World) -> bool:
-    """Balls that neither a vertex nor gravity along a floor that grips can turn."""
+def _can_fall_without_turning(body: Body, world: World) -> bool:
+    """Whether the bodies are balls that only their own spin or sliding can turn: no gravity along a floor with friction."""
     is_ball = np.all(np.asarray(body.radius) > 0.0) and not np.any(body.points)
     return bool(is_ball and (not _grips(world) or world.gravity is None or not np.any(np.asarray(world.gravity)[..., [0, 2]])))
 
 
 def _is_without_spin(states: Array, world: World) -> bool:
-    """And that neither spin nor slide: nothing turns them at all, so turning is left out."""
-    return not np.any(states[:, 10:13]) and not (_grips(world) and np.any(states[:, [7, 9]]))
+    """Whether no body spins, nor slides on a floor with friction; such balls never turn, and the rotation is left out."""
+    return not np.any(states[:, SPIN]) and not (_grips(world) and np.any(states[:, [7, 9]]))
 
 
 def _grips(world: World) -> bool:

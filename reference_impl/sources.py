@@ -1,6 +1,6 @@
-"""What the package's kernels are compiled from, taken down before any of it is imported.
+"""A hash of the package's sources, taken before any of them is imported.
 
-An edit between the import and the first compilation must not file old code under the new text's name.
+Without it, an edit between the import and the first compilation would cache kernels of the old code under the hash of the new one.
 """
 
 import hashlib

@@ -1,16 +1,22 @@
-"""One time step: the note's Algorithm 1, line by line.
+"""One time step: Algorithm 1 of the lecture note, line by line.
 
-A part that is None (no gravity, no forces, no damping, no floor, no rotation, no correction) is left out of the compiled step.
+A part that is None (gravity, forces, damping, floor, rotation or correction) is left out of the compiled step.
+
+Order: 1 for the translation under gravity, as semi-implicit Euler.
+Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithm 1.
 """
 
 from reference_impl.quaternion import rotation_matrix
 from reference_impl.vectors import Vec3, any_, compiled, cross, row, transpose
 
+TRANSLATION_ORDER = 1.0
+TRANSLATION_DISCRETISATION = "semi-implicit Euler"
+
 
 @compiled
 def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, turn, collide, law, correct):
-    """The state (x, q, v, ω) one step of dt later, and whether the contact was solved."""
-    solved = True
+    """The state (x, q, v, ω) after one step of dt, and whether the contact iteration converged."""
+    converged = True
     if gravity is not None:
         v = v + dt * gravity
     if forces is not None:
@@ -19,14 +25,14 @@ def advance(x, q, v, w, dt, body, gravity, forces, damping, floor, turn, collide
         v = damping.linear * v
         w = damping.angular * w
     if floor is not None:
-        if any_(x.y < body.reach):  # else no vertex can be below the floor
-            v, w, solved = collide(x, q, v, w, body, floor, law)
+        if any_(x.y < body.reach):  # otherwise no vertex can be below the floor
+            v, w, converged = collide(x, q, v, w, body, floor, law)
     x = x + dt * v  # eq 1: with the new velocity
     if turn is not None:
-        q, w = turn(q, w, dt, body)  # eq 6, or one of its improvements
+        q, w = turn(q, w, dt, body)  # eq 6, or the rotation chosen instead
     if correct is not None:
         x = correct(x, q, body)
-    return x, q, v, w, solved
+    return x, q, v, w, converged
 
 
 @compiled

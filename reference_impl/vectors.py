@@ -1,8 +1,8 @@
 """The value types that the equations are written in: `Vec3`, `Quat`, `Mat3`.
 
-Each is a named tuple with operators, so that a kernel line reads as the note prints it: `v + dt * g`,
-`R @ I_body @ transpose(R)`. An operator is one plain function: a method calls it in Python and numba compiles the same
-text, so interpreted and compiled arithmetic round alike.
+Each is a named tuple with operators, so that a line of a kernel reads as in the lecture note: `v + dt * g`, `R @ I_body @ transpose(R)`. An
+operator is one plain function: the method of the class calls it in Python, and numba compiles the same source, so that interpreted and
+compiled arithmetic round alike.
 """
 
 import operator
@@ -13,9 +13,9 @@ from numba import types
 from numba.extending import overload, register_jitable
 
 compiled = register_jitable(forceinline=True)
-"""Marks a function of kernel values: plain Python when called from Python, compiled into the very loop of any kernel that calls it.
+"""Decorates a function of kernel values: plain Python when called from Python, inlined into the loop of any kernel that calls it.
 
-Into the loop, because a call would hand over the state and the body, some sixty numbers, by way of memory: half of a step's time.
+A call that is not inlined passes the state and the body, about sixty numbers, through memory, which takes half of a step's time.
 """
 
 
@@ -134,22 +134,21 @@ class Mat3(NamedTuple):
 
 
 def select(mask, a, b):
-    """`a` where the mask holds, else `b`.
+    """`a` where the mask is true, else `b`; numbers or vectors.
 
-    With `any_`, this is how kernels decide: both sides are worked out, so that one text serves a body alone and many side by side.
-    Of numbers or vectors.
+    Kernels branch with `select` and `any_`: both sides are evaluated, so that the same source serves one body and the lanes of many.
     """
     return a if mask else b
 
 
 def any_(mask):
-    """Whether the mask holds for any body."""
+    """Whether the mask is true for any body."""
     return mask
 
 
 @compiled
 def row(array, i):
-    """Row i of an (n, 3) array, as plain floats: NumPy's scalars would be slow and take over the operators below."""
+    """Row i of an (n, 3) array, as plain floats: NumPy scalars are slow and would take precedence over the operators above."""
     return Vec3(float(array[i, 0]), float(array[i, 1]), float(array[i, 2]))
 
 
@@ -163,6 +162,12 @@ def dot(a, b):
 def cross(a, b):
     """A × b."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+
+
+@compiled
+def cross_matrix(r):
+    """Eq 14: the matrix r* for which r* j = r × j."""
+    return Mat3(Vec3(0.0, -r.z, r.y), Vec3(r.z, 0.0, -r.x), Vec3(-r.y, r.x, 0.0))
 
 
 @compiled
@@ -185,7 +190,7 @@ def solve(m, b):
 
 
 class NumberLike(types.Type):
-    """What may stand in compiled code where the physics has a number."""
+    """A numba type that compiled code accepts in place of a float."""
 
 
 def _is(numba_type: Any, kind: type) -> bool:
@@ -194,8 +199,8 @@ def _is(numba_type: Any, kind: type) -> bool:
     return isinstance(numba_type, types.NamedTuple | types.NamedUniTuple) and numba_type.instance_class is kind
 
 
-def _teach_numba(symbol: Callable[..., Any], source: Callable[..., Any], *kinds: type) -> None:
-    """Let compiled code use `source` for `symbol` on operands of these kinds."""
+def _register_operator(symbol: Callable[..., Any], source: Callable[..., Any], *kinds: type) -> None:
+    """Make compiled code use `source` for the operator `symbol` on operands of these kinds."""
     if len(kinds) == 1:
 
         @overload(symbol, strict=False)
@@ -239,4 +244,4 @@ for _symbol, _source, *_kinds in (
     (operator.matmul, _apply, Mat3, Vec3),
     (operator.matmul, _compose, Mat3, Mat3),
 ):
-    _teach_numba(_symbol, _source, *_kinds)
+    _register_operator(_symbol, _source, *_kinds)

@@ -1,4 +1,4 @@
-"""What is simulated, and what the exact answer is: scenes, their catalogue, trajectories and truths."""
+"""What is simulated, and its exact solution: the scene model, the catalogue, trajectories and exact solutions (truths)."""
 
 from scenarios.ensemble import members
 from scenarios.errors import DropspinError, SceneError, UnknownName

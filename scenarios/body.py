@@ -1,4 +1,4 @@
-"""The `[body]` table: what falls or spins, and the mass, inertia and vertices that follow from it."""
+"""The `[body]` table: a body's shape, and the mass, inertia and vertices that follow from it."""
 
 import math
 from functools import cached_property
@@ -19,7 +19,7 @@ PositiveVector = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=
 
 
 class Table(BaseModel):
-    """A table of a file: unknown keys are refused, values stay as loaded."""
+    """A table of a file: immutable, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -37,7 +37,7 @@ PrincipalMoments = Annotated[PositiveVector, AfterValidator(_possible)]
 class _Body(Table):
     mass: Positive
 
-    # By what was given; pydantic's own would compare the arrays that properties have kept as well.
+    # By the given values only; pydantic would compare cached arrays too.
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Body) and self._given == other._given
 
@@ -55,7 +55,7 @@ class _Body(Table):
 
     @property
     def rounding(self) -> float:
-        """How far the surface stands out from the vertices [m]: a ball is one point, rounded by its radius."""
+        """Distance of the surface from the vertices [m]: a ball is one point, rounded by its radius."""
         return 0.0
 
     @property
@@ -65,12 +65,12 @@ class _Body(Table):
 
     @cached_property
     def size(self) -> float:
-        """The farthest that any part is from the centre of mass [m]."""
+        """Largest distance of any part from the centre of mass [m]."""
         return float(np.sqrt(np.max(np.sum(self.vertices**2, axis=1)))) + self.rounding
 
     @property
     def resting_height(self) -> float:
-        """The lowest that the centre of mass can come on a floor [m]."""
+        """Lowest possible height of the centre of mass on a floor [m]."""
         raise NotImplementedError
 
 
@@ -126,7 +126,7 @@ class Box(_Body):
 
 
 class Vertices(_Body):
-    """Any set of points, with equal masses unless they are given."""
+    """A rigid set of points, of equal masses unless they are given."""
 
     shape: Literal["vertices"]
     points: Annotated[tuple[Vector, ...], Field(min_length=2, max_length=10_000)]
@@ -149,7 +149,7 @@ class Vertices(_Body):
             raise ValueError(f"mass is {self.mass:g} but masses add up to {np.sum(self.masses):g}; they must agree")
         moments = np.linalg.eigvalsh(self.inertia_tensor)
         if moments[0] <= 1e-12 * moments[2]:
-            raise ValueError("the points lie on one line, about which they have no inertia; they must span a plane at least")
+            raise ValueError("the points lie on one line, about which they have no inertia; they must span at least a plane")
         return self
 
     @cached_property
@@ -168,13 +168,13 @@ class Vertices(_Body):
         if isinstance(self.inertia, tuple):
             return np.diag(self.inertia)
         masses = self._point_masses if self.inertia == "vertices" else np.ones(len(self.points))
-        # Summed exactly: ten thousand roundings would look like another body to whoever compares to the last digits.
+        # Summed exactly, because the rounding of ten thousand terms would show in a comparison to the last digits.
         spread = np.array([[math.fsum(masses * a * b) for b in self.vertices.T] for a in self.vertices.T])
         return np.trace(spread) * np.eye(3) - spread
 
     @cached_property
     def resting_height(self) -> float:
-        # On its most stable face; a plane set of points can lie flat.
+        # On the face nearest to the centre of mass; a plane set of points can lie flat.
         centred = self.vertices - self.vertices.mean(axis=0)
         if np.linalg.matrix_rank(centred, tol=1e-9 * self.size) < 3:
             return 0.0

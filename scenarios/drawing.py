@@ -1,23 +1,23 @@
-"""Random numbers by their number: draw i depends on the seed, on what it is for and on i, not on how many are drawn beside it."""
+"""Numbered random draws: draw i depends on the seed, on the purpose and on i, not on how many other draws are made."""
 
 import hashlib
 
 import numpy as np
 from numpy.typing import NDArray
 
-BLOCK = 1024  # draws that are made at a time, whichever of them are asked for
+DRAWS_PER_BLOCK = 1024  # generated together, however many of them are requested
 
 
 def uniform(seed: int, purpose: str, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
-    """The draws of these numbers, each even over [0, 1), shape (len(numbers),).
+    """The draws with these numbers, uniform over [0, 1), shape (len(numbers),).
 
-    By a generator that counts (Philox-4x64; J. K. Salmon et al., SC 2011), so that any draw is reached without those before it.
+    They come from a counter-based generator (Philox-4x64; J. K. Salmon et al., SC 2011), which reaches any draw without those before it.
     """
     key = int.from_bytes(hashlib.sha256(f"{seed} {purpose}".encode()).digest()[:16], "little")
     drawn = np.empty(len(numbers))
-    for block in np.unique(numbers // BLOCK):
+    for block in np.unique(numbers // DRAWS_PER_BLOCK):
         counting = np.random.Philox(key=key)
-        counting.advance(int(block) * BLOCK // 4)  # four draws to a count
-        here = numbers // BLOCK == block
-        drawn[here] = np.random.Generator(counting).random(BLOCK)[numbers[here] - block * BLOCK]
+        counting.advance(int(block) * DRAWS_PER_BLOCK // 4)  # four draws to a count
+        here = numbers // DRAWS_PER_BLOCK == block
+        drawn[here] = np.random.Generator(counting).random(DRAWS_PER_BLOCK)[numbers[here] - block * DRAWS_PER_BLOCK]
     return drawn

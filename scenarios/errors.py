@@ -1,7 +1,7 @@
-"""Everything that can go wrong because of what was asked, with a message that is fit to be shown as it is.
+"""Errors caused by the input; their messages can be shown to the user unchanged.
 
 DropspinError
-├── SceneError      a scene file or mapping that is not a scene
+├── SceneError      a file or mapping that is not a valid scene
 └── UnknownName     a scene, engine, option or metric that does not exist
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 
 class DropspinError(Exception):
-    """Bad input: its text is one line that says where, what was given, what is allowed."""
+    """Bad input. The message is one line that says where, what was given, what is allowed."""
 
 
 class SceneError(DropspinError):
@@ -26,6 +26,6 @@ class UnknownName(DropspinError):
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:
-    """' Did you mean …?' for the nearest known name, or nothing."""
+    """' Did you mean …?' with the nearest known name, or an empty string."""
     nearest = difflib.get_close_matches(given, list(known), n=1, cutoff=0.55)
     return f" Did you mean {nearest[0]!r}?" if nearest else ""

@@ -1,4 +1,4 @@
-"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory; the principal axes of its inertia."""
+"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory; principal axes of an inertia tensor."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def angular_momentum(scene: Scenario, motion: Trajectory) -> Array:
-    """L = R I Rᵀ ω about the centre of mass, world frame [kg m²/s], shape (n, 3); I ω where all axes are alike, whatever the attitude."""
+    """L = R I Rᵀ ω about the centre of mass, world frame [kg m²/s], shape (n, 3); I ω, independent of R, for three equal moments."""
     inertia = scene.body.inertia_tensor
     if np.array_equal(inertia, inertia[0, 0] * np.eye(3)):
         return inertia[0, 0] * motion.angular_velocity
@@ -26,10 +26,10 @@ def kinetic_energy(scene: Scenario, motion: Trajectory) -> Array:
 
 
 def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Array:
-    """Kinetic plus potential energy [J], shape (n,); potential energy is 0 at rest on the floor, or at the start.
+    """Kinetic plus potential energy [J], shape (n,). Potential energy is 0 at rest on the floor, or at the start without a floor.
 
-    Synchronised means that a staggered engine's velocity is first brought to the time of its position, to first order:
-    E* = E + lag M g·v. Semi-implicit Euler conserves E* exactly in free fall, and E only to first order in dt.
+    The synchronised energy takes a staggered engine's velocity at the time of its position, to first order: E* = E + lag M g·v.
+    Semi-implicit Euler conserves E* exactly in free fall, and E only to first order in dt.
     """
     mass, g = scene.body.mass, scene.acceleration
     origin = np.array([0.0, scene.body.resting_height, 0.0]) if scene.floor else np.array(scene.start.position)
@@ -38,7 +38,7 @@ def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Ar
 
 
 def apex(scene: Scenario, motion: Trajectory) -> Array:
-    """v²/2g + y: how high a body in flight rises, or has risen [m], alike from each of its states, shape (n,); gravity straight down."""
+    """Height of the apex of a flight [m], v_y²/2g + y, from each of its states, shape (n,); gravity points straight down."""
     v = motion.velocity[:, 1]
     return v * v / (-2.0 * scene.acceleration[1]) + motion.position[:, 1] - motion.velocity_lag * v
 
@@ -50,12 +50,12 @@ def lowest_height(scene: Scenario, motion: Trajectory) -> Array:
 
 
 def is_diagonal(tensor: Array) -> bool:
-    """Whether a body's own axes are principal ones, to the last digit."""
+    """Whether the body axes are principal axes exactly."""
     return np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
 
 
 def principal_axes(inertia: Array) -> tuple[Array, Array]:
-    """Moments and axes (columns, right-handed): the body's own where the tensor is diagonal, else the least moment first."""
+    """Principal moments and axes (columns, right-handed): the body axes of a diagonal tensor, else in ascending order of the moments."""
     if is_diagonal(inertia):
         return np.diag(inertia).copy(), np.eye(3)
     moments, axes = np.linalg.eigh(inertia)

@@ -1,4 +1,4 @@
-"""The scene: a TOML file's content, checked. An absent table is not modelled, by any engine."""
+"""The scene model: the validated content of a TOML file. No engine models a table that is absent."""
 
 import hashlib
 import math
@@ -9,17 +9,18 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
 from scenarios.rotations import rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 TOUCHING = 1e-9
-"""Of the body's size: how near to the floor counts as on it."""
+"""Height above the floor, over the body's size, up to which the body counts as touching it."""
 
 
 def unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
-    """The quaternion with length 1; one that has it, to rounding, stays as it is."""
+    """The quaternion with length 1; one that has it to rounding is returned unchanged."""
     length = math.hypot(*quaternion)
     if length == 0.0:
         raise ValueError("must not be the zero quaternion")
-    if abs(length - 1.0) < 4e-16:  # unit already, to the last digit; a saved scene loads as it was
+    if abs(length - 1.0) < 4e-16:  # a saved scene loads with the same digits
         return quaternion
     return tuple(component / length for component in quaternion)
 
@@ -28,7 +29,7 @@ Orientation = Annotated[tuple[Number, ...], Field(min_length=4, max_length=4), A
 
 
 class Start(Table):
-    """The state at t = 0, all in the world frame [m, -, m/s, rad/s]; quaternions are [x, y, z, w]."""
+    """The state at t = 0, in the world frame [m, -, m/s, rad/s]; quaternions are [x, y, z, w]."""
 
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Orientation = (0.0, 0.0, 0.0, 1.0)
@@ -64,11 +65,11 @@ class Damping(Table):
 
 
 class Ensemble(Table):
-    """Starts drawn from a spread around the scene's own.
+    """Random starts around the scene's start.
 
-    `turn` is the largest rotation from the scene's own attitude [rad]: all those by up to it are equally likely, all attitudes by default.
-    `velocity` [m/s] and `angular_velocity` [rad/s] are spread evenly by up to so much to either side. The height above the floor is the
-    scene's own.
+    `turn` is the largest angle of rotation from the scene's attitude [rad]; rotations are uniform up to it, by default over all attitudes.
+    `velocity` [m/s] and `angular_velocity` [rad/s] are the half widths of uniform distributions around the scene's values. Every start has
+    the scene's height above the floor.
     """
 
     size: Annotated[int, Field(strict=True, ge=2, le=10_000_000)]
@@ -79,9 +80,9 @@ class Ensemble(Table):
 
 
 class Expectation(Table):
-    """What a run is held to: one bound on one metric, for all engines and steps or for those named.
+    """One bound on one metric, for all engines and time steps or for those named.
 
-    `dt` names one step or several [s]. `below` bounds the size of the value, `above` and `within` the value with its sign.
+    `dt` names one time step or several [s]. `below` bounds the absolute value; `above` and `within` bound the value with its sign.
     """
 
     metric: str
@@ -94,7 +95,7 @@ class Expectation(Table):
 
     @field_validator("dt", mode="before")
     @classmethod
-    def _one_step_is_a_list_of_one(cls, dt: object) -> object:
+    def _one_dt_is_a_list_of_one(cls, dt: object) -> object:
         return [dt] if isinstance(dt, float | int) else dt
 
     @model_validator(mode="after")
@@ -109,12 +110,12 @@ class Expectation(Table):
 class Scenario(Table):
     """One scene.
 
-    `name` is the file's, without its ending, and `origin` what was asked for to load it, empty if it was given as a mapping; everything
-    else is the file's content (units: SI).
+    `name` is the file's name without its ending. `origin` is the argument that loaded it, empty for a mapping. All other fields are the
+    file's content, in SI units.
     """
 
-    name: str
-    origin: Annotated[str, Field(exclude=True)] = ""
+    name: Annotated[str, Field(json_schema_extra={"hidden": True})]
+    origin: Annotated[str, Field(exclude=True, json_schema_extra={"hidden": True})] = ""
     summary: str = ""
     source: str = ""
     tags: tuple[str, ...] = ()
@@ -131,7 +132,9 @@ class Scenario(Table):
     def _has_an_inertia(self) -> Self:
         tensor = self.body.inertia_tensor
         if not (np.isfinite(tensor).all() and np.linalg.eigvalsh(tensor)[0] > 0.0):
-            raise ValueError(f"body: its inertia is {tensor.tolist()} kg m², beyond what numbers can hold; scale the scene's units")
+            raise ValueError(
+                f"body: its inertia is {tensor.tolist()} kg m², out of the range of floating-point numbers; scale the scene's units"
+            )
         return self
 
     @model_validator(mode="after")
@@ -143,7 +146,7 @@ class Scenario(Table):
 
     @property
     def initial_state(self) -> Array:
-        """The start, shape (13,): position, orientation, velocity, angular velocity."""
+        """The state at t = 0, shape (13,), in the layout of `scenarios.state`."""
         start = self.start
         return np.array([*start.position, *start.orientation, *start.velocity, *start.angular_velocity])
 
@@ -155,7 +158,7 @@ class Scenario(Table):
 
     @property
     def starts_above_floor(self) -> bool:
-        """Whether the body has to fall to touch the floor; False without one."""
+        """Whether the body starts above the floor; False without a floor."""
         return self.floor is not None and self.clearance > TOUCHING * self.body.size
 
     @property
@@ -165,7 +168,7 @@ class Scenario(Table):
 
     @property
     def digest(self) -> str:
-        """A short hash of everything that moves the body; text and expectations do not count."""
+        """A short hash of everything that affects the motion; texts and expectations do not."""
         physics = self.model_dump_json(exclude={"name", "summary", "source", "tags", "expect"})
         return hashlib.sha256(physics.encode()).hexdigest()[:12]
 
@@ -177,9 +180,9 @@ class Scenario(Table):
         """The same scene from another state, shape (13,)."""
         values = [float(value) for value in state]
         start = Start(
-            position=tuple(values[0:3]),
-            orientation=tuple(values[3:7]),
-            velocity=tuple(values[7:10]),
-            angular_velocity=tuple(values[10:13]),
+            position=tuple(values[POSITION]),
+            orientation=tuple(values[ORIENTATION]),
+            velocity=tuple(values[VELOCITY]),
+            angular_velocity=tuple(values[SPIN]),
         )
         return self.model_copy(update={"start": start})

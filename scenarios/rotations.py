@@ -1,4 +1,4 @@
-"""Rotations by quaternions [x, y, z, w], body to world, over any leading axes."""
+"""Rotations by quaternions [x, y, z, w], body to world, for arrays with any leading axes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ Array = NDArray[np.float64]
 
 
 def cross(a: Array, b: Array) -> Array:
-    """A × b over the last axis; numpy.cross takes four times as long on the few vectors that root finding asks for."""
+    """A × b over the last axis; numpy.cross takes four times as long on the few vectors of a root search."""
     if a.shape != b.shape:
         a, b = np.broadcast_arrays(a, b)
     product = np.empty(a.shape)
@@ -18,7 +18,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def dot(a: Array, b: Array) -> Array:
-    """A · b over the last axis; a sum over so short an axis takes three times as long."""
+    """A · b over the last axis; np.sum over so short an axis takes three times as long."""
     return np.einsum("...i,...i->...", a, b)
 
 
@@ -42,14 +42,14 @@ def conjugate(q: Array) -> Array:
 
 
 def rotate(q: Array, vectors: Array) -> Array:
-    """Vectors in the world frame, (..., 3), of body-frame ones."""
+    """Body-frame vectors, shape (..., 3), in the world frame."""
     axis, w = q[..., :3], q[..., 3:]
     twice = 2.0 * cross(axis, vectors)
     return vectors + w * twice + cross(axis, twice)
 
 
 def unrotate(q: Array, vectors: Array) -> Array:
-    """Vectors in the body frame, (..., 3), of world-frame ones."""
+    """World-frame vectors, shape (..., 3), in the body frame."""
     return rotate(conjugate(q), vectors)
 
 
@@ -62,7 +62,7 @@ def about(axis: Array, angle: Array) -> Array:
 def angle_between_orientations(a: Array, b: Array) -> Array:
     """The angle [rad] of the rotation from a to b; q and -q are the same orientation.
 
-    By the half-angle's sine and cosine together, so that it resolves 1e-16 rad and is sound at pi (W. Kahan).
+    The arctangent of the half angle's sine and cosine resolves 1e-16 rad and is accurate at π (W. Kahan).
     """
     difference = multiply(conjugate(a), b)
     return 2.0 * np.arctan2(length(difference[..., :3]), np.abs(difference[..., 3]))

@@ -1,4 +1,9 @@
-"""The layout of a state: 13 numbers, position [m], orientation [x, y, z, w], velocity [m/s], angular velocity [rad/s]."""
+"""The layout of a state: 13 numbers, position [m], orientation [x, y, z, w], velocity [m/s], angular velocity [rad/s].
+
+`reference_impl.state`, which cannot import this package, defines the same layout; a test compares the two.
+"""
+
+import numpy as np
 
 POSITION = slice(0, 3)
 ORIENTATION = slice(3, 7)
@@ -6,5 +11,8 @@ VELOCITY = slice(7, 10)
 SPIN = slice(10, 13)
 RATES = slice(7, 13)
 """Velocity and angular velocity together."""
+
+UP = np.array([0.0, 1.0, 0.0])
+"""Upwards in the world frame, the floor's normal."""
 
 PARTS = {"position": POSITION, "orientation": ORIENTATION, "velocity": VELOCITY, "angular_velocity": SPIN}

@@ -1,10 +1,12 @@
-"""What a run leaves behind: states over time."""
+"""Trajectories: the states of a body over time."""
 
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 Array = NDArray[np.float64]
 
@@ -19,7 +21,7 @@ class Trajectory:
         orientation: Unit quaternions [x, y, z, w], body to world, shape (n, 4).
         velocity: Of the centre of mass [m/s], shape (n, 3).
         angular_velocity: World frame [rad/s], shape (n, 3).
-        velocity_lag: How far velocities lag positions [s]: half a step for a staggered engine (semi-implicit Euler is
+        velocity_lag: Time by which velocities lag positions [s]: half a step for a staggered engine (semi-implicit Euler is
             leapfrog), else 0.
     """
 
@@ -33,7 +35,7 @@ class Trajectory:
     @classmethod
     def from_states(cls, t: Array, states: Array, velocity_lag: float = 0.0) -> Self:
         """From rows of position, orientation, velocity, angular velocity, shape (n, 13)."""
-        return cls(t, states[:, 0:3], states[:, 3:7], states[:, 7:10], states[:, 10:13], velocity_lag)
+        return cls(t, states[:, POSITION], states[:, ORIENTATION], states[:, VELOCITY], states[:, SPIN], velocity_lag)
 
     @property
     def states(self) -> Array:

@@ -17,6 +17,7 @@ from comparisons.engines.base import (
 from scenarios.body import Array, Body, Box, Sphere
 from scenarios.model import Floor, Scenario
 from scenarios.rotations import cross, rotate
+from scenarios.state import ORIENTATION, SPIN
 
 REASONS = {
     "deactivation": "never falls asleep; else a block that tips over slower than 0.05 rad/s stops halfway",
@@ -115,8 +116,8 @@ class DartSimulation(Simulation):
         rows, floor, body, dt = super().record(steps, every), self._scene.floor, self._scene.body, self._world.getTimeStep()
         if floor is not None and every == 1:
             before, fall = rows[:-1, None], dt * self._world.getGravity()[1]
-            arms = rotate(before[..., 3:7], body.vertices)
-            approach = -(before[..., 8] + cross(before[..., 10:13], arms)[..., 1] + fall)
+            arms = rotate(before[..., ORIENTATION], body.vertices)
+            approach = -(before[..., 8] + cross(before[..., SPIN], arms)[..., 1] + fall)
             rebounds = floor.restitution * approach[(before[..., 1] + arms[..., 1] < body.rounding) & (approach > 0.0)]
             height = 0.1**2 / 2.0 * dt / abs(fall) if fall else 0.0
             lost = {"restitution_error": 1.0, "bounce_height_error": 1.0, "position_error": height}

@@ -1,4 +1,4 @@
-"""The engine `document`: the note, literally."""
+"""The engine `document`: the reference implementation of Wang's lecture note, and of the methods beside it."""
 
 import math
 from collections.abc import Sequence
@@ -8,28 +8,15 @@ from typing import ClassVar
 import numpy as np
 
 import reference_impl
-from comparisons.engines.base import (
-    EXPLICIT_GYROSCOPIC,
-    IMPLICIT_GYROSCOPIC,
-    SEMI_IMPLICIT_EULER,
-    Array,
-    AsBuilt,
-    BatchSimulation,
-    Engine,
-    Simulation,
-    may_tumble,
-    version,
-)
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, may_tumble, version
 from comparisons.measuring.predictions import bounce_error, flight_error
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Body, Box, Sphere, Vertices
 
-ORDERS = {"gyroscopic": 1.0, "implicit-gyroscopic": 1.0, "midpoint": 2.0, "rk4": 4.0, "symmetric-top": 4.0, "exact": math.inf}
-
 
 class Document(Engine):
-    """Algorithms 1 and 2 of the note; each option puts another method in place of one of its parts."""
+    """Algorithms 1 and 2 of Wang's lecture note; each option replaces one of their parts by another method."""
 
     name = "document"
     choices: ClassVar = {
@@ -42,40 +29,35 @@ class Document(Engine):
     def __post_init__(self) -> None:
         super().__post_init__()
         try:
-            self.methods()  # refuses what does not go together
+            self.methods()  # checks the combination
         except ValueError as error:
             raise DropspinError(f"engine {self.label!r}: {error}.") from None
 
     def methods(self) -> reference_impl.Methods:
-        """The chosen leaves."""
+        """The chosen methods."""
         return reference_impl.Methods(**{name: self.option(name) for name in self.choices})
 
     def order_in(self, scene: Scenario) -> float | None:
-        """Order of the rotation; the note's own makes no claim. Translation under gravity is of first order with all of them."""
-        rotation = ORDERS.get(self.option("rotation"))
-        if rotation is None or scene.floor is not None:
-            return None
-        return rotation if scene.gravity is None else min(rotation, 1.0)
+        """The lowest order among the methods that the scene needs; None if one of them claims none, as all contacts do."""
+        return self.methods().order(gravity=scene.gravity is not None, floor=scene.floor is not None)
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """Of the rotation, where it matters, and of the contacts; the translation is the note's with all of them."""
-        known = {"gyroscopic": EXPLICIT_GYROSCOPIC, "implicit-gyroscopic": IMPLICIT_GYROSCOPIC}
-        rotation = self.option("rotation")
-        flight = known.get(rotation, rotation) if may_tumble(scene) else SEMI_IMPLICIT_EULER
+        """The discretisation of the flight, and how contacts are treated if there is a floor."""
+        flight = self.methods().discretisation(tumbles=may_tumble(scene))
         contacts = f"gravity before the impact, law {self.option('law')}, contact {self.option('contact')}"
         return flight if scene.floor is None else f"{flight}, {contacts}"
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
-        """The note's own flight, or an exact rotation about a fixed axis; a flat bounce, in which gravity acts before the impact."""
+        """For a flight by eq 6 or by the exact rotation, and for a flat bounce, in which gravity acts before the impact."""
         rotation = self.option("rotation")
         if rotation in ("note", "exact") and scene.floor is None:
             return flight_error(scene, truth, metric, dt, exact_rotation=rotation == "exact")
         return bounce_error(scene, truth, metric, dt, gravity_first=True) if self.option("correction") == "none" else None
 
     def declines(self, scene: Scenario) -> str | None:
-        """Most laws know no friction between none and infinite."""
+        """Most laws take no finite coefficient of friction."""
         law = self.option("law")
-        if scene.floor is not None and not isinstance(scene.floor.friction, str) and law not in ("normal", "coulomb"):
+        if scene.floor is not None and not isinstance(scene.floor.friction, str) and not self.methods().takes_any_friction:
             return f"law={law} has no Coulomb coefficient ({scene.floor.friction:g}); friction is 'none' or 'infinite', or use law=coulomb"
         if scene.floor is not None and law == "normal" and scene.floor.friction != "none":
             return "law=normal has no friction; the scene's floor has"
@@ -85,7 +67,7 @@ class Document(Engine):
         return DocumentSimulation(scene, dt, self.methods())
 
     def record_batch(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
-        """All side by side."""
+        """All members in one call of the reference implementation."""
         return DocumentBatch(members, dt, self.methods()).run(steps, every=1)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
@@ -93,7 +75,7 @@ class Document(Engine):
 
 
 class DocumentSimulation(Simulation):
-    """A state that the reference implementation moves on."""
+    """A simulation of one scene by the reference implementation."""
 
     staggered = True
 
@@ -129,7 +111,7 @@ class DocumentSimulation(Simulation):
 
 
 class DocumentBatch(BatchSimulation):
-    """States that the reference implementation moves on, in lanes and threads."""
+    """A simulation of an ensemble by the reference implementation, in lanes and threads."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         scene = members[0]
@@ -143,17 +125,17 @@ class DocumentBatch(BatchSimulation):
         return self._states.copy()
 
     def run(self, steps: int, every: int) -> Array:
-        """States now and after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
+        """The current states and those after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
         return self._simulator.run(self._states, steps, every)
 
 
 def reference_body(body: Body) -> reference_impl.Body:
-    """A scene's body as the reference implementation takes it."""
+    """A scene's body in the form that the reference implementation takes."""
     return reference_impl.Body(body.mass, _inertia(body), body.vertices, body.rounding)
 
 
 def _inertia(body: Body) -> Array:
-    """From the scene's words by the note's own formulas; the scene's tensor is computed apart from this one."""
+    """The inertia tensor by the formulas of the lecture note; `Body.inertia_tensor` computes the same independently."""
     if isinstance(body.inertia, tuple):
         return np.diag(body.inertia)
     if body.inertia == "note":
@@ -168,7 +150,7 @@ def _inertia(body: Body) -> Array:
 
 
 def reference_world(scene: Scenario) -> reference_impl.World:
-    """What acts on it, as the reference implementation takes it."""
+    """A scene's gravity, floor and damping in the form that the reference implementation takes."""
     floor = scene.floor
     return reference_impl.World(
         gravity=None if scene.gravity is None else scene.acceleration,

@@ -14,6 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 from comparisons.engines.base import SEMI_IMPLICIT_EULER, AsBuilt, Diverged, Engine, Simulation, version
 from scenarios.body import Array
 from scenarios.model import Floor, Scenario
+from scenarios.state import ORIENTATION
 
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 
@@ -105,7 +106,7 @@ class DrakeSimulation(Simulation):
 
     def state(self) -> Array:
         state = self._plant.GetPositionsAndVelocities(self._context)[[4, 5, 6, 1, 2, 3, 0, 10, 11, 12, 7, 8, 9]]
-        state[3:7] /= np.linalg.norm(state[3:7])  # which Drake does wherever it uses it, and never to the state itself
+        state[ORIENTATION] /= np.linalg.norm(state[ORIENTATION])  # which Drake does wherever it uses it, and never to the state itself
         return state
 
     def as_built(self) -> AsBuilt:

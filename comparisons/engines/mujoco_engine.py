@@ -27,11 +27,12 @@ from comparisons.engines.mujoco_contact import IMPEDANCE, contact
 from comparisons.engines.mujoco_versions import SIDE_BY_SIDE, flight_of, numbers_of, refusal, refusal_of_boxes, solver
 from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.measuring.predictions import bounce_error, flight_error
-from reference_impl.simulate import usable_cores
+from reference_impl.threads import usable_cores
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
 from scenarios.mechanics import is_diagonal, principal_axes
 from scenarios.rotations import conjugate, cross, rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 VERSION = numbers_of(mujoco.__version__)
 DEFAULT_INFINITE_FRICTION = 10.0  # with the pyramidal cones of the default, 1e6 would be no friction and no contact at all
@@ -193,10 +194,10 @@ class MuJoCoSimulation(Simulation):
             self._model.dof_damping[:] = rates
         self._data = mujoco.MjData(self._model)
         start = scene.initial_state
-        self._data.qpos[0:3] = start[0:3]
+        self._data.qpos[0:3] = start[POSITION]
         self._data.qpos[3:7] = start[[6, 3, 4, 5]]
-        self._data.qvel[0:3] = start[7:10]
-        self._data.qvel[3:6] = rotate(conjugate(start[3:7]), start[10:13])
+        self._data.qvel[0:3] = start[VELOCITY]
+        self._data.qvel[3:6] = rotate(conjugate(start[ORIENTATION]), start[SPIN])
         self._steps = 0
 
     def advance(self, steps: int) -> None:
@@ -292,9 +293,9 @@ def _limitations_met(scene: Scenario, states: Array) -> Iterator[KnownLimitation
     if scene.floor is None or isinstance(scene.floor.friction, str):
         return
     before, after = states[:-1], states[1:]
-    arms = rotate(before[:, None, 3:7], scene.body.vertices) - [0.0, scene.body.rounding, 0.0]
+    arms = rotate(before[:, None, ORIENTATION], scene.body.vertices) - [0.0, scene.body.rounding, 0.0]
     touching = before[:, None, 1] + arms[..., 1] <= 0.0
-    velocities = after[:, None, 7:10] + cross(after[:, None, 10:13], arms)
+    velocities = after[:, None, VELOCITY] + cross(after[:, None, SPIN], arms)
     slip = float(np.hypot(velocities[..., 0], velocities[..., 2])[touching].max(initial=0.0))
     if slip <= NO_SLIP:
         return
@@ -390,10 +391,10 @@ def _add_shape(body: Any, scene: Scenario, **properties: Any) -> None:
 def _to_world(rows: Array) -> Array:
     """From [x, q = w x y z, v, ω in the body] to the project's order and frame."""
     states = np.empty_like(rows)
-    states[:, 0:3] = rows[:, 0:3]
+    states[:, POSITION] = rows[:, POSITION]
     states[:, 3:6], states[:, 6] = rows[:, 4:7], rows[:, 3]
-    states[:, 7:10] = rows[:, 7:10]
-    states[:, 10:13] = rotate(states[:, 3:7], rows[:, 10:13])
+    states[:, VELOCITY] = rows[:, VELOCITY]
+    states[:, SPIN] = rotate(states[:, ORIENTATION], rows[:, SPIN])
     return states
 
 

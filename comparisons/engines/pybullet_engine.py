@@ -33,6 +33,7 @@ from comparisons.measuring.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere
 from scenarios.mechanics import is_diagonal
+from scenarios.state import SPIN, VELOCITY
 
 STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact there
 ALMOST = 0.999
@@ -267,14 +268,14 @@ def _limitations_met(rows: Array, dt: float, fall: Array | None) -> Iterator[Kno
 
     `fall` is what gravity adds to the velocity in a step [m/s], where a floor is to grip.
     """
-    turn = float(np.linalg.norm(rows[:, 10:13], axis=1).max()) * dt
+    turn = float(np.linalg.norm(rows[:, SPIN], axis=1).max()) * dt
     if turn > LARGEST_TURN:
         yield KnownLimitation(
             f"the body turns by up to {turn:.3g} rad a step; beyond π/4 Bullet's rotations fall short", {"orientation_error": np.pi}
         )
     if fall is None:
         return
-    pushes = np.diff(rows[:, 7:10], axis=0) - fall
+    pushes = np.diff(rows[:, VELOCITY], axis=0) - fall
     along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
     if bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
         yield KnownLimitation(

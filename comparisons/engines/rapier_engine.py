@@ -18,6 +18,7 @@ from scenarios import Scenario, truth_for
 from scenarios.body import Box, Sphere
 from scenarios.mechanics import principal_axes
 from scenarios.rotations import rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 FRICTION = {"none": 0.0, "infinite": 1e6}
 LARGEST = float(np.finfo(np.float32).max)
@@ -62,7 +63,8 @@ class Rapier(Engine):
         if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):
             return "Rapier's friction does not answer the rebound; a rough floor needs restitution 0, or a ball that it grips"
         truth = truth_for(scene)
-        landings = np.array([rotate(event.before[3:7], body.vertices)[:, 1] for event in truth.events]) if truth else np.empty((0, 1))
+        before = [event.before for event in truth.events] if truth else []
+        landings = np.array([rotate(state[ORIENTATION], body.vertices)[:, 1] for state in before]) if truth else np.empty((0, 1))
         if np.any(np.sum(landings <= landings.min(axis=1, keepdims=True) + 1e-6 * body.size, axis=1) > 1):
             return "Rapier's contacts rebound one after another, once, each undoing those before; here several corners land at once"
         return None
@@ -91,7 +93,8 @@ class RapierSimulation(Simulation):
             dynamics[f"{motion}_damping"] = float(np.expm1(rate * dt)) / dt
         moments, axes = principal_axes(body.inertia_tensor)
         frame = Rotation.from_matrix(axes).as_quat()
-        moving = rapier3d.RigidBody.dynamic(**dynamics).position((start[0:3], start[3:7])).linvel(start[7:10]).angvel(start[10:13])
+        moving = rapier3d.RigidBody.dynamic(**dynamics).position((start[POSITION], start[ORIENTATION]))
+        moving = moving.linvel(start[VELOCITY]).angvel(start[SPIN])
         moving = moving.additional_mass_properties(rapier3d.MassProperties(np.zeros(3), body.mass, moments, frame))
         handle, surface = self._world.add_body(moving), {}
         if floor is not None:

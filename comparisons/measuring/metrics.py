@@ -15,6 +15,7 @@ from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unreso
 from scenarios import Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import angular_momentum, apex, kinetic_energy, lowest_height
 from scenarios.rotations import angle_between_orientations, length
+from scenarios.state import RATES, SPIN
 
 Array = NDArray[np.float64]
 NEAR_FLOOR = 0.05  # of the body's size: engines may take what is so near for contact
@@ -135,7 +136,7 @@ def _spins(scene: Scenario, truth: Truth | None) -> bool:
     if truth is None:
         return False
     sampled = truth(np.linspace(0.0, min(scene.duration, truth.horizon), 9))
-    return bool(sampled.angular_velocity.any()) or any(event.after[10:13].any() for event in truth.events)
+    return bool(sampled.angular_velocity.any()) or any(event.after[SPIN].any() for event in truth.events)
 
 
 def _has_impact(scene: Scenario, truth: Truth | None) -> bool:
@@ -147,7 +148,7 @@ def _lands(scene: Scenario, truth: Truth | None) -> bool:
         truth is not None
         and not _starts_in_flight(scene)
         and len(truth.events) > 0
-        and bool(truth.events[0].time > 0.0 and truth.events[0].before[10:13].any())
+        and bool(truth.events[0].time > 0.0 and truth.events[0].before[SPIN].any())
     )
 
 
@@ -155,7 +156,7 @@ def _comes_to_rest(scene: Scenario, truth: Truth | None) -> bool:
     """Within the first nine tenths, after an impact."""
     if truth is None or truth.horizon < scene.duration or not truth.events or truth.events[0].time == 0.0:
         return False
-    return not truth([0.9 * scene.duration]).states[0, 7:13].any()
+    return not truth([0.9 * scene.duration]).states[0, RATES].any()
 
 
 def _goes_on(scene: Scenario, truth: Truth | None) -> bool:

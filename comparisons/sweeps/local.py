@@ -8,7 +8,7 @@ from threading import Event
 from comparisons.running.processes import Closed, EngineProcesses
 from comparisons.sweeps.parts import Folder
 from comparisons.sweeps.work import Part, Work
-from reference_impl.simulate import usable_cores
+from reference_impl.threads import usable_cores
 
 TICK = 0.5  # s
 

@@ -1,34 +1,43 @@
-"""`contact=sequential`: an impulse at each vertex, over and over until none changes (projected Gauss-Seidel).
+"""`contact=sequential`: one impulse at each vertex, repeated until none changes (projected Gauss-Seidel).
 
-Each submerged vertex shall separate at e times its approach; impulses add up, push only, and stay in the friction cone.
-Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); M. Jean, The non-smooth contact
-dynamics method, CMAME 177 (1999). Cost: some ten to some hundred sweeps over the vertices. Leaves no submerged vertex
-approaching faster than `TOLERANCE`. Sweeps are capped, and a step that did not converge says so; with friction of about 1 and above at
-several vertices there need not be a solution. At restitution above 0 it can add a little energy: a vertex that was separating is held back
-by none of its neighbours' restitution.
+Each submerged vertex is to separate at e times its approach speed. Impulses accumulate, only push, and stay within the friction cone.
+
+Order: none claimed (see the package's docstring).
+Keeps: no submerged vertex approaches faster than `TOLERANCE` after a step that converged. At restitution above 0 it can add a little
+energy: a vertex that was separating does not limit the restitution of its neighbours.
+Stops: the number of sweeps is limited, and a step that did not converge is reported. With friction of about 1 and above at several vertices
+a solution need not exist.
+Lanes: none. Each body needs its own number of sweeps, so the bodies of an ensemble run one after the other.
+Cost: about ten to a few hundred sweeps over the vertices a step.
+Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); M. Jean, The non-smooth contact dynamics
+method, CMAME 177 (1999).
 """
 
 import math
 
 import numpy as np
 
-from reference_impl.contacts.mean import along_normal, impulse_response, vertex
+from reference_impl.contacts.response import impulse_response
+from reference_impl.floor_plane import along_normal, vertex
 from reference_impl.quaternion import rotation_matrix
 from reference_impl.vectors import Vec3, compiled, cross, transpose
 
-TOLERANCE = 1e-10  # m/s: no vertex's velocity changes by more in the last sweep
-MOST_SWEEPS = 2000
+ORDER = None
+RUNS_IN_LANES = False
+
+TOLERANCE = 1e-10  # m/s; converged where no vertex's velocity changed by more in a sweep
+MAX_SWEEPS = 2000
 
 
 @compiled
 def collide_normal(x, q, v, w, body, floor, law):
-    """Without friction, whatever the floor's coefficient is."""
+    """For `law=normal`: without friction, whatever coefficient the floor has."""
     return _sweep(x, q, v, w, body, floor, 0.0)
 
 
 @compiled
 def collide_coulomb(x, q, v, w, body, floor, law):
-    """With Coulomb's cone of the floor's coefficient; infinity sticks."""
+    """For `law=coulomb`: within the cone of the floor's coefficient; infinity sticks."""
     return _sweep(x, q, v, w, body, floor, floor.friction)
 
 
@@ -38,7 +47,7 @@ def _sweep(x, q, v, w, body, floor, friction):
     I_inverse = R @ body.inverse_inertia @ transpose(R)
     impulses = np.zeros((body.points.shape[0], 3))
     v0, w0 = v, w
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         largest = 0.0
         for i in range(body.points.shape[0]):
             r = vertex(R, body, i)
@@ -60,11 +69,11 @@ def _sweep(x, q, v, w, body, floor, friction):
 
 @compiled
 def _improve(j, K, u, wanted, friction):
-    """The vertex's impulse j after one more look at its velocity u: separation first, then friction within its cone."""
+    """The next iterate of a vertex's impulse j at velocity u: first the normal part, then friction within its cone."""
     normal = max(j.y + (wanted - u.y) / K.row2.y, 0.0)
     if friction == 0.0:
         return Vec3(0.0, normal, 0.0)
-    # One scale for both directions, so that where it slips friction is opposite to the slip: that of the direction that gives way most.
+    # One scale for both directions, that of the more compliant one, so that friction opposes the slip where the vertex slips.
     half_difference = 0.5 * (K.row1.x - K.row3.z)
     softest = 0.5 * (K.row1.x + K.row3.z) + math.sqrt(half_difference * half_difference + K.row1.z * K.row1.z)
     x = j.x - u.x / softest

@@ -2,14 +2,23 @@
 
 Kinetic energy is u·K⁻¹u/2 of the contact velocity u plus a part that no impulse changes; after eq 17 it is µ² u_n² (K⁻¹)_nn / 2.
 Without friction it is the normal law, because eq 15 can add energy even at µ = 0.
+
+Order: infinite; no time step enters (see the package's docstring).
+Keeps: never adds energy.
+Valid for: friction 0 or infinity.
+Cost: three solutions of a 3 x 3 system an impact.
 Source: follows from eq 12 and 15; A. Chatterjee & A. Ruina, J. Applied Mechanics 65 (1998), for the bound.
 """
 
 import math
 
-from reference_impl.contacts.mean import N
+from reference_impl.floor_plane import N
 from reference_impl.laws import normal
 from reference_impl.vectors import compiled, dot, select, solve
+
+ORDER = math.inf
+RUNS_IN_LANES = True
+ANY_FRICTION = False
 
 
 @compiled

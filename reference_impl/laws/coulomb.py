@@ -3,17 +3,26 @@
     stick   K j = -u - µ u_n N
     slip    j = j_n (N - f t),  t = u_t / |u_t|,  j_n = -(1 + µ) u_n / (N·K (N - f t))
 
-f is the coefficient of friction. A contact that does not slide yet starts where its impulse drives it, t along (K N)_t. Where slip would
-turn round within the impact or jam (N·K (N - f t) not above 0), friction has stopped it on the way: it sticks, with more tangential impulse
-than the cone allows. Slip never adds energy; sticking does where eq 17 does.
+f is the coefficient of friction. For a contact that does not slide at first, t is the direction in which its normal impulse drives it,
+along (K N)_t. Where the slip would reverse within the impact, or jam (N·K (N - f t) not above 0), friction stops it on the way: the contact
+sticks, with a larger tangential impulse than the cone allows.
+
+Order: infinite; no time step enters (see the package's docstring).
+Keeps: the friction cone where it slips. Slipping never adds energy; sticking does where eq 17 does.
+Valid for: any friction. One direction of slip per impact.
+Cost: one solution of a 3 x 3 system and three products with K an impact.
 Source: C. A. de Coulomb (1785); E. J. Routh, Elementary Rigid Dynamics (1905), section 187.
 """
 
 import math
 
-from reference_impl.contacts.mean import N
+from reference_impl.floor_plane import N
 from reference_impl.laws import normal, note
 from reference_impl.vectors import compiled, dot, select
+
+ORDER = math.inf
+RUNS_IN_LANES = True
+ANY_FRICTION = True
 
 
 @compiled
@@ -36,4 +45,5 @@ def impulse(K, u, mu, friction):
 
 @compiled
 def _along_floor(a):
+    """Length of the component along the floor."""
     return math.sqrt(a.x * a.x + a.z * a.z)

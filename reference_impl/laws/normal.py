@@ -1,11 +1,20 @@
 """`law=normal`: the impulse of a frictionless floor, straight up, with Newton's restitution.
 
-Never adds energy, keeps horizontal momentum. Valid for frictionless floors; on others it is a model of its own.
+Order: infinite; no time step enters (see the package's docstring).
+Keeps: horizontal momentum. Never adds energy.
+Valid for: frictionless floors. On others it still applies no friction.
+Cost: one product with K an impact.
 Source: E. T. Whittaker, Analytical Dynamics, section 95.
 """
 
-from reference_impl.contacts.mean import N
+import math
+
+from reference_impl.floor_plane import N
 from reference_impl.vectors import compiled, dot
+
+ORDER = math.inf
+RUNS_IN_LANES = True
+ANY_FRICTION = True
 
 
 @compiled

@@ -1,12 +1,22 @@
 """`law=note`: eq 15 without friction, eq 17 where the floor sticks.
 
-Eq 15 keeps the tangential velocity of the contact, so its impulse is not normal: it pushes sideways, and it can add energy, by up
-to a factor of 7 at restitution 1. Eq 17 can add energy at restitution above .66 (a solid box), and can pull.
+Eq 15 keeps the tangential velocity of the contact, so its impulse is not normal: it pushes sideways, and it can add energy, by up to a
+factor of 7 at restitution 1. Eq 17 can add energy at restitution above .66 (a solid box), and can pull.
+
+Order: infinite; no time step enters (see the package's docstring).
+Valid for: friction 0 or infinity.
+Cost: one solution of a 3 x 3 system an impact.
 Source: H. Wang, Rigid Body Dynamics, eq 11 to 17.
 """
 
-from reference_impl.contacts.mean import N, along_normal
+import math
+
+from reference_impl.floor_plane import N, along_normal
 from reference_impl.vectors import compiled, select, solve
+
+ORDER = math.inf
+RUNS_IN_LANES = True
+ANY_FRICTION = False
 
 
 @compiled

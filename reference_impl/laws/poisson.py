@@ -1,13 +1,24 @@
-"""`law=poisson`: sticking with Poisson's restitution: expansion returns µ times the impulse of compression.
+"""`law=poisson`: sticking with Poisson's restitution, in which expansion returns µ times the impulse of compression.
 
-The contact leaves straight up at s = µ max(-N·K⁻¹u, 0) / (N·K⁻¹N). Never adds energy. Without friction Poisson's and Newton's
-restitution are the same, so there it is the normal law.
+The contact leaves straight up at s = µ max(-N·K⁻¹u, 0) / (N·K⁻¹N). Without friction Poisson's and Newton's restitution agree, so it is the
+normal law there.
+
+Order: infinite; no time step enters (see the package's docstring).
+Keeps: never adds energy.
+Valid for: friction 0 or infinity.
+Cost: three solutions of a 3 x 3 system an impact.
 Source: S. D. Poisson, Traité de mécanique (1833); W. J. Stronge, Impact Mechanics (2000), section 3.4.
 """
 
-from reference_impl.contacts.mean import N
+import math
+
+from reference_impl.floor_plane import N
 from reference_impl.laws import normal
 from reference_impl.vectors import compiled, dot, select, solve
+
+ORDER = math.inf
+RUNS_IN_LANES = True
+ANY_FRICTION = False
 
 
 @compiled

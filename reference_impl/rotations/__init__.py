@@ -1,1 +1,1 @@
-"""How a body turns: `rotation=…`, each a `turn(q, w, dt, body)`."""
+"""Rotations over one step: `rotation=…`, each a `turn(q, w, dt, body)` that returns (q, ω)."""

@@ -3,7 +3,12 @@
     ω = (A_a cn, ± A_b sn, ± A_c dn)(u) along the principal axes a, b, c; b the intermediate one, c the one that L circles
     R' = R B₀ R_z(φ) B'ᵀ, B a triad in the body with L along its third axis, φ the angle by which it has turned about L
 
-Exact, to the rounding of a restart each step; any |ω| dt. Keeps everything. The most expensive rotation by far.
+Order: infinite; each step is exact to the rounding of its restart.
+Keeps: energy and L.
+Valid for: any |ω| dt.
+Lanes: none. The branches and iterations of the elliptic functions differ from body to body, so the bodies of an ensemble run one after the
+other.
+Cost: one set of elliptic functions, two integrals R_F and two to four R_J a step, by far the most of all rotations.
 Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; E. T. Whittaker, Analytical Dynamics, section 69; Carlson's integrals.
 """
 
@@ -12,6 +17,10 @@ import math
 from reference_impl.elliptic import r_f, r_j, sn_cn_dn
 from reference_impl.quaternion import conjugate, from_matrix, normalise, product, to_body, to_world
 from reference_impl.vectors import Mat3, Quat, Vec3, compiled, cross, dot, transpose
+
+ORDER = math.inf
+RUNS_IN_LANES = False
+DISCRETISATION = "exact"
 
 PARALLEL = 1e-15
 """Sine of the angle between L and ω below which the body spins about a principal axis."""
@@ -104,7 +113,7 @@ def _asymmetric_top(moments, spin, dt):
     sn, cn, dn = sn_cn_dn(u, m1)
     after = Vec3(A * cn, B * sn, C * dn)
 
-    # Measure the turn about L against the axis p that L stays away from; o is the other one, and holds L where sn = 0.
+    # Measure the turn about L from the axis p that L stays away from; o is the other one, near L where sn = 0.
     ma, mb, mc = Ia * A, Ib * B, Ic * C
     about_c = abs(ma) > abs(mc)
     Io, mo = (Ia, ma) if about_c else (Ic, mc)

@@ -1,14 +1,21 @@
-"""`rotation=gyroscopic`: eq 6 with the gyroscopic torque it leaves out, explicitly.
+"""`rotation=gyroscopic`: eq 6 with the gyroscopic torque that it omits, explicitly.
 
     ω ← ω + dt I⁻¹ (-ω × I ω)
 
-Order 1. Gains energy at every step and blows up; usable for short times and |ω| dt below .02.
+Order: 1, as explicit Euler.
+Keeps: nothing. Gains energy at every step and diverges.
+Valid for: short times and |ω| dt below .02.
+Cost: `note` and one product with I and I⁻¹ each.
 Source: L. Euler (1758); the explicit term as in many engines, for instance MuJoCo's Euler and Bullet's multibody.
 """
 
 from reference_impl.quaternion import to_body, to_world
 from reference_impl.rotations import note
 from reference_impl.vectors import compiled, cross
+
+ORDER = 1.0
+RUNS_IN_LANES = True
+DISCRETISATION = "semi-implicit Euler with the gyroscopic term explicit"
 
 
 @compiled

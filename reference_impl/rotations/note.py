@@ -1,12 +1,21 @@
-"""`rotation=note`: eq 6. ω stays as it is; q moves along its tangent and is pulled back to unit length.
+"""`rotation=note`: eq 6. ω does not change; q moves along its tangent and is normalised.
 
-No gyroscopic term: not consistent for a body with unequal moments (order 0). Turns 2 atan(|ω| dt/2) a step instead of |ω| dt. Keeps
-kinetic energy and |L|, and loses the direction of L. Never blows up.
+    q ← (q + dt/2 [ω, 0] q) / |…|,   ω ← ω
+
+Order: none claimed. Without the gyroscopic term the method is inconsistent (order 0) for unequal moments. About a principal axis it is of
+order 2: it turns by 2 atan(|ω| dt/2) a step instead of |ω| dt.
+Keeps: kinetic energy and |L|, but not the direction of L.
+Valid for: any |ω| dt; it never diverges.
+Cost: one quaternion product and one normalisation a step, the least of all rotations.
 Source: H. Wang, Rigid Body Dynamics, eq 6.
 """
 
 from reference_impl.quaternion import normalise, product
 from reference_impl.vectors import Quat, compiled
+
+ORDER = None
+RUNS_IN_LANES = True
+DISCRETISATION = "note"
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""The exact answers. Each file is one problem: its formula, its source, what it is valid for."""
+"""Exact solutions ("truths"). Each file solves one problem and states its formula, its source and its range of validity."""
 
 from functools import lru_cache
 
@@ -16,17 +16,17 @@ from scenarios.truths.truth import Impact, Truth
 __all__ = ["LAWS", "Impact", "Law", "Truth", "truth_for"]
 
 
-@lru_cache(maxsize=128)  # a run, its tables and its plots all ask for it, and the course of a tumble takes a second
+@lru_cache(maxsize=128)  # a run, its tables and its plots all need it, and the solution of a tumble takes a second
 def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     """The exact motion of a scene, or None where there is no closed form for it.
 
     Args:
         scene: The scene.
-        law: An impact law to take in the place of the floor's own, for bodies that strike with a corner, an edge or as a ball: what an
-            engine must converge to that has this law.
+        law: An impact law in place of the floor's, for bodies that strike with a corner, an edge or as a ball. An engine that implements
+            this law must converge to this solution.
 
     Returns:
-        A callable of times [s] that gives a `Trajectory`, with the impacts in `events` and its limit in `horizon`.
+        A callable of times [s] that returns a `Trajectory`, with the impacts in `events` and the end of its validity in `horizon`.
     """
     if law is not None:
         return corner_impact(scene, law)

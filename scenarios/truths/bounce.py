@@ -4,11 +4,12 @@
     u_k = e^k u₀,         t_k = t_(k-1) + 2 u_k / g   the impacts after it
     h_k = u_k² / 2g = e^(2k) h_0                      the apexes
 
-For e < 1 the impacts pile up at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time; then the body rests.
+For e < 1 the impacts accumulate at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time; then the body rests.
 
 Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
-Valid for: a ball on a frictionless floor, with any spin about any axis; a box that lands on a face, without spin or with one
-about the vertical; without sideways motion and spin on any floor, with them on a frictionless one; gravity straight down, no damping.
+Valid for: a ball on a frictionless floor, with any spin and any sideways motion; a box that lands on a face of a frictionless floor, with
+any sideways motion and with spin about the vertical only; both on any floor without spin and sideways motion; gravity straight down, no
+damping.
 """
 
 import math
@@ -24,19 +25,19 @@ from scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 
-MOST_BOUNCES = 100_000
-SHORTEST_FLIGHT = 1e-12
-"""Flights shorter than this share of the first fall count as rest: their apexes are below 1e-24 of the drop's."""
+MAX_BOUNCES = 100_000
+MIN_FLIGHT_SHARE = 1e-12
+"""Flights shorter than this share of the first fall count as rest; their apexes are below 1e-24 of the drop height."""
 
 
 def bounce_ladder(scene: Scenario) -> Truth | None:
-    """The truth of a flat drop."""
+    """The exact solution of a flat drop."""
     if scene.floor is None or scene.damping is not None or not _falls_straight_down(scene) or not _stays_flat(scene):
         return None
     g = -float(scene.acceleration[1])
     start = scene.initial_state
     upward = float(start[8])
-    # A hair above the floor is on it; else a ball at rest would be said to bounce a nanometre high for ever.
+    # A body within TOUCHING of the floor starts on it; otherwise a ball at rest would bounce a nanometre high for ever.
     clearance = scene.clearance if scene.clearance > TOUCHING * scene.body.size else 0.0
     u0 = math.sqrt(upward**2 + 2.0 * g * clearance)
     t0 = (upward + u0) / g
@@ -44,14 +45,14 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
     if leaving is None:
         return None
     starts = np.concatenate([[0.0, t0], t0 + np.cumsum(2.0 / g * leaving)])
-    # Starts of flight 0 (the fall), of each flight after an impact, and of rest.
+    # Speeds at the start of flight 0 (the fall), of each flight after an impact, and of rest.
     speeds = np.concatenate([[upward], leaving, [0.0]])
     floor_height = start[1] - scene.clearance
     heights = np.concatenate([[start[1]], np.full(len(speeds) - 1, floor_height)])
     sideways_and_spin = flight_states(start, scene.body.inertia_tensor, np.zeros(3))
 
     def states(t: Array) -> Array:
-        # An impact's own time belongs to the flight before it: before an impact means up to it.
+        # The time of an impact belongs to the flight before it.
         flight = np.maximum(np.searchsorted(starts, t, side="left") - 1, 0)
         since, speed = t - starts[flight], speeds[flight]
         pull = np.where(flight == len(speeds) - 1, 0.0, g)
@@ -70,7 +71,7 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
 
 
 def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array | None:
-    """Speeds after the impacts that are followed by a flight, until the end of the scene or until rest; None if too many."""
+    """Speeds after the impacts that start a flight, until the scene ends or the body rests; None if there are too many."""
     e = floor.restitution
     if remaining < 0.0 or u0 < floor.rest_speed or e * u0 <= 0.0:
         return np.empty(0)
@@ -78,18 +79,18 @@ def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Arra
     if e == 1.0:
         flights = remaining / first + 1.0
     else:
-        # Flights k = 1, 2, … last first e^(k-1); those to come after the end, or too slow to count, are not needed.
+        # Flight k = 1, 2, … lasts first * e^(k-1); flights after the end, or too short to count, are not needed.
         share = 1.0 - remaining * (1.0 - e) / first
         flights = math.log(share) / math.log(e) + 1.0 if share > 0.0 else math.inf
-        flights = min(flights, math.log(SHORTEST_FLIGHT) / math.log(e))
+        flights = min(flights, math.log(MIN_FLIGHT_SHARE) / math.log(e))
         if floor.rest_speed > 0.0:
             flights = min(flights, math.log(floor.rest_speed / u0) / math.log(e) + 1.0)
-    if flights > MOST_BOUNCES:
+    if flights > MAX_BOUNCES:
         return None
     speeds: Array = u0 * e ** np.arange(1.0, math.ceil(flights) + 1.0)
-    # The last flight is the one before an impact slower than rest_speed.
+    # The last flight ends with an impact slower than rest_speed.
     bounces = np.concatenate([[u0], speeds[:-1]]) >= floor.rest_speed
-    return speeds[bounces & (speeds > SHORTEST_FLIGHT * u0)]
+    return speeds[bounces & (speeds > MIN_FLIGHT_SHARE * u0)]
 
 
 def _falls_straight_down(scene: Scenario) -> bool:
@@ -112,7 +113,7 @@ def _stays_flat(scene: Scenario) -> bool:
 
 
 def _turns_about_the_vertical(scene: Scenario) -> bool:
-    """Whether a body that lies flat goes on lying flat: without spin, or with one about a vertical principal axis."""
+    """Whether a flat body stays flat: without spin, or with spin about a vertical principal axis."""
     w = np.array(scene.start.angular_velocity)
     momentum = scene.body.inertia_tensor @ unrotate(np.array(scene.start.orientation), w)
     sideways = np.abs(rotate(np.array(scene.start.orientation), momentum)[[0, 2]]).max()

@@ -1,13 +1,13 @@
-"""A box that lies on a rough floor and turns about the vertical: friction at its corners slows it evenly until it stops.
+"""A box that lies on a rough floor turns about the vertical: friction at its corners decelerates it uniformly until it stops.
 
-    ω(t) = ω₀ - α t,   φ(t) = ω₀ t - α t²/2,   α = f M g ρ / I     up to the stop at ω₀/α
+    ω(t) = ω₀ - α t,   φ(t) = ω₀ t - α t²/2,   α = f M g ρ / I     until it stops at t = ω₀/α
 
-ρ is the distance of the base's corners from the axis. However they share the weight, opposite corners alike, friction has this moment and
-no other.
+ρ is the distance of the base's corners from the axis. For any distribution of the weight that is equal at opposite corners, friction has
+this moment and no resultant force.
 
 Source: C. A. de Coulomb, Théorie des machines simples (1785); Euler's equation about a principal axis.
 Valid for: a box flat on the floor at the start, turning about the vertical and not moving otherwise; a Coulomb coefficient above 0; gravity
-straight down, no damping. Corners touch, not the face between them. Restitution does not matter: nothing separates.
+straight down, no damping. The corners touch, not the face between them. Restitution has no effect, because nothing separates.
 """
 
 import math
@@ -18,25 +18,24 @@ from numpy.typing import NDArray
 from scenarios.body import Box
 from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import about, multiply, rotate, unrotate
+from scenarios.state import ORIENTATION, UP, VELOCITY
 from scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 
-UP = np.array([0.0, 1.0, 0.0])
-
 
 def coulomb_turn(scene: Scenario) -> Truth | None:
-    """The truth of a flat turn."""
+    """The exact solution of a flat turn."""
     floor, start, g = scene.floor, scene.initial_state, scene.acceleration
     if floor is None or isinstance(floor.friction, str) or scene.damping is not None:
         return None
     straight_down = g[1] < 0.0 and g[0] == 0.0 and g[2] == 0.0
-    if not straight_down or start[7:10].any() or start[10] != 0.0 or start[12] != 0.0 or start[11] == 0.0:
+    if not straight_down or start[VELOCITY].any() or start[10] != 0.0 or start[12] != 0.0 or start[11] == 0.0:
         return None
     lever = _lever(scene)
     if lever is None:
         return None
-    vertical = unrotate(start[3:7], UP)
+    vertical = unrotate(start[ORIENTATION], UP)
     moment = float(vertical @ scene.body.inertia_tensor @ vertical)
     spin, slowing = float(start[11]), floor.friction * scene.body.mass * -float(g[1]) * lever / moment
 
@@ -44,16 +43,16 @@ def coulomb_turn(scene: Scenario) -> Truth | None:
         rows = np.tile(start, (len(t), 1))
         turning = np.minimum(t, abs(spin) / slowing)
         left = abs(spin) - slowing * turning
-        rows[:, 3:7] = multiply(about(UP, math.copysign(1.0, spin) * 0.5 * (abs(spin) + left) * turning), start[3:7])
+        rows[:, ORIENTATION] = multiply(about(UP, math.copysign(1.0, spin) * 0.5 * (abs(spin) + left) * turning), start[ORIENTATION])
         rows[:, 11] = math.copysign(1.0, spin) * left
         return rows
 
-    statement = "even slowing by friction at the corners, f M g ρ/I, until it stops (Coulomb)"
+    statement = "uniform deceleration by friction at the corners, f M g ρ/I, until it stops (Coulomb)"
     return Truth("coulomb-turn", statement, states, horizon=scene.duration)
 
 
 def _lever(scene: Scenario) -> float | None:
-    """Distance of the base's corners from the vertical through the centre of mass [m]; None if the box does not lie."""
+    """Distance of the base's corners from the vertical through the centre of mass [m]; None if the box does not lie flat."""
     if not isinstance(scene.body, Box) or abs(scene.clearance) > TOUCHING * scene.body.size:
         return None
     corners = rotate(np.array(scene.start.orientation), scene.body.vertices)

@@ -1,6 +1,6 @@
-"""Jacobi's elliptic functions, from the complementary parameter, so that they stay exact up to the separatrix.
+"""Jacobi's elliptic functions of the complementary parameter, accurate up to the separatrix.
 
-With m₁ = 1 - k² given (not 1 - m₁ recomputed from k), the motion near an unstable axis keeps all its digits.
+Taking m₁ = 1 - k² as the argument, instead of computing it from k, keeps all digits of a motion near an unstable axis.
 """
 
 import math
@@ -8,13 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import elliprf, elliprj
 
 Array = NDArray[np.float64]
 
-
-TINY = 1e-100  # where sn is as small as this it is its own tangent, and the square of cn/sn would overflow
-CONVERGED = 1e-8  # the arithmetic-geometric mean squares its error: one more mean reaches the last digit
+SMALLEST_SINE = 1e-100  # below it sn equals its argument, and the square of cn/sn would overflow
+CONVERGED = 1e-8  # each arithmetic-geometric mean squares the error, so one more reaches the last digit
 
 
 class Jacobi(NamedTuple):
@@ -26,10 +24,10 @@ class Jacobi(NamedTuple):
 
 
 def jacobi(u: Array, m1: float | Array) -> Jacobi:
-    """sn, cn and dn of u for the complementary parameter m₁ = 1 - k² in [0, 1], or for one in (0, 1] for each u.
+    """sn, cn and dn of u for the complementary parameter m₁ = 1 - k²: one number in [0, 1], or one in (0, 1] for each u.
 
-    By Gauss's transformation, on cn/sn rather than on the amplitude: the amplitude would lose half the digits where sn is
-    near 1, which is nearly everywhere on a motion near the separatrix.
+    Gauss's transformation is applied to cn/sn, not to the amplitude, which would lose half the digits where sn is near 1: nearly everywhere
+    on a motion near the separatrix.
 
     Source: R. Bulirsch, Numerische Mathematik 7 (1965), 78-90, procedure sncndn.
     """
@@ -43,7 +41,7 @@ def jacobi(u: Array, m1: float | Array) -> Jacobi:
         steps.append((a, b))
     mean = 0.5 * (a + b)
     sine, cosine = np.sin(mean * u), np.cos(mean * u)
-    at_zero = np.abs(sine) < TINY
+    at_zero = np.abs(sine) < SMALLEST_SINE
     ratio = cosine / np.where(at_zero, 1.0, sine)
     c, dn = mean * ratio, np.ones_like(ratio)
     for a, b in reversed(steps):
@@ -56,11 +54,15 @@ def jacobi(u: Array, m1: float | Array) -> Jacobi:
 
 def quarter_period(m1: float) -> float:
     """K, the complete integral of the first kind; infinite on the separatrix m₁ = 0."""
+    from scipy.special import elliprf
+
     return math.inf if m1 == 0.0 else float(elliprf(0.0, m1, 1.0))
 
 
 def argument(sn: float, cn: float, m1: float) -> float:
-    """The u in (-2K, 2K] whose elliptic sine and cosine are these."""
+    """The u in (-2K, 2K] with this elliptic sine and cosine."""
+    from scipy.special import elliprf
+
     dn2 = m1 + (1.0 - m1) * cn * cn
     u = sn * float(elliprf(cn * cn, dn2, 1.0))
     return u if cn >= 0.0 else math.copysign(2.0 * quarter_period(m1), sn) - u
@@ -71,6 +73,8 @@ def integral_of_sn2(u: Array, at_u: Jacobi, n: float, m1: float) -> Array:
 
     Source: B. C. Carlson, DLMF 19.25.14: Π(n; φ, k) = F + n/3 sin³φ R_J(cos²φ, 1 - k² sin²φ, 1, 1 - n sin²φ).
     """
+    from scipy.special import elliprj
+
     K = quarter_period(m1)
     half_turns = np.round(u / (2.0 * K))
     sign = np.where(half_turns % 2 == 0, 1.0, -1.0)

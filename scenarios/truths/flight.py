@@ -1,4 +1,4 @@
-"""Free flight: the centre of mass on its path, the body turning about it as a free rotor, both slowed by damping if there is any.
+"""Free flight: the centre of mass on a parabola and the body turning as a free rotor, or both with exponential damping.
 
 Without damping:
 
@@ -7,11 +7,11 @@ Without damping:
 With decay rates k of velocity and κ of angular velocity (v' = g - k v, (I ω)' = -κ I ω), φ₁(z) = (1 - e⁻ᶻ)/z, φ₂(z) = (z - 1 + e⁻ᶻ)/z²:
 
     x(t) = x₀ + v₀ t φ₁(kt) + g t² φ₂(kt),   v(t) = v₀ e⁻ᵏᵗ + g t φ₁(kt)
-    ω(t) = e^(-κt) Ω(s),  attitude that of the free rotor Ω at the time s = t φ₁(κt)
+    ω(t) = e^(-κt) Ω(s),  attitude of the free rotor Ω at the time s = t φ₁(κt)
 
-because the damped Euler equations are the free ones in the time s.
+because the substitution of the time s turns the damped Euler equations into the free ones.
 
-Source: Galileo (1638), Discorsi, fourth day, for the parabola; J. Bernoulli (1719) for a resistance in proportion to speed; `free_rotor`
+Source: Galileo (1638), Discorsi, fourth day, for the parabola; J. Bernoulli (1719) for a resistance proportional to speed; `free_rotor`
 for the attitude.
 Valid for: any body without floor, or, undamped, between two impacts.
 """
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.model import Damping, Scenario
+from scenarios.state import PARTS
 from scenarios.truths.free_rotor import AsymmetricTop, free_rotor
 from scenarios.truths.truth import States, Truth
 
@@ -32,8 +33,8 @@ SERIES_TERMS = 22  # enough for 17 digits of φ₂ up to z = 1
 
 
 def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Damping = UNDAMPED) -> States:
-    """Times since `state`, shape (n,), to states, shape (n, 13)."""
-    x, q, v, w = state[0:3], state[3:7], state[7:10], state[10:13]
+    """A function of times since `state` [s], shape (n,), that returns states, shape (n, 13)."""
+    x, q, v, w = (state[part] for part in PARTS.values())
     rotor = free_rotor(inertia, q, w)
 
     def undamped_states(t: Array) -> Array:
@@ -53,7 +54,7 @@ def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Da
 
 
 def flight(scene: Scenario) -> Truth | None:
-    """The truth of a scene in which nothing but gravity and damping acts."""
+    """The exact solution of a scene without a floor."""
     if scene.floor is not None:
         return None
     q, w = np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
@@ -67,8 +68,8 @@ def flight(scene: Scenario) -> Truth | None:
         turning = "angular velocity constant, angle ωt" if np.any(w) else "orientation constant"
     if scene.damping is not None:
         name = f"damped-{name}"
-        parabola = "" if scene.gravity is None else "path of resistance in proportion to speed; "
-        turning += ", in the time (1 - exp(-κt))/κ, all rates decaying"
+        parabola = "" if scene.gravity is None else "path with resistance proportional to speed; "
+        turning += ", at the time (1 - exp(-κt))/κ, with decaying rates"
     states = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration, scene.damping or UNDAMPED)
     return Truth(name, parabola + turning, states)
 
@@ -80,7 +81,7 @@ def _phi1(z: Array) -> Array:
 
 
 def _phi2(z: Array) -> Array:
-    """(z - 1 + e⁻ᶻ)/z², 1/2 at 0; by its series where the difference would lose digits."""
+    """(z - 1 + e⁻ᶻ)/z², 1/2 at 0; by its series below 1, where the difference would lose digits."""
     series = np.polynomial.polynomial.polyval(np.minimum(z, 1.0), [(-1.0) ** n / math.factorial(n + 2) for n in range(SERIES_TERMS)])
     safe = np.maximum(z, 1.0)
     return np.where(z < 1.0, series, (safe + np.expm1(-safe)) / (safe * safe))

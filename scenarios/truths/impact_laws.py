@@ -1,18 +1,19 @@
-"""What one impulse at one point of a body does, by each of the laws that are in use.
+"""The velocities after one impulse at one point of a body, by each impact law.
 
-With u = v + ω × r the velocity of the point, K = 1/M - r* I⁻¹ r* (the note's eq 15), e the restitution and f the friction:
+With u = v + ω × r the velocity of the point, K = 1/M - r* I⁻¹ r* (eq 15 of Wang's lecture note), e the restitution and f the friction:
 
-    note       K j = -(1 + e) u_n N, or, where the floor grips, K j = -u - e u_n N                     eq 15, eq 17
-    normal     j = -(1 + e) u_n / (N·K N) N                                                        without friction
-    poisson    as normal; where the floor grips K j = s N - u,  s = e max(-N·K⁻¹u, 0) / (N·K⁻¹N)
-    clamped    as normal; where the floor grips eq 17 with the largest restitution up to e that adds no energy
+    note       K j = -(1 + e) u_n N without friction (eq 15), K j = -u - e u_n N with infinite friction (eq 17)
+    normal     j = -(1 + e) u_n / (N·K N) N, whatever the friction
+    poisson    normal without friction; with infinite friction K j = s N - u,  s = e max(-N·K⁻¹u, 0) / (N·K⁻¹N)
+    clamped    normal without friction; with infinite friction eq 17 with the largest restitution up to e that adds no energy
     coulomb    eq 17 while it stays within the cone of f, else j = j_n (N - f t), t along u's tangential part
 
-An edge or a face that strikes with one velocity is one point at its middle.
+An edge or a face whose points have one velocity acts as one point at its middle.
 
 Source: H. Wang, Rigid Body Dynamics, eq 15 and 17; E. T. Whittaker, Analytical Dynamics, section 95; S. D. Poisson, Traité de mécanique
 (1833); A. Chatterjee & A. Ruina, J. Applied Mechanics 65 (1998); C. A. de Coulomb (1785), E. J. Routh, Elementary Rigid Dynamics (1905).
-Valid for: a point that approaches. `coulomb` for one that slides the same way throughout the impact: a ball of equal moments does.
+Valid for: a point that approaches. `coulomb`: a point whose direction of sliding does not change during the impact, as on a ball of equal
+moments.
 """
 
 from typing import Literal, get_args
@@ -22,22 +23,21 @@ from numpy.typing import NDArray
 
 from scenarios.model import Floor
 from scenarios.rotations import rotate
+from scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
 
 Array = NDArray[np.float64]
 Law = Literal["note", "normal", "poisson", "clamped", "coulomb"]
 LAWS: tuple[Law, ...] = get_args(Law)
 
-UP = np.array([0.0, 1.0, 0.0])
-
 
 def law_of(floor: Floor) -> Law:
-    """The law that is the truth on a floor: none but the normal impulse without friction, eq 17 where it grips, else Coulomb's."""
+    """The law of the exact solution on a floor: the normal impulse without friction, eq 17 with infinite friction, else Coulomb's law."""
     return {"none": "normal", "infinite": "note"}.get(str(floor.friction), "coulomb")  # type: ignore[return-value]
 
 
 def velocities_after(state: Array, point: Array, mass: float, inertia: Array, floor: Floor, law: Law) -> Array:
     """Velocity and angular velocity, shape (6,), after the impact of one point, offset `point` from the centre in the world frame [m]."""
-    q, v, w = state[3:7], state[7:10], state[10:13]
+    q, v, w = state[ORIENTATION], state[VELOCITY], state[SPIN]
     axes = rotate(q, np.eye(3))  # rows: the body's axes in the world
     inverse = axes.T @ np.linalg.inv(inertia) @ axes
     arm = np.cross(np.eye(3), point)  # as a matrix: arm @ j = point × j

@@ -1,22 +1,23 @@
-"""A box on one edge falls about it, lands, and rocks from edge to edge until it lies.
+"""A box that stands on an edge falls about it, lands on a face, and rocks from edge to edge until it lies still.
 
 ψ is the angle at the pivot between the vertical and the centre of mass, R their distance, k = I/(M R²):
 
     ψ'' = p² sin ψ,   p² = g / ((1 + k) R)               an inverted pendulum
     sin(ψ/2) = √s nd(u),   ψ' = 2p √s √(1-s) sd(u)       u = p (t - T); at rest at the time T with sin²(ψ/2) = s; modulus² = 1 - s
 
-It lands at tan α = a/h, with a the half width of the face it lands on and h the half height of the box above it, and goes on about that
-face's other edge, n = 0, 1, …:
+It lands at tan α = a/h, with a the half width of the face it lands on and h the half height of the box above it, and continues about the
+other edge of that face. For the rockings n = 0, 1, …:
 
-    ω⁺/ω⁻ = r = (k R² + h² - a²) / ((1 + k) R²)          angular momentum about the new pivot is kept
+    ω⁺/ω⁻ = r = (k R² + h² - a²) / ((1 + k) R²)          conservation of angular momentum about the new pivot
     sin²(α/2) - s_n = r²ⁿ (sin²(α/2) - s_0)              from one rocking to the next
 
-or stays down at once where r <= 0. The landings pile up as the impacts of a bouncing ball do; then the box lies still.
+For r <= 0 the box stops at the first landing. The landings accumulate like the impacts of a bouncing ball; then the box lies still.
 
 Source: G. W. Housner, Bull. Seismological Soc. America 53 (1963), 403-417, for the landing; E. T. Whittaker, Analytical Dynamics,
 section 44, for the pendulum.
-Valid for: a box that stands on one edge, at rest or turning about it too slowly to pass the top; a floor that grips, of restitution 0, or
-else until it lands; gravity straight down, no damping; a floor that never has to pull: k + 3 cos²ψ - 2 cos ψ (1 - 2 s) >= 0.
+Valid for: a box that stands on one edge, at rest or turning about it too slowly to pass the top; infinite friction and restitution 0, or
+any restitution until it lands; gravity straight down, no damping; a normal force that is never negative: k + 3 cos²ψ - 2 cos ψ (1 - 2 s) >=
+0.
 """
 
 import math
@@ -27,20 +28,21 @@ from numpy.typing import NDArray
 
 from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import about, multiply
+from scenarios.state import ORIENTATION, UP, VELOCITY
 from scenarios.truths.elliptic import argument, jacobi
-from scenarios.truths.stand import LEAST_LEVEL, UP, Stand, on_one_edge
+from scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 
 PENDULUM = "inverted pendulum by Jacobi's elliptic functions (Whittaker, section 44)"
-MOST_ROCKINGS = 100_000
-SMALLEST_ROCKING = 1e-24
-"""Of the first one's energy: less counts as rest, as in the bounce ladder."""
+MAX_ROCKINGS = 100_000
+MIN_ENERGY_SHARE = 1e-24
+"""Energy of a rocking over that of the first, below which the box counts as at rest, as in the bounce ladder."""
 
 
 class _Ladder(NamedTuple):
-    """One rocking after the other: when it is at rest [s], sin²(ψ/2) there, and when it lands [s]; shapes (n,)."""
+    """The successive rockings: time of rest [s], sin²(ψ/2) at rest, and time of landing [s]; shapes (n,)."""
 
     rests: Array
     levels: Array
@@ -48,7 +50,7 @@ class _Ladder(NamedTuple):
 
 
 def rocking(scene: Scenario) -> Truth | None:
-    """The truth of a box that falls about an edge."""
+    """The exact solution of a box that falls about an edge."""
     floor = scene.floor
     if floor is None or floor.friction != "infinite" or scene.damping is not None:
         return None
@@ -60,7 +62,7 @@ def rocking(scene: Scenario) -> Truth | None:
         return None
 
     def states(t: Array) -> Array:
-        # A landing's own time belongs to the rocking before it.
+        # The time of a landing belongs to the rocking before it.
         begins = np.concatenate([[0.0], ladder.landings])
         number = np.maximum(np.searchsorted(begins, t, side="left") - 1, 0)
         lies = number == len(ladder.rests)
@@ -73,13 +75,13 @@ def rocking(scene: Scenario) -> Truth | None:
         return Truth("tipping", PENDULUM, states, horizon=scene.duration)
     if floor.restitution > 0.0:
         return Truth("tipping", PENDULUM, states, horizon=float(ladder.landings[0]))
-    statement = f"{PENDULUM}; angular momentum about the new edge kept on landing (Housner 1963)"
+    statement = f"{PENDULUM}; angular momentum about the new edge is conserved on landing (Housner 1963)"
     return Truth("rocking", statement, states, _impacts(scene, stand, ladder), scene.duration)
 
 
 def _pivots(scene: Scenario, stand: Stand) -> bool:
-    """Whether the edge that it stands on is at rest."""
-    velocity = scene.initial_state[7:10]
+    """Whether the edge on which the box stands is at rest."""
+    velocity = scene.initial_state[VELOCITY]
     turning = np.cross(stand.speed * stand.falling, stand.to_centre)
     return bool(np.abs(velocity - turning).max() <= TOUCHING * np.linalg.norm(velocity))
 
@@ -90,43 +92,43 @@ def _rate(stand: Stand) -> float:
 
 
 def _ratio(stand: Stand) -> float:
-    """Angular speed after over before landing, r."""
+    """Ratio r of the angular speeds after and before a landing."""
     squares = stand.half_height**2 - stand.half_width**2
     return (stand.share * stand.radius**2 + squares) / ((1.0 + stand.share) * stand.radius**2)
 
 
 def _ladder(stand: Stand, duration: float) -> _Ladder | None:
-    """All rockings until the scene ends or the box lies; None if it passes the top, lifts off, or lands too often."""
+    """All rockings until the scene ends or the box lies still; None if it passes the top, lifts off, or lands too often."""
     at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.flat) ** 2
     risen = (0.5 * stand.speed / _rate(stand)) ** 2
     level = at_start - risen
-    if level < LEAST_LEVEL or _would_lift_off(stand, level):
+    if level < MIN_LEVEL or _would_lift_off(stand, level):
         return None
     rest = math.copysign(_time_from_rest(stand, level, risen), -stand.speed)
     fallen = at_end - level
     rests, levels, landings = [rest], [level], [rest + _time_from_rest(stand, level, fallen)]
-    while _ratio(stand) > 0.0 and landings[-1] <= duration and len(rests) < MOST_ROCKINGS:
+    while _ratio(stand) > 0.0 and landings[-1] <= duration and len(rests) < MAX_ROCKINGS:
         still = _ratio(stand) ** (2 * len(rests)) * fallen
-        if still < SMALLEST_ROCKING * fallen:
+        if still < MIN_ENERGY_SHARE * fallen:
             break
         half = _time_from_rest(stand, at_end - still, still)
         rests.append(landings[-1] + half)
         levels.append(at_end - still)
         landings.append(rests[-1] + half)
-    if len(rests) == MOST_ROCKINGS:
+    if len(rests) == MAX_ROCKINGS:
         return None
     return _Ladder(np.array(rests), np.array(levels), np.array(landings))
 
 
 def _would_lift_off(stand: Stand, level: float) -> bool:
-    """Whether the floor would have to pull at some angle of the first rocking, the widest."""
+    """Whether the normal force would be negative at some angle of the first rocking, the widest."""
     at_rest = 1.0 - 2.0 * level
     cosine = min(max(at_rest / 3.0, math.cos(stand.flat)), at_rest)
     return stand.share + 3.0 * cosine**2 - 2.0 * cosine * at_rest < 0.0
 
 
 def _time_from_rest(stand: Stand, level: float, fallen: float) -> float:
-    """Time [s] from rest at sin²(ψ/2) = level to where it is `fallen` more."""
+    """Time [s] from rest at sin²(ψ/2) = level to sin²(ψ/2) = level + fallen."""
     now = level + fallen
     sn = math.sqrt(fallen / (now * (1.0 - level)))
     cn = math.sqrt(level * (1.0 - now) / (now * (1.0 - level)))
@@ -134,25 +136,25 @@ def _time_from_rest(stand: Stand, level: float, fallen: float) -> float:
 
 
 def _pendulum(rate: float, since_rest: Array, level: Array) -> tuple[Array, Array]:
-    """Sin(ψ/2) and ψ' [rad/s] at times since rest [s], shape (n,), each with its own level, shape (n,)."""
+    """Sin(ψ/2) and ψ' [rad/s] at times since rest [s], shape (n,), for the level of each, shape (n,)."""
     sn, _, dn = jacobi(rate * since_rest, level)
     return np.sqrt(level) / dn, 2.0 * rate * np.sqrt(level * (1.0 - level)) * sn / dn
 
 
 def _states(scene: Scenario, stand: Stand, number: NDArray[np.intp], angle: Array, speed: Array) -> Array:
-    """Rockings by number, shape (n,), each at its angle ψ [rad] and speed ψ' [rad/s], as states, shape (n, 13)."""
+    """States, shape (n, 13), of rockings by number, shape (n,), at angles ψ [rad] and speeds ψ' [rad/s]."""
     side = np.where(number % 2 == 0, 1.0, -1.0)[:, None]
     pivot = stand.pivot + np.where(side > 0.0, 0.0, 2.0 * stand.half_width) * stand.outward
     sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]
     to_centre = stand.radius * (side * sine * stand.outward + cosine * UP)
     turned = stand.flat - stand.angle - side[:, 0] * (stand.flat - angle)
     spin = side * speed[:, None] * stand.falling
-    orientation = multiply(about(stand.falling, turned), scene.initial_state[3:7])
+    orientation = multiply(about(stand.falling, turned), scene.initial_state[ORIENTATION])
     return np.hstack([pivot + to_centre, orientation, np.cross(spin, to_centre), spin])
 
 
 def _impacts(scene: Scenario, stand: Stand, ladder: _Ladder) -> tuple[Impact, ...]:
-    """The landings within the scene's duration, each as the state just before and just after."""
+    """The landings within the scene's duration."""
     times = ladder.landings[ladder.landings <= scene.duration]
     number = np.arange(len(times))
     flat = np.full(len(times), stand.flat)

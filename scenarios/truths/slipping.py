@@ -1,6 +1,6 @@
-"""A box on one edge falls over on a frictionless floor: the edge slips, the centre of mass comes straight down.
+"""A box that stands on an edge falls over on a frictionless floor: the edge slips and the centre of mass falls straight down.
 
-ψ is the angle at the edge between the vertical and the centre of mass, R their distance, k = I/(M R²); energy is kept:
+ψ is the angle at the edge between the vertical and the centre of mass, R their distance, k = I/(M R²). Energy is conserved:
 
     (k + sin²ψ) ψ'² = 2 (g/R) (cos ψ_rest - cos ψ)
 
@@ -8,11 +8,11 @@ With sin(ψ/2) = √s cosh u, s = sin²(ψ_rest/2), the time since rest is the i
 
     dt/du = √((k + sin²ψ) R/g) / cos(ψ/2)
 
-which is no elliptic integral: it is taken of its Chebyshev series, and inverted by Newton's method.
+which is not an elliptic integral. It is integrated as a Chebyshev series and inverted by Newton's method.
 
 Source: the integrals of energy and of horizontal momentum; C. W. Clenshaw & A. R. Curtis, Numerische Mathematik 2 (1960), for the time.
-Valid for: a box that stands on one edge, at rest, sliding evenly or turning about the edge too slowly to pass the top; a frictionless
-floor; gravity straight down, no damping; until the box lands. The floor never has to pull.
+Valid for: a box that stands on one edge, with any horizontal velocity, at rest or turning about the edge too slowly to pass the top; a
+frictionless floor; gravity straight down, no damping; until the box lands. The normal force is never negative.
 """
 
 import math
@@ -22,22 +22,22 @@ from functools import partial
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import about, multiply
-from scenarios.truths.stand import LEAST_LEVEL, UP, Stand, on_one_edge
+from scenarios.state import ORIENTATION, POSITION, UP, VELOCITY
+from scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 
-FIRST_DEGREE, LAST_DEGREE = 16, 512
-NEGLIGIBLE = 1e-15
-GUESSES = 500  # of the cubic, good for 1e-9 and so for the square of that after Newton
+MIN_DEGREE, MAX_DEGREE = 16, 512  # of the Chebyshev series
+NEGLIGIBLE_COEFFICIENT = 1e-15  # of the largest
+GUESS_POINTS = 500  # of the cubic, whose error of 1e-9 Newton's method squares
 
 
 def slipping(scene: Scenario) -> Truth | None:
-    """The truth of a box whose edge slips."""
+    """The exact solution of a box whose edge slips."""
     floor = scene.floor
     if floor is None or floor.friction != "none" or scene.damping is not None:
         return None
@@ -49,7 +49,7 @@ def slipping(scene: Scenario) -> Truth | None:
         return None
     at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.flat) ** 2
     level = at_start - 0.25 * (stand.share + math.sin(stand.angle) ** 2) * stand.radius / stand.gravity * stand.speed**2
-    if level < LEAST_LEVEL:
+    if level < MIN_LEVEL:
         return None
     since_rest = _time_since_rest(stand, level, at_end)
     rest = math.copysign(float(since_rest(math.acosh(math.sqrt(max(at_start / level, 1.0))))), -stand.speed)
@@ -76,17 +76,19 @@ def _pace(stand: Stand, level: float, u: Array) -> Array:
 
 def _time_since_rest(stand: Stand, level: float, at_end: float) -> Chebyshev:
     """Time since rest [s] over u, from rest to landing."""
-    degree, end = FIRST_DEGREE, math.acosh(math.sqrt(at_end / level))
+    degree, end = MIN_DEGREE, math.acosh(math.sqrt(at_end / level))
     while True:
         pace = Chebyshev.interpolate(partial(_pace, stand, level), degree, domain=[0.0, end])
-        if degree == LAST_DEGREE or np.abs(pace.coef[-4:]).max() < NEGLIGIBLE * np.abs(pace.coef).max():
+        if degree == MAX_DEGREE or np.abs(pace.coef[-4:]).max() < NEGLIGIBLE_COEFFICIENT * np.abs(pace.coef).max():
             return pace.integ(lbnd=0.0)
         degree *= 2
 
 
 def _inverse(since_rest: Chebyshev, pace: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """The function from times since rest [s] to u: one step of Newton's from a cubic; before rest as after it, but for the sign."""
-    u = np.linspace(0.0, since_rest.domain[1], GUESSES)
+    """The inverse function, from times since rest [s] to u, odd in time: a cubic and one step of Newton's method."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    u = np.linspace(0.0, since_rest.domain[1], GUESS_POINTS)
     guess = CubicHermiteSpline(since_rest(u), u, 1.0 / pace(u))
 
     def inverse(times: Array) -> Array:
@@ -97,11 +99,11 @@ def _inverse(since_rest: Chebyshev, pace: Callable[[Array], Array]) -> Callable[
 
 
 def _states(scene: Scenario, stand: Stand, t: Array, angle: Array, speed: Array) -> Array:
-    """Angles ψ [rad] and speeds ψ' [rad/s] at times [s], shapes (n,), as states, shape (n, 13)."""
+    """States, shape (n, 13), at times [s], angles ψ [rad] and speeds ψ' [rad/s], shapes (n,)."""
     start, t_ = scene.initial_state, t[:, None]
-    sideways = start[7:10] * np.array([1.0, 0.0, 1.0])
-    position = start[0:3] + sideways * t_
+    sideways = start[VELOCITY] * np.array([1.0, 0.0, 1.0])
+    position = start[POSITION] + sideways * t_
     position[:, 1] = stand.pivot[1] + stand.radius * np.cos(angle)
     velocity = sideways - (stand.radius * np.sin(angle) * speed)[:, None] * UP
-    orientation = multiply(about(stand.falling, angle - stand.angle), start[3:7])
+    orientation = multiply(about(stand.falling, angle - stand.angle), start[ORIENTATION])
     return np.hstack([position, orientation, velocity, speed[:, None] * stand.falling])

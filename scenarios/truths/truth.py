@@ -1,4 +1,4 @@
-"""What a truth is: the exact motion, the impacts in it, and until when it holds."""
+"""The type of an exact solution: the motion, its impacts, and the time up to which it is valid."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ class Impact:
     """One collision with the floor.
 
     Attributes:
-        time: When [s].
+        time: Time of the collision [s].
         before: State just before, shape (13,).
         after: State just after, shape (13,).
     """
@@ -33,11 +33,11 @@ class Truth:
     """The exact motion of a scene.
 
     Attributes:
-        name: Short name, as in the results' column `truth`.
+        name: Short name, as in the column `truth` of the results.
         statement: The formula and its source, one sentence.
-        states: Times, shape (n,), to states, shape (n, 13).
+        states: Function of times, shape (n,), that returns states, shape (n, 13).
         events: The impacts within the scene's duration, in order.
-        horizon: Until when the formula holds [s].
+        horizon: Time up to which the formula is valid [s].
     """
 
     name: str
@@ -47,11 +47,11 @@ class Truth:
     horizon: float = float("inf")
 
     def covers(self, t: Array) -> NDArray[np.bool_]:
-        """Which times [s] are not past the horizon; the last of n dt may round past it."""
+        """Mask of the times [s] up to the horizon, with a margin because the last of n dt may round past it."""
         return t <= self.horizon * (1.0 + 1e-9)
 
     def after(self, delay: float) -> "Truth":
-        """The rest of the motion, from a moment on that is not beyond the first impact [s]."""
+        """The motion from a time `delay` [s] on, which must not be after the first impact."""
         later = tuple(replace(event, time=event.time - delay) for event in self.events)
         return replace(self, states=lambda t: self.states(t + delay), events=later, horizon=self.horizon - delay)
 
@@ -59,9 +59,9 @@ class Truth:
         """The motion at times [s] from 0 to `horizon`, shape (n,).
 
         Raises:
-            ValueError: A time lies outside.
+            ValueError: A time is outside this range.
         """
         t = np.atleast_1d(np.asarray(times, dtype=float))
         if not np.all((t >= 0.0) & self.covers(t)):
-            raise ValueError(f"the truth {self.name!r} holds for 0 <= t <= {self.horizon:.6g} s")
+            raise ValueError(f"the exact solution {self.name!r} is valid for 0 <= t <= {self.horizon:.6g} s")
         return Trajectory.from_states(t, self.states(t))

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import reference_impl
 from reference_impl import Body, Floor, Methods, World, lanes
+from reference_impl.state import ORIENTATION, SPIN, VELOCITY
 
 G = np.array([0.0, -9.8, 0.0])
 POINTS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.1, 0.2, 0.3]
@@ -17,7 +18,7 @@ WORLD = World(G, Floor(0.5, np.inf))
 def starts(count, seed=0):
     rows = np.random.default_rng(seed).normal(size=(count, 13))
     rows[:, 1] = 0.4
-    rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
+    rows[:, ORIENTATION] /= np.linalg.norm(rows[:, ORIENTATION], axis=1, keepdims=True)
     return rows
 
 
@@ -93,8 +94,8 @@ def test_forces_of_each_body():
     start = np.array([0, 5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0])
     after = reference_impl.step(start, BOX, World(), 1e-3, forces=forces)
     torques = np.cross(POINTS, forces).sum(axis=1)
-    np.testing.assert_allclose(after[:, 10:13], 1e-3 * np.linalg.solve(BOX.inertia, torques.T).T, rtol=1e-12)
-    np.testing.assert_allclose(after[:, 7:10], 1e-3 * forces.sum(axis=1), rtol=1e-12, atol=1e-18)
+    np.testing.assert_allclose(after[:, SPIN], 1e-3 * np.linalg.solve(BOX.inertia, torques.T).T, rtol=1e-12)
+    np.testing.assert_allclose(after[:, VELOCITY], 1e-3 * forces.sum(axis=1), rtol=1e-12, atol=1e-18)
 
 
 def test_balls_are_turned_if_one_of_them_has_to_be():
@@ -117,7 +118,7 @@ def test_balls_are_turned_if_one_of_them_has_to_be():
         (lambda: run(body=Body(np.ones(3), BOX.inertia, POINTS, np.zeros(2))), "ensemble: got 3 of mass but 2 of radius"),
         (lambda: run(states=np.zeros((0, 13))), r"state: must have shape \(13,\) or \(B, 13\), got \(0, 13\)"),
         (lambda: run(world=World(G, Floor(np.array([0.5, 1.5]), 0.0))), "restitution: got 1.5 for body 1; must be between 0 and 1"),
-        (lambda: run(world=World(G, Floor(0.5, np.array([0.0, 0.3])))), "law 'note' knows friction 0 and infinity, got 0.3"),
+        (lambda: run(world=World(G, Floor(0.5, np.array([0.0, 0.3])))), "friction: got 0.3; law 'note' takes 0 and infinity only; use law='coulomb'"),
         (
             lambda: run(body=Body(1.0, np.stack([np.eye(3), -np.eye(3)]), POINTS)),
             "inertia: got .* for body 1; must be .* positive definite",

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 import reference_impl
 from reference_impl import Body, Methods, World
 from reference_impl.elliptic import r_c1, r_f, r_j, sn_cn_dn
+from reference_impl.state import ORIENTATION, SPIN
 from scenarios.rotations import angle_between_orientations, rotate, unrotate
 from scenarios.truths.free_rotor import free_rotor
 
@@ -24,7 +25,7 @@ def turned(rotation, moments, spin, duration, steps, start=TILTED):
     body = Body(1.0, inertia, POINTS)
     rows = reference_impl.simulate(state, body, World(), duration / steps, steps, steps, Methods(rotation=rotation))
     exact, _ = free_rotor(inertia, start, w)(np.array([duration]))
-    return rows, angle_between_orientations(rows[-1, 3:7], exact[0])
+    return rows, angle_between_orientations(rows[-1, ORIENTATION], exact[0])
 
 
 # The range of |ω| dt in which each method shows its order: below it rounds, above it has not settled.
@@ -90,8 +91,8 @@ def kept(rotation, size, steps=20_000):
     spin = np.array([0.3, 0.8, -0.5])
     rows, _ = turned(rotation, (1, 2, 3), spin, steps * size / np.linalg.norm(spin), steps)
     inertia = np.diag([1.0, 2.0, 3.0])
-    L = rotate(rows[:, 3:7], unrotate(rows[:, 3:7], rows[:, 10:13]) @ inertia)
-    energy = np.sum(L * rows[:, 10:13], axis=1)
+    L = rotate(rows[:, ORIENTATION], unrotate(rows[:, ORIENTATION], rows[:, SPIN]) @ inertia)
+    energy = np.sum(L * rows[:, SPIN], axis=1)
     return abs(energy[-1] / energy[0] - 1), np.linalg.norm(L[-1] - L[0]) / np.linalg.norm(L[0])
 
 
@@ -126,7 +127,7 @@ def test_a_body_off_its_axes():
             )[-1]
             for start, inertia in ((IDENTITY, np.diag([1.0, 2.0, 3.0])), (frame, axes.T @ np.diag([1.0, 2.0, 3.0]) @ axes))
         ]  # fmt: skip
-        straight, skew = (row[3:7] for row in rows)
+        straight, skew = (row[ORIENTATION] for row in rows)
         assert angle_between_orientations(multiply(straight, frame), skew) <= 1e-12
 
 
@@ -156,7 +157,7 @@ def test_energy_does_not_drift_by_rounding(rotation):
     body = Body(1.0, np.diag([1.0, 2.0, 3.0]), np.full((1, 3), 0.1))
     start = np.array([0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0.3, 0.8, -0.5])
     rows = reference_impl.simulate(start, body, World(), 1e-3, 100_000, 100_000, Methods(rotation=rotation))
-    energy = [0.5 * (np.diag(body.inertia) @ Rotation.from_quat(row[3:7]).inv().apply(row[10:13]) ** 2) for row in rows]
+    energy = [0.5 * (np.diag(body.inertia) @ Rotation.from_quat(row[ORIENTATION]).inv().apply(row[SPIN]) ** 2) for row in rows]
     assert abs(energy[1] / energy[0] - 1) <= 1e-11
 
 
@@ -174,8 +175,8 @@ def test_midpoint_solves_its_equation_at_large_angles():
     body = Body(1.0, np.diag([1.0, 2.0, 3.0]), np.full((1, 3), 0.1))
     start = np.array([0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1.0, 1.5, -1.7])
     rows = reference_impl.simulate(start, body, World(), 2.5 / np.linalg.norm(start[10:]), 200, 1, Methods(rotation="midpoint"))
-    R = Rotation.from_quat(rows[:, 3:7])
-    spin = R.inv().apply(rows[:, 10:13])
+    R = Rotation.from_quat(rows[:, ORIENTATION])
+    spin = R.inv().apply(rows[:, SPIN])
     energy, L = 0.5 * spin**2 @ np.diag(body.inertia), R.apply(spin * np.diag(body.inertia))
     assert np.ptp(energy) <= 1e-12 * energy[0]
     assert np.abs(L - L[0]).max() <= 1e-12 * np.linalg.norm(L[0])

@@ -5,6 +5,7 @@ import pytest
 
 import reference_impl
 from reference_impl import Body, Floor, World
+from reference_impl.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 G = np.array([0.0, -9.8, 0.0])
 HALF = np.array([0.1, 0.2, 0.3])
@@ -21,15 +22,15 @@ def test_eq1_free_flight_in_closed_form():
     h, n = 1e-2, np.arange(301)
     rows = reference_impl.simulate(state(v=(1, 2, 3)), BODY, World(G), h, 300)
     exact = np.array([0, 5, 0]) + np.outer(n * h, [1, 2, 3]) + np.outer(h**2 * n * (n + 1) / 2, G)
-    np.testing.assert_allclose(rows[:, 0:3], exact, rtol=0, atol=1e-13 * np.abs(exact).max())
+    np.testing.assert_allclose(rows[:, POSITION], exact, rtol=0, atol=1e-13 * np.abs(exact).max())
 
 
 def test_synchronised_energy_is_conserved_and_the_raw_one_drifts():
     """v²/2 - g·x + h g·v/2 is constant to 1e-13; v²/2 - g·x loses g² h t/2, 0.48 J/kg after 1 s at 10 ms."""
     h = 1e-2
     rows = reference_impl.simulate(state(), BODY, World(G), h, 100)
-    raw = 0.5 * np.sum(rows[:, 7:10] ** 2, axis=1) - rows[:, 0:3] @ G
-    shadow = raw + 0.5 * h * rows[:, 7:10] @ G
+    raw = 0.5 * np.sum(rows[:, VELOCITY] ** 2, axis=1) - rows[:, POSITION] @ G
+    shadow = raw + 0.5 * h * rows[:, VELOCITY] @ G
     assert np.ptp(shadow) <= 1e-13 * shadow[0]
     assert raw[-1] - raw[0] == pytest.approx(-(9.8**2) * h * 1.0 / 2, rel=1e-12)
 
@@ -49,14 +50,14 @@ def test_without_gyroscopic_term_energy_and_length_of_momentum_look_perfect():
     rows = reference_impl.simulate(state(w=np.radians([25, -15, 40])), body, World(), 1e-3, 10_000)
     from scipy.spatial.transform import Rotation
 
-    R = Rotation.from_quat(rows[:, 3:7])
-    L = R.apply(R.inv().apply(rows[:, 10:13]) @ body.inertia)
-    energy = np.sum(L * rows[:, 10:13], axis=1)
+    R = Rotation.from_quat(rows[:, ORIENTATION])
+    L = R.apply(R.inv().apply(rows[:, SPIN]) @ body.inertia)
+    energy = np.sum(L * rows[:, SPIN], axis=1)
     length = np.linalg.norm(L, axis=1)
     assert np.ptp(energy) <= 1e-12 * energy[0]
     assert np.ptp(length) <= 1e-12 * length[0]
     direction = np.arccos(np.clip(L @ L[0] / (length * length[0]), -1, 1))
-    cone = np.arctan2(np.linalg.norm(np.cross(L[0], rows[0, 10:13])), L[0] @ rows[0, 10:13])
+    cone = np.arctan2(np.linalg.norm(np.cross(L[0], rows[0, SPIN])), L[0] @ rows[0, SPIN])
     assert direction.max() == pytest.approx(2 * cone, rel=1e-5)  # L runs round a cone about ω; 0.753 rad
     assert direction.max() > 0.7
 
@@ -77,8 +78,8 @@ def test_eq6_torque_of_a_couple():
     forces[0], forces[7] = (0, 0, 1.0), (0, 0, -1.0)
     after = reference_impl.step(state(), BODY, World(), 1e-3, forces=forces)
     torque = sum(np.cross(p, f) for p, f in zip(POINTS, forces, strict=True))
-    np.testing.assert_allclose(after[10:13], 1e-3 * np.linalg.solve(BODY.inertia, torque), rtol=1e-14)
-    np.testing.assert_array_equal(after[7:10], 0.0)
+    np.testing.assert_allclose(after[SPIN], 1e-3 * np.linalg.solve(BODY.inertia, torque), rtol=1e-14)
+    np.testing.assert_array_equal(after[VELOCITY], 0.0)
 
 
 def test_damping_is_exponential_in_time():
@@ -142,7 +143,7 @@ def test_eq7_and_eq9_in_a_body_that_is_turned():
 
     R = Rotation.from_quat(q).as_matrix()
     torque = np.cross(POINTS @ R.T, forces).sum(axis=0)
-    np.testing.assert_allclose(after[10:13], 1e-3 * R @ np.linalg.solve(BODY.inertia, R.T @ torque), rtol=1e-12)
+    np.testing.assert_allclose(after[SPIN], 1e-3 * R @ np.linalg.solve(BODY.inertia, R.T @ torque), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +156,7 @@ def test_a_ball_is_turned_wherever_something_turns_it(motion, turns, sideways):
     ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
     start = state(x=(0, 0.2, 0), **motion)
     rows = reference_impl.simulate(start, ball, World(G + np.array(sideways), Floor(0.5, np.inf)), 1e-3, 400)
-    turned = bool(np.any(rows[-1, 3:7] != rows[0, 3:7]))
+    turned = bool(np.any(rows[-1, ORIENTATION] != rows[0, ORIENTATION]))
     assert turned == (turns or any(sideways))
 
 
@@ -168,7 +169,7 @@ def test_orientations_are_brought_to_unit_length():
     ]
     for other in rows[1:]:
         np.testing.assert_allclose(other, rows[0], rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(rows[0][0, 3:7], q)
+    np.testing.assert_array_equal(rows[0][0, ORIENTATION], q)
 
 
 def test_what_a_simulator_was_given_may_change_afterwards():

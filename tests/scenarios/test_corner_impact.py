@@ -6,6 +6,7 @@ import pytest
 from scenarios import load, truth_for
 from scenarios.mechanics import angular_momentum, energy, lowest_height
 from scenarios.rotations import rotate
+from scenarios.state import ORIENTATION, RATES, SPIN, VELOCITY
 from scenarios.trajectory import Trajectory
 from scenarios.truths.flight import flight_states
 
@@ -28,10 +29,10 @@ def test_published_figures():
     """A box of corner masses dropped from rest: time and velocities after, to the six published decimals."""
     [smooth] = truth_for(dropped_from_rest("none")).events
     assert smooth.time == pytest.approx(0.426939, abs=5e-7)
-    np.testing.assert_allclose(smooth.after[7:10], [0, 1.084631, 0], rtol=0, atol=5e-7)
-    np.testing.assert_allclose(smooth.after[10:13], [-3.903102, -0.284375, 0.051236], rtol=0, atol=5e-7)
+    np.testing.assert_allclose(smooth.after[VELOCITY], [0, 1.084631, 0], rtol=0, atol=5e-7)
+    np.testing.assert_allclose(smooth.after[SPIN], [-3.903102, -0.284375, 0.051236], rtol=0, atol=5e-7)
     [rough] = truth_for(dropped_from_rest("infinite")).events
-    np.testing.assert_allclose(rough.after[7:10], [-0.038962, 1.558309, -1.253507], rtol=0, atol=5e-7)
+    np.testing.assert_allclose(rough.after[VELOCITY], [-0.038962, 1.558309, -1.253507], rtol=0, atol=5e-7)
 
 
 @pytest.mark.parametrize("name", ["drop-box-corner", "drop-box-sticking"])
@@ -42,16 +43,16 @@ def test_laws_of_the_catalogue_scenes(name):
     [impact] = truth.events
     before, after = truth.states(np.array([impact.time]))[0], impact.after
     np.testing.assert_allclose(before, impact.before, rtol=0, atol=1e-14)
-    offsets = rotate(impact.before[3:7], scene.body.vertices)
+    offsets = rotate(impact.before[ORIENTATION], scene.body.vertices)
     corner = offsets[np.argmin(offsets[:, 1])]
     assert impact.before[1] + corner[1] == pytest.approx(0.0, abs=1e-14)
 
-    axes = rotate(impact.before[3:7], np.eye(3)).T
+    axes = rotate(impact.before[ORIENTATION], np.eye(3)).T
     inertia = axes @ scene.body.inertia_tensor @ axes.T
-    kick = scene.body.mass * (after[7:10] - impact.before[7:10])
-    turn = inertia @ (after[10:13] - impact.before[10:13])
+    kick = scene.body.mass * (after[VELOCITY] - impact.before[VELOCITY])
+    turn = inertia @ (after[SPIN] - impact.before[SPIN])
     np.testing.assert_allclose(turn, np.cross(corner, kick), rtol=0, atol=1e-13 * np.linalg.norm(kick))
-    contact_before, contact_after = (s[7:10] + np.cross(s[10:13], corner) for s in (impact.before, after))
+    contact_before, contact_after = (s[VELOCITY] + np.cross(s[SPIN], corner) for s in (impact.before, after))
     assert contact_after[1] == pytest.approx(-0.5 * contact_before[1], rel=1e-13)
     if name == "drop-box-corner":
         np.testing.assert_allclose(kick[[0, 2]], 0.0, rtol=0, atol=1e-13)
@@ -103,26 +104,26 @@ def test_a_tumble_against_an_integrator_with_events(friction):
     inverse, e = np.linalg.inv(tensor), scene.floor.restitution
 
     def derivative(t, s):
-        q, spin = s[3:7], s[10:13]  # spin in the body
+        q, spin = s[ORIENTATION], s[SPIN]  # spin in the body
         p, q0, r = spin
         turning = 0.5 * np.array(
             [q[3] * p + q[1] * r - q[2] * q0, q[3] * q0 + q[2] * p - q[0] * r, q[3] * r + q[0] * q0 - q[1] * p, -q[:3] @ spin]
         )
-        return np.concatenate([s[7:10], turning, [0, -9.8, 0], -inverse @ np.cross(spin, tensor @ spin)])
+        return np.concatenate([s[VELOCITY], turning, [0, -9.8, 0], -inverse @ np.cross(spin, tensor @ spin)])
 
     def lowest(t, s):
-        return s[1] + Rotation.from_quat(s[3:7]).apply(points)[:, 1].min()
+        return s[1] + Rotation.from_quat(s[ORIENTATION]).apply(points)[:, 1].min()
 
     lowest.terminal, lowest.direction = True, -1
     state, now = scene.initial_state, 0.0
-    state[10:13] = Rotation.from_quat(state[3:7]).inv().apply(state[10:13])
+    state[SPIN] = Rotation.from_quat(state[ORIENTATION]).inv().apply(state[SPIN])
     for event in truth.events:
         solved = solve_ivp(derivative, (now, 3.0), state, "DOP853", events=lowest, rtol=1e-13, atol=1e-13)
         now, state = solved.t[-1], solved.y[:, -1]
         assert now == pytest.approx(event.time, abs=1e-9)
-        R = Rotation.from_quat(state[3:7]).as_matrix()
+        R = Rotation.from_quat(state[ORIENTATION]).as_matrix()
         r = (points @ R.T)[np.argmin((points @ R.T)[:, 1])]
-        v, w = state[7:10], R @ state[10:13]
+        v, w = state[VELOCITY], R @ state[SPIN]
         approach = v + np.cross(w, r)
         arm = -np.cross(np.eye(3), r).T  # arm @ j = r × j, and ω × r = -arm @ ω
         # Unknown: v+, ω+, j. M (v+ - v) = j; I (ω+ - ω) = r × j; and what the contact does, three equations.
@@ -137,7 +138,7 @@ def test_a_tumble_against_an_integrator_with_events(friction):
                 A[row], b[row] = 0.0, 0.0
                 A[row, 6 + axis] = 1.0
         after = np.linalg.solve(A, b)
-        np.testing.assert_allclose(event.after[7:13], after[:6], rtol=0, atol=1e-8 * np.abs(after[:6]).max())
+        np.testing.assert_allclose(event.after[RATES], after[:6], rtol=0, atol=1e-8 * np.abs(after[:6]).max())
         state = np.concatenate([state[:7], after[:3], R.T @ after[3:6]])
         now, state = now + 1e-9, solve_ivp(derivative, (0, 1e-9), state, "DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
     assert len(truth.events) >= 5
@@ -241,8 +242,8 @@ def test_a_ball_that_grips_leaves_as_the_closed_form_says(beta):
     after = impact.after
     assert impact.time == pytest.approx(0.4 / 3, abs=1e-15)
     vx, vz = 2 - beta * (2 + 0.1 * 40) / (1 + beta), 0.5 - beta * (0.5 - 0.1 * 1) / (1 + beta)
-    np.testing.assert_allclose(after[7:10], [vx, 2.4, vz], rtol=0, atol=1e-14 * 3)
-    np.testing.assert_allclose(after[10:13], [vz / 0.1, 7.0, -vx / 0.1], rtol=0, atol=1e-13 * 40)
+    np.testing.assert_allclose(after[VELOCITY], [vx, 2.4, vz], rtol=0, atol=1e-14 * 3)
+    np.testing.assert_allclose(after[SPIN], [vz / 0.1, 7.0, -vx / 0.1], rtol=0, atol=1e-13 * 40)
     assert truth.horizon == 0.5
 
 
@@ -250,7 +251,7 @@ def test_a_ball_on_a_smooth_floor_keeps_its_spin():
     """Only the normal velocity turns round."""
     scene = ball_with_spin("none")
     after = truth_for(scene)([0.5]).states[0]
-    np.testing.assert_allclose(after[7:13], [2, 2.4, 0.5, 1, 7, 40], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(after[RATES], [2, 2.4, 0.5, 1, 7, 40], rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("friction", ["none", "infinite"])
@@ -272,7 +273,7 @@ def test_an_edge_strikes_as_one_point_at_its_middle(friction):
         j = np.linalg.solve(K, [0.0, -(1 + 0.5) * u])
     spin = (r[0] * j[1] - r[1] * j[0]) / moment
     np.testing.assert_allclose(impact.after[7:9], impact.before[7:9] + j / M, rtol=0, atol=1e-13 * abs(u))
-    np.testing.assert_allclose(impact.after[10:13], [0, 0, spin], rtol=0, atol=1e-12 * abs(spin))
+    np.testing.assert_allclose(impact.after[SPIN], [0, 0, spin], rtol=0, atol=1e-12 * abs(spin))
 
 
 def test_a_body_that_stays_on_the_floor_has_no_impact_truth():

@@ -6,6 +6,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from scenarios import SceneError, load, members
+from scenarios.state import ORIENTATION
 
 
 def scene_with(**ensemble):
@@ -54,7 +55,7 @@ def test_rates_and_heights():
     np.testing.assert_allclose([member.clearance for member in drawn], scene.clearance, atol=1e-15)
     np.testing.assert_array_equal(states, [member.initial_state for member in members(scene)])
     other = members(scene_with(size=1000, seed=4, velocity=[0.5, 0.0, 0.0]))
-    assert not np.isclose(states[:, 3:7], [member.initial_state[3:7] for member in other]).all(axis=1).any()
+    assert not np.isclose(states[:, ORIENTATION], [member.initial_state[ORIENTATION] for member in other]).all(axis=1).any()
 
 
 @pytest.mark.parametrize("largest", [1e-9, 1e-7, 1e-3, 0.099, 0.101])

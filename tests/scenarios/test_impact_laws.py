@@ -11,6 +11,7 @@ from support.taylor import free_rotor as taylor_rotor
 
 from scenarios import load, truth_for
 from scenarios.model import Floor
+from scenarios.state import ORIENTATION, POSITION, RATES
 from scenarios.truths import LAWS
 from scenarios.truths.impact_laws import law_of, velocities_after
 
@@ -65,7 +66,7 @@ def by_mpmath(law, corner, v, w, e, friction, inertia=INERTIA, mass=MASS):
     elif law == "clamped":
 
         def energy(values):
-            linear = mass * sum(mpf(c) ** 2 for c in values[0:3])
+            linear = mass * sum(mpf(c) ** 2 for c in values[POSITION])
             return linear + sum(mpf(inertia[i][k]) * mpf(values[3 + i]) * mpf(values[3 + k]) for i in range(3) for k in range(3))
 
         found, before = newton, energy([*v, *w])
@@ -133,13 +134,13 @@ def test_a_whole_first_impact_against_forty_digits(name, law):
         v = [mpf(start.velocity[i]) - (mpf("9.8") * t if i == 1 else 0) for i in range(3)]
         exact = by_mpmath(law, r, v, to_world(q, w), scene.floor.restitution, friction, tensor, scene.body.mass)
     assert impact.time == pytest.approx(float(t), rel=1e-12)
-    np.testing.assert_allclose(impact.after[7:13], exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+    np.testing.assert_allclose(impact.after[RATES], exact, rtol=0, atol=1e-12 * np.abs(exact).max())
 
 
 def lowest_corner(scene, impact):
     from scenarios.rotations import rotate
 
-    return int(np.argmin(rotate(impact.before[3:7], scene.body.vertices)[:, 1]))
+    return int(np.argmin(rotate(impact.before[ORIENTATION], scene.body.vertices)[:, 1]))
 
 
 def to_world(q, a):
@@ -176,7 +177,7 @@ def test_a_ball_with_coulomb_friction(friction):
     lost = min(friction * 1.8 * 3.0, speed / (1 + 1 / 0.4))
     kick = -lost * sliding / speed
     spin = np.array([1.0, 7.0, 40.0]) + np.cross([0.0, -0.1, 0.0], kick) / (0.4 * 0.1**2)
-    np.testing.assert_allclose(impact.after[7:13], [2.0 + kick[0], 2.4, 0.5 + kick[2], *spin], rtol=0, atol=2e-14 * 40)
+    np.testing.assert_allclose(impact.after[RATES], [2.0 + kick[0], 2.4, 0.5 + kick[2], *spin], rtol=0, atol=2e-14 * 40)
 
 
 def test_which_law_is_a_floor_s_own():

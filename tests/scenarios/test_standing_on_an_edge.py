@@ -13,6 +13,7 @@ from mpmath import mp, mpf
 from scenarios import load, truth_for
 from scenarios.mechanics import energy
 from scenarios.rotations import rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN
 
 AXES = list(permutations(range(3)))
 
@@ -142,8 +143,8 @@ def test_landings_against_forty_digits():
             # About the new edge: I ω of the box, less M c x v of its centre, which moves as about the old one.
             momentum = R2 * speed + h * (speed * h) - a * (speed * a)
             assert impact.time == pytest.approx(float(now), abs=1e-13)
-            assert np.linalg.norm(impact.before[10:13]) == pytest.approx(float(speed), rel=1e-13)
-            assert np.linalg.norm(impact.after[10:13]) == pytest.approx(float(momentum / (2 * R2)), rel=1e-13)
+            assert np.linalg.norm(impact.before[SPIN]) == pytest.approx(float(speed), rel=1e-13)
+            assert np.linalg.norm(impact.after[SPIN]) == pytest.approx(float(momentum / (2 * R2)), rel=1e-13)
             psi, rate = alpha, -momentum / (2 * R2)
 
 
@@ -156,7 +157,7 @@ def test_lands_on_the_right_face(axes, lean, friction):
     truth = truth_for(scene)
     assert truth.name == ("rocking" if friction == "infinite" else "slipping")
     landing = truth.events[0].before if friction == "infinite" else truth.states(np.array([truth.horizon]))[0]
-    corners = landing[0:3] + rotate(landing[3:7], scene.body.vertices)
+    corners = landing[POSITION] + rotate(landing[ORIENTATION], scene.body.vertices)
     np.testing.assert_allclose(np.sort(corners[:, 1])[:4], 0.0, atol=2e-15 if friction == "infinite" else 1e-14)
     assert landing[1] == pytest.approx(0.5 if lean > 0 else 0.2, abs=1e-14)
 
@@ -192,12 +193,12 @@ def test_it_comes_to_rest_where_it_stood():
     scene = standing(half=(0.5, 0.5), lean=math.pi / 4 - math.radians(0.1), duration=20.0)
     truth = truth_for(scene)
     end = truth([20.0])
-    ratios = [np.linalg.norm(event.after[10:13]) / np.linalg.norm(event.before[10:13]) for event in truth.events[:5]]
+    ratios = [np.linalg.norm(event.after[SPIN]) / np.linalg.norm(event.before[SPIN]) for event in truth.events[:5]]
     np.testing.assert_allclose(ratios, 0.5, rtol=1e-12)  # a cube of corner masses keeps half
     assert not end.velocity.any()
     assert not end.angular_velocity.any()
     assert end.position[0, 1] == pytest.approx(0.5, abs=1e-15)
-    flat = truth.events[0].before[0:3]
+    flat = truth.events[0].before[POSITION]
     np.testing.assert_allclose(end.position[0], flat, atol=1e-15)
 
 

@@ -1,0 +1,1 @@
+"""Position corrections after the step: `correction=…`, each a `correct(x, q, body)`."""

@@ -1,0 +1,19 @@
+"""The geometry of the floor y = 0: its normal, components along it, and the points at which a body can touch it."""
+
+from reference_impl.vectors import Vec3, compiled, row
+
+N = Vec3(0.0, 1.0, 0.0)
+"""The floor's unit normal, upwards."""
+
+
+@compiled
+def along_normal(a):
+    """The component along N, a · N. Written out, because a compiler that follows IEEE rules keeps the products with N's zeros."""
+    return a.y
+
+
+@compiled
+def vertex(R, body, i):
+    """Offset from the centre of mass to vertex i. A rounded vertex touches at its lowest point (a departure from the note, for balls)."""
+    r = R @ row(body.points, i)
+    return Vec3(r.x, r.y - body.radius, r.z)

@@ -6,7 +6,6 @@ import numpy as np
 
 from comparisons.results.results import Results
 from reports.plots.style import TIME, Array, at_one_step
-from scenarios import DropspinError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,15 +24,9 @@ def plot_angular_momentum_of_ensemble(results: Results, scene_name: str, axes: "
 
     It is divided by r √(2 E M), with the energy E of the scene and the size r of the body: the angular momentum of a ring of radius r whose
     spin has all of E. This scale is defined for starts without spin too.
-
-    Raises:
-        DropspinError: The run was made by a version that did not store angular momenta.
     """
-    if not keeps_angular_momentum(results, scene_name):
-        raise DropspinError(f"{scene_name}: this run was made by a version that stored no angular momenta; run it again.")
     for outcome, style in at_one_step(results, results.ensembles, scene_name, min):
-        if outcome.angular_momentum is not None:
-            _draw_spread(outcome.t, outcome.angular_momentum, style, axes)
+        _draw_spread(outcome.t, outcome.angular_momentum, style, axes)
     axes.set_xlabel(TIME)
     axes.set_ylabel("|L| / (r √(2 E M))")
 
@@ -45,11 +38,6 @@ def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> No
     axes.set_xlim(0.0, results.scenes[scene_name].duration)
     axes.set_xlabel(TIME)
     axes.set_ylabel("fraction at rest")
-
-
-def keeps_angular_momentum(results: Results, scene_name: str) -> bool:
-    """Whether a run has the angular momentum of the ensemble of a scene."""
-    return any(outcome.angular_momentum is not None for outcome, _ in at_one_step(results, results.ensembles, scene_name, min))
 
 
 def _draw_spread(t: Array, values: Array, style: dict[str, Any], axes: "Axes") -> None:

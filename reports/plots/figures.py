@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING
 from comparisons.results.results import Results
 from reports.plots.bounces import plot_bounce_ladder
 from reports.plots.convergence import plot_error_over_dt
-from reports.plots.ensembles import (
-    keeps_angular_momentum,
-    plot_angular_momentum_of_ensemble,
-    plot_energy_of_ensemble,
-    plot_rest_of_ensemble,
-)
+from reports.plots.ensembles import plot_angular_momentum_of_ensemble, plot_energy_of_ensemble, plot_rest_of_ensemble
 from reports.plots.growth import plot_error_growth
 from reports.plots.history import plot_history
 from reports.plots.over_time import plot_over_time, quantities
@@ -68,9 +63,7 @@ def ensemble_figure(results: Results, scene_name: str) -> "Figure | None":
     """Energy, |L| and the fraction at rest of an ensemble over time; None if no engine has an outcome."""
     if not any(name == scene_name for name, _, _ in results.ensembles):
         return None
-    plots = [plot_energy_of_ensemble, plot_rest_of_ensemble]
-    if keeps_angular_momentum(results, scene_name):
-        plots.insert(1, plot_angular_momentum_of_ensemble)
+    plots = [plot_energy_of_ensemble, plot_angular_momentum_of_ensemble, plot_rest_of_ensemble]
     with _figure([""] * len(plots)) as (figure, panels):
         for axes, plot in zip(panels, plots, strict=True):
             plot(results, scene_name, axes)

@@ -1,4 +1,4 @@
-"""How the documentation is built: `make docs`."""
+"""Settings of Sphinx, which builds the documentation: `make docs`."""
 
 from importlib import metadata
 from pathlib import Path
@@ -14,7 +14,7 @@ napoleon_custom_sections = ["Source", "Valid for"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_format = "short"
-html_theme = "furo"  # which asks for nothing from elsewhere
+html_theme = "furo"  # its pages load nothing from other servers
 html_title = project
 exclude_patterns = ["out"]
 nitpicky = False
@@ -24,20 +24,20 @@ CATALOGUE = Path(__file__).parent / "reference" / "catalogue.md"
 
 def table(rows: list[dict[str, Any]]) -> str:
     """Rows as a Markdown table."""
-    heads = list(rows[0])
-    processes = [[str(row[head]).replace("|", "\\|") for head in heads] for row in rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in [heads, ["---"] * len(heads), *processes])
+    columns = list(rows[0])
+    cells = [[str(row[column]).replace("|", "\\|") for column in columns] for row in rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in [columns, ["---"] * len(columns), *cells])
 
 
 def write_catalogue(_: Any) -> None:
-    """Write the page of what `dropspin list` lists."""
-    from reports.views import listings as look
+    """Write the page with the lists of `dropspin list`."""
+    from reports.views import listings
 
-    listed = {"Scenes": look.scene_rows(), "Engines": look.engine_rows(), "Metrics": look.metric_rows()}
+    listed = {"Scenes": listings.scene_rows(), "Engines": listings.engine_rows(), "Metrics": listings.metric_rows()}
     parts = ["# Scenes, engines, metrics", *(f"## {title}\n\n{table(rows)}" for title, rows in listed.items())]
     CATALOGUE.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
 def setup(app: Any) -> None:
-    """Have the catalogue's page written before pages are read."""
+    """Write the page of the catalogue before Sphinx reads the pages."""
     app.connect("builder-inited", write_catalogue)

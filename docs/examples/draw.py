@@ -1,4 +1,4 @@
-"""Draw the pictures of pages: a page's own lines are run, block after block, and what they draw is the picture below them."""
+"""Draw the pictures of pages: run the Python blocks of each page one after another; a block draws the picture below it."""
 
 import re
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ BLOCK = re.compile(r"^```python\n(?P<lines>.*?)^```\n(?:\n!\[[^]]+\]\((?P<pictur
 
 
 def drawn(page: Path) -> "Iterator[tuple[Path, Figure]]":
-    """The figure of each block that has a picture, and where the picture is."""
+    """The file of each picture of a page, and the figure that its block draws."""
     import matplotlib.pyplot as plt
 
     names: dict[str, Any] = {}
@@ -25,7 +25,7 @@ def drawn(page: Path) -> "Iterator[tuple[Path, Figure]]":
 
 
 def draw(page: Path) -> None:
-    """Write every picture of the page."""
+    """Write every picture of a page."""
     from matplotlib import rc_context
 
     style: Any = {"backend": "agg", "figure.figsize": (5.5, 3.4), "figure.constrained_layout.use": True}

@@ -1,4 +1,4 @@
-"""The replay as a page of its own."""
+"""The replay as an HTML page."""
 
 from markupsafe import Markup
 
@@ -7,10 +7,10 @@ from reports.replay import Replay, as_data
 
 
 def replay_page(replays: list[Replay], plots: dict[str, str]) -> str:
-    """A page of viewers, each with its plots over time.
+    """The page: a viewer for each scene, with its plots over time.
 
     Args:
-        replays: The scenes.
-        plots: By scene: its SVG element.
+        replays: One per scene.
+        plots: SVG element of each scene, by its name.
     """
     return page("replay.html", replays=[(replay, as_data(replay), Markup(plots[replay.scene.name])) for replay in replays])

@@ -27,30 +27,30 @@ from scenarios import truth_for
 
 
 def html_report(results: Results, plots: dict[str, str], sections: Sequence[Section] = ()) -> str:
-    """The whole page.
+    """The page.
 
     Args:
         results: The run.
-        plots: SVG elements, by the names of `figures`.
-        sections: What other studies have to tell.
+        plots: SVG elements, by the names of `report_figures`.
+        sections: Sections of other studies.
     """
     styles, drawn = with_shared_styles(plots)
-    begin = overview(results)
+    summary = overview(results)
     found = verdicts(results)
     kinds = {
         (scene, engine): {*mine, *found.get((scene, engine), ())} - {"measured"}
-        for scene, by_engine in begin["chips"].items()
+        for scene, by_engine in summary["chips"].items()
         for engine, mine in by_engine.items()
     }
     words = sorted({word for mine in kinds.values() for word in mine})
-    return page("report.html", **begin, **_details(results, drawn), kinds=kinds, words=words, sections=sections, styles=Markup(styles))
+    return page("report.html", **summary, **_details(results, drawn), kinds=kinds, words=words, sections=sections, styles=Markup(styles))
 
 
 def _details(results: Results, plots: dict[str, str]) -> dict[str, Any]:
     return {
-        "held": counts(results).failed == 0 and counts(results).broken == 0,
+        "passed": counts(results).failed == 0 and counts(results).broken == 0,
         "colours": engine_colours(results.engines),
-        "stuck": list(LASTING.values()),
+        "lasting": list(LASTING.values()),
         "negligible": NEGLIGIBLE,
         "leading": leading_errors(results),
         "costs": step_costs(results),
@@ -88,19 +88,21 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         "agreement": _agreement(frame, min(dts)),
         "ensemble": _ensemble(frame, min(dts)),
         "wobbles": wobbles_freely(scene),
-        # Our own SVG; its text is escaped by matplotlib.
+        # SVG of reports.plots, whose text matplotlib has escaped.
         **{f"{kind}_plot": Markup(plots.get(f"{number:02d}-{kind}", "")) for kind in FIGURES},
     }
 
 
 def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
-    """What becomes of each metric of each engine as the step goes to 0: a word, the worse of two verdicts, and the reasons."""
+    """The behaviour of each metric of each engine as dt → 0: a few words, the worse of the two verdicts, and the reasons."""
     trends = {}
     for (metric, engine), rows in studies.groupby(["metric", "engine"]):
-        order, limit = (rows[rows["kind"] == kind] for kind in STUDIES)
-        p, m = (float(part["value"].iloc[0]) if len(part) else float("nan") for part in (order, limit))
+        order, asymptotic = (rows[rows["kind"] == kind] for kind in STUDIES)
+        p, m = (float(part["value"].iloc[0]) if len(part) else float("nan") for part in (order, asymptotic))
         reasons = [f"order {p:.3f}, {reason}" for reason in order["reason"]]
-        reasons += [f"limit {m:.3g} ± {upper:.1g}, {reason}" for upper, reason in zip(limit["upper"], limit["reason"], strict=True)]
+        reasons += [
+            f"{m:.3g} ± {upper:.1g} as dt → 0, {reason}" for upper, reason in zip(asymptotic["upper"], asymptotic["reason"], strict=True)
+        ]
         cause = str(rows["cause"].iloc[0])
         verdict = "failed" if (rows["verdict"] == "failed").any() else str(rows["verdict"].iloc[-1])
         trends[str(metric), str(engine)] = {
@@ -113,7 +115,7 @@ def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
 
 
 def _sorted_rows(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    """What was measured, metric by metric, then engine by engine, the limit last."""
+    """The rows by metric, then by engine, those for dt → 0 last."""
     metrics = {metric: number for number, metric in enumerate(dict.fromkeys(rows["metric"]))}
     return [_row(row) for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).itertuples()]
 
@@ -124,7 +126,7 @@ def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
 
 
 def _ensemble(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
-    """The means over the ensemble, then the differences between engines, metric by metric."""
+    """The means over the ensemble, then the differences between engines, for each metric."""
     rows = frame[(frame["dt"] == dt) & frame["metric"].isin(list(ENSEMBLE_METRICS))]
     return [_row(row) for metric in ENSEMBLE_METRICS for row in rows[rows["metric"] == metric].itertuples()]
 

@@ -1,7 +1,7 @@
-"""Plots: each function takes results and draws into axes, for the report and for notebooks alike.
+"""Plots: each `plot_` function draws results into axes, for the report and for notebooks alike.
 
-A plot function makes no figure and no legend: `axes.legend()` does, from the labels that it gave. docs/examples.md has a picture of each,
-and the lines that make it.
+A plot function makes no figure and no legend; it labels what it draws, so that `axes.legend()` makes one. docs/examples.md shows every
+picture and the lines that draw it.
 """
 
 from reports.plots.bounces import plot_bounce_ladder
@@ -38,10 +38,10 @@ __all__ = [
     "limits_figure",
     "plot_angular_momentum_of_ensemble",
     "plot_bounce_ladder",
-    "plot_failure_modes",
     "plot_energy_of_ensemble",
     "plot_error_growth",
     "plot_error_over_dt",
+    "plot_failure_modes",
     "plot_history",
     "plot_over_time",
     "plot_polhode",

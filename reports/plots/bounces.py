@@ -1,4 +1,4 @@
-"""The bounce ladder: how high each bounce rises."""
+"""The bounce ladder: the apex after each bounce."""
 
 from typing import TYPE_CHECKING
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison
 from comparisons.results.results import Results
-from reports.plots.style import Array, as_truth, at_one_step, label_powers, step_of
+from reports.plots.style import Array, at_one_step, exact_style, label_powers, step_of
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import apex
 
@@ -15,40 +15,40 @@ if TYPE_CHECKING:
 
 
 def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
-    """Draw the apex of each bounce over the drop, logarithmic: every engine's at the finest step, and the truth's e²ᵏ as stairs.
+    """Draw the apex after each bounce relative to the drop height, logarithmic: engines at the finest step, and the exact e²ᵏ as stairs.
 
-    An engine's flights are its own, between the steps in which the floor changes its velocity; they end with the first that lasts less than
-    16 steps.
+    The flights of an engine lie between the steps in which the floor changes its velocity. The first flight shorter than 16 steps ends the
+    ladder.
 
     Args:
         results: The run.
-        scene_name: One of its scenes; its truth must have an impact.
-        axes: What to draw into.
+        scene_name: One of its scenes; its exact solution must have an impact.
+        axes: The axes to draw into.
 
     Raises:
-        DropspinError: The scene's truth has no impact.
+        DropspinError: The exact solution of the scene has no impact, or there is no exact solution.
     """
     scene = results.scenes[scene_name]
     truth = truth_for(scene)
     if truth is None or not truth.events or not scene.starts_above_floor:
-        raise DropspinError(f"{scene_name} has no bounces that are known; choose a scene that has, such as drop-ball.")
+        raise DropspinError(f"{scene_name}: the exact solution has no bounces; choose a scene that has some, such as drop-ball.")
     exact, lasting = _exact_apexes(scene, truth, SHORTEST_FLIGHT * step_of(results.trajectories, scene_name, min))
     shown = [lasting]
-    for motion, look in at_one_step(results, results.trajectories, scene_name, min, least_marker=4.0):
+    for motion, style in at_one_step(results, results.trajectories, scene_name, min, least_marker=4.0):
         heights = apexes(scene, motion) / exact[0]
-        axes.semilogy(range(len(heights)), heights, linestyle="none", **look)
+        axes.semilogy(range(len(heights)), heights, linestyle="none", **style)
         shown.append(len(heights))
     stairs = exact[: max(shown)] / exact[0]
-    axes.step(range(len(stairs)), stairs, where="mid", **as_truth())
+    axes.step(range(len(stairs)), stairs, where="mid", **exact_style())
     axes.set_xticks(np.arange(0, max(shown), 1 + max(shown) // 8))
     label_powers(axes, "y")
     axes.set_xlabel("bounce")
-    axes.set_ylabel("apex, over the drop")
+    axes.set_ylabel("apex / drop height")
 
 
-@np.errstate(all="ignore")  # an engine may say 1e300
+@np.errstate(all="ignore")  # an engine may return 1e300
 def apexes(scene: Scenario, motion: Trajectory) -> Array:
-    """Apex above the floor [m] of the drop and of the flight after each bounce, the mean over its inner half, shape (flights,)."""
+    """Apex above the floor [m] of the drop and of the flight after each bounce, averaged over the inner half of it, shape (flights,)."""
     touching = Comparison(scene, motion).touching
     edges = np.flatnonzero(np.diff(np.concatenate([[True], touching, [True]])))
     found = []
@@ -61,7 +61,7 @@ def apexes(scene: Scenario, motion: Trajectory) -> Array:
 
 
 def _exact_apexes(scene: Scenario, truth: Truth, shortest: float) -> tuple[Array, int]:
-    """The truth's, and how many of its flights last no less than this [s], the drop among them."""
+    """Exact apexes above the floor [m], shape (flights,), and how many flights, counting the drop, last at least this long [s]."""
     states = np.array([truth.events[0].before, *(event.after for event in truth.events)])
     heights = apex(scene, Trajectory.from_states(np.zeros(len(states)), states)) - _floor_height(scene)
     is_short = 2.0 * states[1:, 8] / -scene.acceleration[1] < shortest
@@ -69,5 +69,5 @@ def _exact_apexes(scene: Scenario, truth: Truth, shortest: float) -> tuple[Array
 
 
 def _floor_height(scene: Scenario) -> float:
-    """Where the centre of mass is when the body touches the floor as it is turned at the start [m]."""
+    """Height of the centre of mass when the body touches the floor in the attitude of the start [m]."""
     return scene.start.position[1] - scene.clearance

@@ -1,4 +1,4 @@
-"""What becomes of an error as the step goes to 0."""
+"""Errors over the time step."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,16 @@ if TYPE_CHECKING:
 
 
 def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
-    """Draw the size of one error over the time step, logarithmic, with a dotted line of first order, and crosses where it was predicted."""
+    """Draw the absolute value of an error over the time step, logarithmic.
+
+    A dotted line has order 1, dashed lines are the fits that the order and the asymptotic error come from, crosses are predicted errors.
+
+    Args:
+        results: The run.
+        scene_name: One of its scenes.
+        metric: One of its metrics.
+        axes: The axes to draw into.
+    """
     colours, markers = engine_colours(results.engines), engine_markers(results.engines)
     frame = results.measurements
     mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric)]
@@ -24,33 +33,33 @@ def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Ax
         largest = max([largest, *sizes])
         style: Any = {"marker": markers[engine], "markerfacecolor": "none", "linewidth": 1.5, "color": colours[engine]}
         axes.loglog(rows["dt"], sizes, markersize=thinner(8.0, 4.0, number, len(results.engines)), label=engine, **style)
-        foreseen = results.table[(results.table["kind"] == "prediction") & (results.table["engine"] == engine)]
-        foreseen = foreseen[(foreseen["scene"] == scene_name) & (foreseen["metric"] == metric) & (foreseen["value"].abs() > ROUNDING)]
-        if not foreseen.empty:
+        predicted = results.table[(results.table["kind"] == "prediction") & (results.table["engine"] == engine)]
+        predicted = predicted[(predicted["scene"] == scene_name) & (predicted["metric"] == metric) & (predicted["value"].abs() > ROUNDING)]
+        if not predicted.empty:
             label = None if is_labelled else "predicted"
             is_labelled = True
-            axes.loglog(foreseen["dt"], foreseen["value"].abs(), color=ink(), linestyle="none", marker="x", markersize=5.0, label=label)
+            axes.loglog(predicted["dt"], predicted["value"].abs(), color=ink(), linestyle="none", marker="x", markersize=5.0, label=label)
         _draw_fit(results, scene_name, metric, engine, rows["dt"].to_numpy(), rows["value"].to_numpy(), axes)
     dts = np.sort(mine["dt"].unique())
     if len(dts) > 1 and largest > 0.0:
-        # Above the data, so that it hides no line that it may coincide with.
+        # Above the data, so that it hides no line.
         axes.loglog(dts, 2.0 * largest * dts / dts[-1], color=ink(), linewidth=1.0, linestyle=":", label="order 1")
     axes.set_xticks(dts, [f"{1e3 * dt:g}" for dt in dts])
     axes.minorticks_off()
     label_powers(axes, "y")
-    axes.set_xlabel("step [ms]")
+    axes.set_xlabel("time step [ms]")
     axes.set_ylabel(metric_label(metric))
 
 
 def _draw_fit(results: Results, scene_name: str, metric: str, engine: str, dts: Array, errors: Array, axes: "Axes") -> None:
-    """Draw |m + C hᵖ| through the finest step, dashed, from the coarsest to a quarter of the finest."""
+    """Draw |m + C hᵖ|, dashed, through the error at the finest step, from the coarsest step to a quarter of the finest."""
     frame = results.table
     mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric) & (frame["engine"] == engine)]
-    fitted, limits = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))
-    if fitted.empty or limits.empty:
+    fitted, asymptotic = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))
+    if fitted.empty or asymptotic.empty:
         return
     order = float(fitted["value"].iloc[0])
-    limit = float(limits["value"].iloc[0]) if limits["cause"].iloc[0] in ("model", "setting") else 0.0
+    m = float(asymptotic["value"].iloc[0]) if asymptotic["cause"].iloc[0] in ("model", "setting") else 0.0
     h = np.geomspace(dts.max(), 0.25 * dts.min(), 50)
-    curve = np.abs(limit + (errors[0] - limit) * (h / dts[0]) ** order)
+    curve = np.abs(m + (errors[0] - m) * (h / dts[0]) ** order)
     axes.loglog(h, np.maximum(curve, ROUNDING), color=engine_colours(results.engines)[engine], linewidth=0.8, linestyle=(0, (4, 3)))

@@ -1,4 +1,4 @@
-"""The report's figures: plots side by side, in the colours of the page, under one legend."""
+"""The figures of the report: plots side by side, in the colours of the page, with one legend."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING
 from comparisons.results.results import Results
 from reports.plots.bounces import plot_bounce_ladder
 from reports.plots.convergence import plot_error_over_dt
-from reports.plots.ensembles import (
-    keeps_angular_momentum,
-    plot_angular_momentum_of_ensemble,
-    plot_energy_of_ensemble,
-    plot_rest_of_ensemble,
-)
+from reports.plots.ensembles import plot_angular_momentum_of_ensemble, plot_energy_of_ensemble, plot_rest_of_ensemble
 from reports.plots.growth import plot_error_growth
 from reports.plots.history import plot_history
 from reports.plots.over_time import plot_over_time, quantities
@@ -39,7 +34,7 @@ CONVERGENCE = (
 )
 GROWTH = ("orientation_error", "position_error", "energy_error")
 WORTH_A_POINT, WORTH_A_LINE = 1e-13, 1e-11
-"""Errors that are nowhere larger are rounding; over many steps it adds up."""
+"""Errors that are nowhere larger are rounding; over time it accumulates."""
 MOST_PANELS = 3
 
 
@@ -53,7 +48,7 @@ def report_figures(results: Results) -> "Iterator[tuple[str, Figure]]":
 
 
 def tradeoff_figure(found: "TradeOff") -> "Figure":
-    """Error over cost in one scene: of one body, and of each of many where an engine takes them side by side."""
+    """Error over cost in a scene: for one world, and per world of a batch if an engine simulates batches."""
     together = [False, True] if found.front_side_by_side else [False]
     with _figure([""] * (len(together) + 1)) as (figure, panels):
         for axes, side_by_side in zip(panels, together, strict=False):
@@ -65,12 +60,10 @@ def tradeoff_figure(found: "TradeOff") -> "Figure":
 
 
 def ensemble_figure(results: Results, scene_name: str) -> "Figure | None":
-    """Energy and |L| left in an ensemble and the share of it at rest, over time; None if nothing has an outcome."""
+    """Energy, |L| and the fraction at rest of an ensemble over time; None if no engine has an outcome."""
     if not any(name == scene_name for name, _, _ in results.ensembles):
         return None
-    plots = [plot_energy_of_ensemble, plot_rest_of_ensemble]
-    if keeps_angular_momentum(results, scene_name):
-        plots.insert(1, plot_angular_momentum_of_ensemble)
+    plots = [plot_energy_of_ensemble, plot_angular_momentum_of_ensemble, plot_rest_of_ensemble]
     with _figure([""] * len(plots)) as (figure, panels):
         for axes, plot in zip(panels, plots, strict=True):
             plot(results, scene_name, axes)
@@ -89,7 +82,7 @@ def time_figure(results: Results, scene_name: str) -> "Figure":
 
 
 def convergence_figure(results: Results, scene_name: str) -> "Figure | None":
-    """The scene's first three errors that are not zero everywhere, over the time step; None if all are."""
+    """The first three errors of the scene that are above rounding somewhere, over the time step; None if there are none."""
     present = _errors(results, scene_name, CONVERGENCE, WORTH_A_POINT)[:MOST_PANELS]
     if not present:
         return None
@@ -101,7 +94,7 @@ def convergence_figure(results: Results, scene_name: str) -> "Figure | None":
 
 
 def flight_figure(results: Results, scene_name: str) -> "Figure | None":
-    """The polhode of a body that turns about no principal axis, and the growth of errors, for a scene without a floor; None for others."""
+    """The polhode of a body that does not spin about a principal axis, and errors over time; None for scenes with a floor."""
     scene = results.scenes[scene_name]
     if scene.floor is not None or truth_for(scene) is None:
         return None
@@ -119,7 +112,7 @@ def flight_figure(results: Results, scene_name: str) -> "Figure | None":
 
 
 def bounce_figure(results: Results, scene_name: str) -> "Figure | None":
-    """The bounce ladder, and the growth of the error of place; None where the truth is no ladder."""
+    """The bounce ladder, and the position error over time; None if the exact solution is not a bounce ladder."""
     truth = truth_for(results.scenes[scene_name])
     if truth is None or truth.name != "bounce-ladder" or not truth.events or not results.scenes[scene_name].starts_above_floor:
         return None
@@ -142,14 +135,14 @@ def history_figure(history: "History", scene_name: str) -> "Figure":
 
 
 def _errors(results: Results, scene_name: str, metrics: Sequence[str], worth: float) -> list[str]:
-    """Those of some metrics by which some engine is wrong by so much."""
+    """The metrics of which some engine has an error larger than `worth`."""
     mine = results.measurements[results.measurements["scene"] == scene_name]
     return [name for name in metrics if (mine.loc[mine["metric"] == name, "value"].abs() > worth).any()]
 
 
 @contextmanager
 def _figure(projections: Sequence[str], in_a_row: int | None = None) -> "Iterator[tuple[Figure, list[Axes]]]":
-    """A figure with a panel for each projection, `3d` or none, in the report's style; all in a row, or so many."""
+    """A figure in the style of the report with a panel for each projection, `3d` or empty; all in one row, or `in_a_row`."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -174,4 +167,4 @@ FIGURES: "dict[str, Callable[[Results, str], Figure | None]]" = {
     "convergence": convergence_figure,
     "ensemble": ensemble_figure,
 }
-"""The figures of a scene in the report, where it has them."""
+"""The kinds of figure that a scene can have in the report."""

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 
 LONGEST_LABEL = 22
 SMALLEST, MOST_TICKS = 1e-3, 7
-"""Results below this share of the largest are drawn near 0, on a linear part of the axis."""
+"""Results below this fraction of the largest are drawn on a linear part of the axis around 0; the most ticks of the axis."""
 
 
 def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -> None:
-    """Draw a metric at the finest step over runs, of every engine; a ring marks each run in which it moved.
+    """Draw a metric at the finest time step over runs, for each engine; a ring marks each run in which it moved.
 
     Args:
         history: The runs.
         scene_name: One of their scenes.
         metric: One of its metrics.
-        axes: What to draw into.
+        axes: The axes to draw into.
     """
     from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
@@ -44,7 +44,7 @@ def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -
         at = line[line["run"].isin(moved)]
         axes.plot(at["run"], at["value"], "o", markersize=13.0, markerfacecolor="none", markeredgecolor=colours[engine])
     sizes = shown["value"].abs()
-    if sizes.max() > 0.0:  # results of several engines, orders of magnitude apart, each visible
+    if sizes.max() > 0.0:  # shows results that differ by orders of magnitude
         smallest = max(float(sizes[sizes > 0.0].min()), SMALLEST * float(sizes.max()))
         linear = float(10.0 ** np.floor(np.log10(smallest)))
         axes.set_yscale("symlog", linthresh=linear)
@@ -62,17 +62,16 @@ def _signed(value: float) -> str:
 
 
 def run_labels(history: History) -> list[str]:
-    """What tells the runs apart in few words: versions that differ between them, else commits, else their names."""
+    """A short label for each run: the versions that differ between runs, else their commits, else their names."""
     stamps = history.stamps.drop(columns=["run", "started"])
     differing = [column for column in stamps if stamps[column].nunique(dropna=False) > 1]
     versions = [column for column in differing if column != "commit"]
-    telling = versions or differing
-    if not telling:
+    shown = versions or differing
+    if not shown:
         return [name[:LONGEST_LABEL] for name in history.names]
-    # Of columns that change together one is enough.
-    if len(telling) == 1:
-        return [str(value) if column == "commit" else f"{column} {value}" for column in telling for value in stamps[column]]
-    return [", ".join(f"{column} {row[column]}" for column in telling)[:LONGEST_LABEL] for row in stamps.to_dict("records")]
+    if len(shown) == 1:
+        return [str(value) if column == "commit" else f"{column} {value}" for column in shown for value in stamps[column]]
+    return [", ".join(f"{column} {row[column]}" for column in shown)[:LONGEST_LABEL] for row in stamps.to_dict("records")]
 
 
 def _has(results: "pd.DataFrame", scene_name: str, metric: str, steps: str) -> bool:

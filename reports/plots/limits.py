@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Light is well; of the others, after Okabe & Ito (2008), each is told apart with any colour vision.
+# Sound is pale; the others, after Okabe & Ito (2008), are distinguishable with any colour vision.
 COLOURS = {
     "declined": "none",
     "sound": "#D9E8D9",
@@ -33,7 +33,13 @@ HEIGHT = 0.82
 
 
 def plot_failure_modes(found: RobustnessStudy, axis_name: str, axes: "Axes") -> None:
-    """Draw what becomes of each engine along an axis, the scene's own value dotted."""
+    """Draw the failure mode of each engine along an axis of a robustness study; the nominal value of the scene is dotted.
+
+    Args:
+        found: The study.
+        axis_name: One of its axes.
+        axes: The axes to draw into.
+    """
     lines = [line for line in found.scans if line.axis.name == axis_name]
     for number, line in enumerate(lines):
         _draw_segments(line, number, HEIGHT, axes)
@@ -45,7 +51,7 @@ def plot_failure_modes(found: RobustnessStudy, axis_name: str, axes: "Axes") -> 
 
 
 def _in_lines(label: str) -> str:
-    """An engine's label, its options two to a line."""
+    """The label of an engine, two options per line."""
     name, _, listed = label.partition("[")
     options = listed.removesuffix("]").split(",")
     lines = [",".join(options[first : first + 2]) for first in range(0, len(options), 2)]
@@ -53,7 +59,7 @@ def _in_lines(label: str) -> str:
 
 
 def _draw_segments(line: AxisScan, row: float, height: float, axes: "Axes") -> None:
-    """From edge to edge."""
+    """Draw a bar for each failure mode between two transitions."""
     place = line.axis.coordinate
     left = place(line.points[0].value)
     for inside, outside in [*((edge.before, edge.after) for edge in line.transitions), (line.points[-1], line.points[-1])]:
@@ -64,12 +70,12 @@ def _draw_segments(line: AxisScan, row: float, height: float, axes: "Axes") -> N
         left = right
 
 
-def _in_words(condition: str) -> str:
-    return condition.replace("_", " ")
+def _in_words(mode: str) -> str:
+    return mode.replace("_", " ")
 
 
 def _label(axis: Axis, values: Sequence[float], axes: "Axes") -> None:
-    """Ticks at round values of the axis: each power of ten, or each third one; of restitutions, those that are studied."""
+    """Set ticks at each power of ten, or at each third one; for restitutions, at the values of the study."""
     low, high = min(values), max(values)
     if axis.name == "restitution":
         ticks = [value for value in (0.0, 0.9, 0.99, 0.999, 0.9999) if low <= value <= high]
@@ -84,7 +90,7 @@ def _label(axis: Axis, values: Sequence[float], axes: "Axes") -> None:
 
 
 def limits_figure(found: RobustnessStudy) -> "Figure":
-    """All engines along all axes of a scene."""
+    """The failure modes of all engines along all axes of a scene, one panel per axis."""
     names = list(dict.fromkeys(line.axis.name for line in found.scans))
     engines = len({line.engine for line in found.scans})
     with _panels(len(names), 2, (5.4, 1.0 + 0.3 * engines)) as (figure, panels):
@@ -100,7 +106,7 @@ def limits_figure(found: RobustnessStudy) -> "Figure":
 
 @contextmanager
 def _panels(count: int, across: int, size: tuple[float, float]) -> "Iterator[tuple[Figure, list[Axes]]]":
-    """So many panels, each so large [inches], in rows of so many."""
+    """A figure with `count` panels of this size [inches], at most `across` in a row."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -112,7 +118,7 @@ def _panels(count: int, across: int, size: tuple[float, float]) -> "Iterator[tup
 
 
 def _add_legend(figure: "Figure", panels: "list[Axes]") -> None:
-    """All conditions that are there, from the mildest to the worst."""
+    """Add a legend of the failure modes that occur, from the mildest to the worst."""
     named = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    shown = [_in_words(condition) for condition in FAILURE_MODES if _in_words(condition) in named]
+    shown = [_in_words(mode) for mode in FAILURE_MODES if _in_words(mode) in named]
     figure.legend([named[label] for label in shown], shown, loc="outside upper left", ncols=len(shown), fontsize=8)

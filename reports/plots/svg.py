@@ -1,4 +1,4 @@
-"""A matplotlib figure as SVG, small, deterministic, in the colours of the page it stands in; and as PNG."""
+"""A matplotlib figure as small, deterministic SVG in the colours of its page; and as PNG."""
 
 import io
 import json
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def svg(figure: "Figure", identifier: str) -> str:
-    """A figure as an `<svg>` element whose ids start with `identifier`, so that many can stand in one page."""
+    """A figure as an `<svg>` element whose ids start with `identifier`, so that a page can have many."""
     from matplotlib import rc_context
 
     buffer = io.StringIO()
@@ -29,14 +29,14 @@ def svg(figure: "Figure", identifier: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL).strip()
     wanted = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
     text = re.sub(r' id="([^"]+)"', lambda found: found.group() if found[1] in wanted else "", text)
-    # A hundredth of a point is more than can be seen.
+    # A hundredth of a point is finer than can be seen.
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found.group()), text)
     panels = over_time(figure)
     return text.replace("<svg ", f'<svg data-over-time="{escape(json.dumps(panels))}" ', 1) if panels else text
 
 
 def with_shared_styles(drawings: dict[str, str]) -> tuple[str, dict[str, str]]:
-    """Rules of CSS, and SVG elements that have classes for styles: those of many plots are few, and half of their size."""
+    """CSS rules, and the SVG elements with classes instead of styles: the plots share few styles, which make up half of their size."""
     classes: dict[str, str] = {}
 
     def shared(found: re.Match[str]) -> str:
@@ -47,9 +47,9 @@ def with_shared_styles(drawings: dict[str, str]) -> tuple[str, dict[str, str]]:
     return "\n".join(f".{name} {{ {style} }}" for style, name in classes.items()), drawn
 
 
-def with_ids_of(svg_element: str, place: str) -> str:
-    """An SVG element whose ids start with a place's: two studies may have drawn pictures of one name."""
-    return re.sub(r'(\bid="|url\(#|href="#)', rf"\1{place}-", svg_element)
+def with_ids_of(svg_element: str, prefix: str) -> str:
+    """An SVG element with a prefix to its ids: two studies may have drawn pictures of one name."""
+    return re.sub(r'(\bid="|url\(#|href="#)', rf"\1{prefix}-", svg_element)
 
 
 def save_png(figure: "Figure", file: "Path") -> None:
@@ -58,7 +58,7 @@ def save_png(figure: "Figure", file: "Path") -> None:
 
 
 def over_time(figure: "Figure") -> list[dict[str, float]]:
-    """Where panels over time are in a figure that was drawn: edges in points from the upper left, and from when to when they show [s]."""
+    """The panels over time of a drawn figure: edges in points from the upper left, and the first and last time shown [s]."""
     width, height = 72.0 * figure.get_size_inches()
     found = []
     for axes in figure.axes:

@@ -1,4 +1,4 @@
-"""What accuracy costs."""
+"""Error over cost."""
 
 from math import isfinite
 from typing import TYPE_CHECKING
@@ -14,9 +14,12 @@ if TYPE_CHECKING:
 
 
 def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -> None:
-    """Draw error over cost, both logarithmic: each engine's steps joined, and the front, which nothing beats in both.
+    """Draw error over cost, both logarithmic: the time steps of each engine joined by a line, and the Pareto front.
 
-    `side_by_side` draws the cost of each of many bodies instead, of the engines that take them together.
+    Args:
+        found: The study.
+        axes: The axes to draw into.
+        side_by_side: Draw the cost per world of a batch, of the engines that simulate batches.
     """
     front = found.front_side_by_side if side_by_side else found.front
 
@@ -26,7 +29,7 @@ def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -
     engines = list(dict.fromkeys(point.engine for point in found.points))
     colours, markers = engine_colours(engines), engine_markers(engines)
     cheapest, best = zip(*((cost(point), max(point.error, ROUNDING)) for point in front), strict=True)
-    axes.loglog(cheapest, best, color=ink(), linewidth=5.0, alpha=0.25, label="front")
+    axes.loglog(cheapest, best, color=ink(), linewidth=5.0, alpha=0.25, label="Pareto front")
     for engine in engines:
         mine = [point for point in found.points if point.engine == engine and isfinite(cost(point))]
         axes.loglog(
@@ -40,5 +43,5 @@ def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -
         )
     label_powers(axes, "x")
     label_powers(axes, "y")
-    axes.set_xlabel(f"time per simulated second{f', each of {SIDE_BY_SIDE}' if side_by_side else ''} [s]")
+    axes.set_xlabel("time per simulated second [s]" + (f",\nper world (batch of {SIDE_BY_SIDE})" if side_by_side else ""))
     axes.set_ylabel(metric_label(found.metric))

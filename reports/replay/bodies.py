@@ -1,4 +1,4 @@
-"""What a body looks like: flat faces around its vertices, or a ball."""
+"""The surface of a body: the faces of the convex hull of its vertices, or a sphere."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from scenarios.body import Body
 Array = NDArray[np.float64]
 
 IN_ONE_PLANE = 1e-9
-"""How far points of one face may be out of its plane, of the body's size."""
+"""Largest distance of the points of a face from its plane, relative to the size of the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,10 +19,10 @@ class Outline:
     """The surface of a body, in its own frame.
 
     Attributes:
-        vertices: From the centre of mass [m], shape (n, 3); one, at the centre, of a ball.
-        faces: Of each face its vertices, by number, counterclockwise from outside; none of a ball.
-        radius: How far the surface stands out from the vertices [m].
-        is_flat: Whether the body is a plane figure, seen from both sides.
+        vertices: Positions relative to the centre of mass [m], shape (n, 3); a sphere has one, at its centre.
+        faces: For each face the numbers of its vertices, counterclockwise seen from outside; a sphere has none.
+        radius: Distance of the surface from the vertices [m].
+        is_flat: Whether the body is a plane polygon, visible from both sides.
     """
 
     vertices: Array
@@ -32,7 +32,7 @@ class Outline:
 
 
 def outline(body: Body) -> Outline:
-    """The convex hull of a body's vertices, or its ball."""
+    """The convex hull of the vertices of a body, or its sphere."""
     if body.rounding:
         return Outline(body.vertices, [], body.rounding)
     from scipy.spatial import ConvexHull
@@ -43,7 +43,7 @@ def outline(body: Body) -> Outline:
         corners = ConvexHull((points - centre) @ axes[:2].T).vertices
         return Outline(points[corners], [list(range(len(corners)))], is_flat=True)
     hull = ConvexHull(points)
-    # Qhull cuts faces into triangles; those of one plane are one face.
+    # Qhull splits faces into triangles; triangles of one plane form one face.
     planes: dict[tuple[float, ...], set[int]] = {}
     for plane, corners in zip(hull.equations, hull.simplices, strict=True):
         key = tuple(np.round(plane / [1.0, 1.0, 1.0, body.size], 9) + 0.0)
@@ -54,7 +54,7 @@ def outline(body: Body) -> Outline:
 
 
 def _around(points: Array, corners: list[int], normal: Array) -> list[int]:
-    """Corners of a face in order, counterclockwise about its outward normal."""
+    """The corners of a face in order, counterclockwise about its outward normal."""
     arms = points[corners] - points[corners].mean(axis=0)
     across = np.cross(normal, arms[0])
     angles = np.arctan2(arms @ across, arms @ arms[0] * np.linalg.norm(normal))

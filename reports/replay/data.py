@@ -1,4 +1,4 @@
-"""The data of a replay for the viewer in a page."""
+"""The data of a replay for the viewer in the page."""
 
 import base64
 from typing import Any
@@ -6,18 +6,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reports.plots.colours import EXACT
 from reports.replay.bodies import outline
-from reports.replay.motions import TRUTH, Motion, Replay
+from reports.replay.motions import Motion, Replay
 
 Array = NDArray[np.float64]
 
-MOST = 2**31 - 1
-COARSE = 1e3
-"""Numbers larger than this are given whole: a share of 5e-10 of them might be seen."""
+LARGEST_INTEGER = 2**31 - 1
+LARGEST_SCALED = 1e3
+"""Columns with larger numbers are stored as float64: a relative rounding error of 5e-10 of them might be visible."""
 
 
 def as_data(replay: Replay) -> dict[str, Any]:
-    """What the viewer's program needs of a scene, as JSON; numbers are exact to 5e-7."""
+    """The data that the viewer needs, ready for JSON; numbers have an absolute error below 5e-7."""
     shape = outline(replay.scene.body)
     return {
         "scene": replay.scene.name,
@@ -40,7 +41,7 @@ def _motion(motion: Motion) -> dict[str, Any]:
         "label": motion.label,
         "colour": motion.colour,
         "count": len(motion.frames),
-        "isTruth": motion.label == TRUTH and not motion.colour,
+        "isExact": motion.label == EXACT and not motion.colour,
         "position": _packed(motion.frames.position),
         "orientation": _packed(motion.frames.orientation),
         "turns": motion.turns.tolist() if motion.turns.any() else [],
@@ -51,13 +52,13 @@ def _motion(motion: Motion) -> dict[str, Any]:
 
 
 def _packed(numbers: Array) -> list[Any]:
-    """Numbers, column by column, little-endian, in base 64: as integers of a scale, or whole; a column of one number as this number."""
+    """Columns of numbers, shape (n, k): a constant column as its number, any other in base 64, as scaled int32 or as float64."""
     return [float(column[0]) if np.ptp(column) == 0.0 else _column(column) for column in numbers.T] if len(numbers) else []
 
 
 def _column(numbers: Array) -> dict[str, Any]:
     largest = float(np.abs(numbers).max())
-    if largest > COARSE:
+    if largest > LARGEST_SCALED:
         return {"data": base64.b64encode(numbers.astype("<f8").tobytes()).decode()}
-    scale = max(largest, np.finfo(float).tiny * MOST) / MOST
+    scale = max(largest, np.finfo(float).tiny * LARGEST_INTEGER) / LARGEST_INTEGER
     return {"scale": scale, "data": base64.b64encode(np.rint(numbers / scale).astype("<i4").tobytes()).decode()}

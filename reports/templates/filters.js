@@ -1,4 +1,4 @@
-// Filters of the report: what is marked with a scene or an engine that is not asked for is hidden. On paper all details are open.
+// Filters of the report: they hide elements of scenes and engines that are not selected. For printing, all details are opened.
 "use strict";
 (() => {
   const form = document.getElementById("filters"), total = document.querySelectorAll("#scenes > section").length;

@@ -1,10 +1,10 @@
-// The viewer of a scene's motions. A page has, for each, an element with data-replay="ID" and its data as JSON in the element with that id.
+// The viewer of the motions of a scene. For each one a page has an element with data-replay="ID", and its data as JSON in the element with that id.
 "use strict";
 (() => {
   const LIGHT = [0.35, 0.85, 0.4];
   const SPEEDS = [0.01, 0.03, 0.1, 0.25, 0.5, 1, 2];
-  const SHORTEST_SHOW = 4;     // seconds that a motion is shown for, if a slower speed makes it last so long
-  const GLOW = 0.35;           // seconds that an impulse stays to be seen
+  const SHORTEST_SHOW = 4;     // seconds that a motion lasts at least at the speed chosen first, if a speed is slow enough
+  const GLOW = 0.35;           // seconds that an impulse stays visible
   const MARGIN = 1.15;
   const FOCAL = 1.2;           // of the smaller side of a view
 
@@ -19,14 +19,14 @@
     return plus(plus(v, t, q[3]), cross(q, t));
   };
   const multiply = (a, b) => [...plus(plus(times(b, a[3]), a, b[3]), cross(a, b)), a[3] * b[3] - dot(a, b)];
-  // The shorter way from one attitude to another.
-  const way = (a, b) => {
+  // The shorter rotation from one attitude to another.
+  const shorter = (a, b) => {
     const q = multiply(b, [-a[0], -a[1], -a[2], a[3]]), v = q[3] < 0 ? times(q, -1) : q.slice(0, 3);
     return { axis: times(v, 1 / (size(v) || 1)), angle: 2 * Math.atan2(size(v), Math.abs(q[3])) };
   };
-  // A share of the way, and of whole turns that come to it.
+  // A fraction of that rotation and of the whole turns beyond it.
   const turned = (a, b, share, turns) => {
-    const { axis, angle } = way(a, b), half = share * (angle / 2 + Math.PI * turns);
+    const { axis, angle } = shorter(a, b), half = share * (angle / 2 + Math.PI * turns);
     return multiply([...times(axis, Math.sin(half)), Math.cos(half)], a);
   };
 
@@ -45,7 +45,7 @@
     const impulses = unpacked(raw.impulses, raw.struck.length), points = unpacked(raw.points, raw.struck.length);
     const last = position.length - 1;
     return {
-      label: raw.label, colour: raw.colour, isTruth: raw.isTruth, shown: true, position, orientation, last,
+      label: raw.label, colour: raw.colour, isExact: raw.isExact, shown: true, position, orientation, last,
       hasEnded: (time) => time > last * interval + 1e-9,
       strikes: raw.struck.map((frame, i) => ({ time: frame * interval, impulse: impulses[i], point: points[i] })),
       at(time) {
@@ -91,8 +91,8 @@
       this.sight = data.sight;
       this.scene = data.scene;
       this.motions = data.motions.map((raw) => readMotion(raw, data.interval));
-      this.truth = this.motions.find((motion) => motion.isTruth);
-      this.engines = this.motions.filter((motion) => !motion.isTruth);
+      this.exact = this.motions.find((motion) => motion.isExact);
+      this.engines = this.motions.filter((motion) => !motion.isExact);
       this.frames = Math.max(...this.motions.map((motion) => motion.last));
       this.duration = this.frames * this.interval;
       this.strongest = Math.max(0, ...this.motions.flatMap((motion) => motion.strikes.map((strike) => size(strike.impulse))));
@@ -105,7 +105,7 @@
       matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     }
 
-    // Controls are the browser's own, so that keyboards and screen readers know them.
+    // Native controls work with keyboards and screen readers.
     build() {
       this.canvas = made("canvas", {
         role: "img", tabindex: "0", "aria-label": `${this.scene} in 3D; arrow keys turn the view, plus and minus zoom`,
@@ -131,10 +131,10 @@
         type: "button", "aria-label": label, onclick: () => { this.stop(); this.seek((Math.round(this.time / this.interval) + frames) * this.interval); },
       }, text);
       this.rows = this.motions.map((motion) => this.row(motion));
-      const heads = ["shown", "height [m]", ...(this.truth ? ["from the truth [m]", "turned from it [rad]"] : []), ...(this.hasFloor ? ["last impulse [N s]"] : [])];
+      const heads = ["shown", "height [m]", ...(this.exact ? ["position error [m]", "attitude error [rad]"] : []), ...(this.hasFloor ? ["last impulse [N s]"] : [])];
       const table = made("table", {}, made("thead", {}, made("tr", {}, ...heads.map((text) => made("th", { scope: "col" }, text)))),
         made("tbody", {}, ...this.rows.map((row) => row.element)));
-      const box = made("div", { class: "scroll", role: "region", "aria-label": `${this.scene}: where the bodies are` }, table);
+      const box = made("div", { class: "scroll", role: "region", "aria-label": `${this.scene}: positions of the bodies` }, table);
       stopWhereItScrolls.observe(box);
       this.home.replaceChildren(
         this.canvas,
@@ -148,11 +148,11 @@
       const box = made("input", { type: "checkbox", onchange: () => { motion.shown = box.checked; this.draw(); } });
       box.checked = true;
       const dot = made("span", { class: "dot", style: motion.colour ? `background:${motion.colour}` : "border:1px dashed" });
-      const cells = Array.from({ length: 1 + (this.truth ? 2 : 0) + (this.hasFloor ? 1 : 0) }, () => made("td"));
+      const cells = Array.from({ length: 1 + (this.exact ? 2 : 0) + (this.hasFloor ? 1 : 0) }, () => made("td"));
       return { cells, element: made("tr", {}, made("th", { scope: "row" }, made("label", {}, box, " ", dot, motion.label)), ...cells) };
     }
 
-    // The plots over time that stand in the same section.
+    // Find the plots over time in the same section.
     findPlots() {
       const section = this.home.closest("section") ?? document.body;
       this.lines = [];
@@ -206,7 +206,7 @@
       this.draw();
     }
 
-    // The bodies' poses now, by label.
+    // The current poses of the bodies, by label.
     poses() {
       return Object.fromEntries(this.motions.map((motion) => [motion.label, motion.at(this.time)]));
     }
@@ -218,7 +218,7 @@
       return [right, cross(back, right), back];
     }
 
-    // The whole motion, as near as it can be seen from a little above.
+    // Fit the whole motion into the view, from slightly above.
     frame() {
       this.azimuth = 0.5;
       this.elevation = 0.22;
@@ -230,7 +230,7 @@
       this.extent = low.map((least, i) => high[i] - least);
       this.target = axes.reduce((sum, axis, i) => plus(sum, axis, (low[i] + high[i]) / 2), [0, 0, 0]);
       this.reach = Math.max(...this.extent) / 2;
-      this.apart = 1;
+      this.zoomFactor = 1;
       this.follow.checked = this.reach > 25 * this.size;
     }
 
@@ -252,7 +252,7 @@
     }
 
     zoom(factor) {
-      this.apart = Math.max(0.02, Math.min(10, this.apart * factor));
+      this.zoomFactor = Math.max(0.02, Math.min(10, this.zoomFactor * factor));
       this.draw();
     }
 
@@ -276,7 +276,7 @@
       pen.scale(ratio, ratio);
       this.ink = getComputedStyle(this.canvas).color;
       const isThere = (motion) => motion.shown && !motion.hasEnded(this.time);
-      const visible = this.engines.filter(isThere), ghost = this.truth && isThere(this.truth) ? this.truth : null;
+      const visible = this.engines.filter(isThere), ghost = this.exact && isThere(this.exact) ? this.exact : null;
       const views = this.layout.value === "beside" && visible.length > 1 ? visible.map((motion) => [motion]) : [visible];
       const columns = Math.min(views.length, Math.max(1, Math.round(Math.sqrt(views.length * width / height))));
       const rows = Math.ceil(views.length / columns);
@@ -294,7 +294,7 @@
         }
         pen.restore();
       });
-      this.tell();
+      this.updateTable();
     }
 
     drawView(pen, box, motions, ghost) {
@@ -302,7 +302,7 @@
       const target = this.follow.checked && leading ? leading.at(this.time).position : this.target;
       const [right, up, back] = this.axes(), [wide, tall, deep] = this.extent;
       const focal = FOCAL * Math.min(box.width, box.height), whole = deep / 2 + MARGIN * focal * Math.max(wide / box.width, tall / box.height);
-      const distance = this.apart * whole * (this.follow.checked ? Math.min(1, 4 * this.size / this.reach) : 1);
+      const distance = this.zoomFactor * whole * (this.follow.checked ? Math.min(1, 4 * this.size / this.reach) : 1);
       const eye = plus(target, back, distance);
       const seen = (p) => {
         const arm = plus(p, eye, -1), depth = -dot(arm, back);
@@ -358,7 +358,7 @@
         const [x, , z] = corners[0], r = this.body.radius;
         this.path(pen, Array.from({ length: 33 }, (_, i) => seen([x + r * Math.cos(i * Math.PI / 16), 0, z + r * Math.sin(i * Math.PI / 16)])));
       } else {
-        // Every face that looks up covers the shadow once.
+        // The faces that point up cover the shadow once.
         for (const face of this.body.faces) {
           const flat = face.map((i) => [corners[i][0], 0, corners[i][2]]);
           if (this.body.isFlat || this.normal(face.map((i) => corners[i]))[1] > 0) this.path(pen, [...flat, flat[0]].map(seen));
@@ -378,7 +378,7 @@
       pen.strokeStyle = motion.colour || this.ink;
       pen.lineWidth = 1;
       pen.globalAlpha = 0.5;
-      pen.setLineDash(motion.isTruth ? [3, 4] : []);
+      pen.setLineDash(motion.isExact ? [3, 4] : []);
       pen.beginPath();
       this.path(pen, [...motion.position.slice(0, until + 1), motion.at(this.time).position].map(seen));
       pen.stroke();
@@ -414,7 +414,7 @@
       const { position, orientation } = motion.at(this.time), r = this.body.radius, centre = seen(position);
       pen.beginPath();
       pen.arc(centre.x, centre.y, r * centre.scale, 0, 2 * Math.PI);
-      if (!motion.isTruth) {
+      if (!motion.isExact) {
         const glow = pen.createRadialGradient(centre.x + 0.3 * r * centre.scale, centre.y - 0.45 * r * centre.scale, 0, centre.x, centre.y, r * centre.scale);
         glow.addColorStop(0, shade(motion.colour, 1.25));
         glow.addColorStop(1, shade(motion.colour, 0.7));
@@ -423,10 +423,10 @@
         pen.fill();
       }
       pen.globalAlpha = 1;
-      pen.strokeStyle = motion.isTruth ? this.ink : shade(motion.colour, 0.6);
+      pen.strokeStyle = motion.isExact ? this.ink : shade(motion.colour, 0.6);
       pen.lineWidth = 1.2;
       pen.stroke();
-      // Three great circles, where they face us: they show how the ball turns.
+      // Three great circles, on the near side: they show the rotation of the sphere.
       for (const axis of [0, 1, 2]) {
         pen.beginPath();
         let isDrawing = false;
@@ -463,7 +463,7 @@
       pen.setLineDash([]);
     }
 
-    // Points on the floor as dots; an impulse as an arrow, which fades.
+    // Draw contact points as dots, and an impulse as an arrow that fades.
     drawContact({ pen, seen, reach }, motion) {
       if (!this.hasFloor) return;
       const colour = motion.colour || this.ink;
@@ -482,7 +482,7 @@
       const angle = Math.atan2(to.y - from.y, to.x - from.x);
       pen.globalAlpha = 1 - 0.8 * age / GLOW;
       pen.lineWidth = 2.5;
-      pen.setLineDash(motion.isTruth ? [4, 3] : []);
+      pen.setLineDash(motion.isExact ? [4, 3] : []);
       pen.beginPath();
       this.path(pen, [from, to]);
       pen.stroke();
@@ -497,25 +497,25 @@
       return motion.strikes.findLast((strike) => strike.time <= this.time + 1e-9);
     }
 
-    // Figures are of the frame that is nearest, where nothing is interpolated.
-    tell() {
+    // Values are those of the nearest frame: no interpolation.
+    updateTable() {
       const frame = Math.round(this.time / this.interval);
       this.slider.value = String(this.time / this.interval);
       this.slider.setAttribute("aria-valuetext", `${this.time.toFixed(3)} s`);
       this.clock.textContent = `${this.time.toFixed(3)} s of ${this.duration.toFixed(3)}`;
       this.motions.forEach((motion, i) => {
-        const row = Math.min(frame, motion.last), told = [motion.position[row][1]];
-        if (this.truth) {
-          const isKnown = !motion.isTruth && frame <= this.truth.last && frame <= motion.last;
-          told.push(isKnown ? size(plus(motion.position[frame], this.truth.position[frame], -1)) : null);
-          told.push(isKnown ? way(motion.orientation[frame], this.truth.orientation[frame]).angle : null);
+        const row = Math.min(frame, motion.last), values = [motion.position[row][1]];
+        if (this.exact) {
+          const isKnown = !motion.isExact && frame <= this.exact.last && frame <= motion.last;
+          values.push(isKnown ? size(plus(motion.position[frame], this.exact.position[frame], -1)) : null);
+          values.push(isKnown ? shorter(motion.orientation[frame], this.exact.orientation[frame]).angle : null);
         }
         if (this.hasFloor) {
           const strike = this.lastStrike(motion);
-          told.push(strike ? size(strike.impulse) : null);
+          values.push(strike ? size(strike.impulse) : null);
         }
         const ended = motion.hasEnded(this.time) ? `ended at ${(motion.last * this.interval).toFixed(3)} s` : null;
-        told.forEach((value, k) => { this.rows[i].cells[k].textContent = ended && k === 0 ? ended : ended || value === null ? "–" : rounded(value); });
+        values.forEach((value, k) => { this.rows[i].cells[k].textContent = ended && k === 0 ? ended : ended || value === null ? "–" : rounded(value); });
       });
       for (const { line, panel } of this.lines ?? []) {
         const x = panel.left + (this.time - panel.from) / (panel.to - panel.from) * (panel.right - panel.left);
@@ -527,7 +527,7 @@
     }
   }
 
-  // A viewer is made when it is first asked for: opening a page of many scenes is not kept waiting.
+  // A viewer is made when its button is pressed, so that a page of many scenes opens fast.
   for (const home of document.querySelectorAll("[data-replay]")) {
     const start = () => {
       home.viewer = new Viewer(home, JSON.parse(document.getElementById(home.dataset.replay).textContent));

@@ -1,4 +1,4 @@
-// A box that scrolls can be reached by keyboard; one that does not is no stop on the way.
+// A box that scrolls is a tab stop, so that the keyboard can scroll it; a box that does not scroll is none.
 "use strict";
 const stopWhereItScrolls = new ResizeObserver((entries) => {
   for (const { target } of entries) {

@@ -1,4 +1,4 @@
-"""The replay: what it shows is what the run holds; impulses are the truth's; pages and clips are written whole."""
+"""The replay: it shows the states of the run and the impulses of the exact solution; pages and GIFs are written whole."""
 
 import base64
 import json
@@ -9,15 +9,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from PIL import Image
+from support.cli import dropspin
 
-import comparisons
-import reports
-import scenarios
-from reports.commands.main import dropspin, main
-from reports.replay import as_data, replay_of, replay_page, write_clip
+import dropspin as ds
+from comparisons.results.store import save
+from reports.commands.replay import replay_command
+from reports.html.replay import replay_page
+from reports.plots.colours import EXACT
+from reports.replay import as_data, replay_of
 from reports.replay.bodies import outline
+from reports.replay.clip import write_clip
 from reports.replay.motions import MOST_FRAMES, _stride, floor_impulses
 from scenarios import DropspinError, Trajectory, truth_for
 from scenarios.mechanics import angular_momentum
@@ -25,20 +27,22 @@ from scenarios.rotations import about, angle_between_orientations, multiply, rot
 
 
 @pytest.fixture(scope="module")
-def results():
-    """A corner that strikes, a free tumble and a ball, at two steps."""
-    scenes = [scenarios.load(name) for name in ("drop-box-corner", "spin-asymmetric", "drop-ball")]
-    return comparisons.run(scenes, ["document", "mujoco"], [4e-3, 2e-3])
+def folder(shared):
+    """The data of a run: the impact of a corner, a free tumble and a ball, at two time steps."""
+
+    def make(folder):
+        save(ds.run(["drop-box-corner", "spin-asymmetric", "drop-ball"], ["document", "mujoco"], dt=[4e-3, 2e-3]), folder)
+
+    return shared("replay-run", make)
 
 
 @pytest.fixture(scope="module")
-def folder(results, tmp_path_factory):
-    """The run, written."""
-    return reports.write(results, tmp_path_factory.mktemp("out") / "run").parent
+def results(folder):
+    return ds.load_results(folder)
 
 
 def unpacked(columns, count):
-    """What the page's program makes of columns."""
+    """The numbers that the viewer reads from the columns of `as_data`."""
     whole = [
         np.full(count, column)
         if isinstance(column, float)
@@ -48,12 +52,12 @@ def unpacked(columns, count):
     return np.column_stack(whole)
 
 
-def test_frames_are_the_states_of_the_trajectory(results):
-    """What a page is given, decoded, is every so-manyeth stored state, to 3e-10 of the largest; measured 2.3e-10."""
+def test_frames_are_stored_states_at_a_fixed_stride(results):
+    """Decoded data of the page, to 3e-10 of the largest value; measured 2.3e-10."""
     for name in results.scenes:
         replay = replay_of(results, name)
         for motion in as_data(replay)["motions"]:
-            if motion["isTruth"]:
+            if motion["isExact"]:
                 continue
             stored = results.trajectories[name, motion["label"], 4e-3]
             every = round(replay.interval / 4e-3)
@@ -63,20 +67,19 @@ def test_frames_are_the_states_of_the_trajectory(results):
                 assert np.abs(shown - expected).max() <= 3e-10 * max(np.abs(expected).max(), 1e-300)
 
 
-def test_the_ghost_is_the_truth(results):
-    """At the frames' times."""
+def test_last_motion_is_the_exact_solution_at_the_frames(results):
     replay = replay_of(results, "spin-asymmetric", 2e-3)
     ghost = replay.motions[-1]
     exact = truth_for(replay.scene)(replay.interval * np.arange(len(ghost.frames)))
-    assert ghost.label == "truth"
+    assert ghost.label == EXACT
     assert len(ghost.frames) == len(replay.motions[0].frames)
     np.testing.assert_allclose(ghost.frames.orientation, exact.orientation, atol=1e-15)
 
 
-def test_between_frames_it_turns_as_it_spins():
-    """500 rad/s, 18 rad from frame to frame: a quarter of the way on, attitude is that of a quarter of the time, by the closed form."""
-    scene = scenarios.load("spin-principal-500")
-    results = comparisons.run([scene], ["mujoco"], [4e-3])
+def test_interpolation_between_frames_follows_the_angular_velocity():
+    """500 rad/s, 18 rad between frames: a quarter of an interval after a frame the attitude is that of the closed form."""
+    scene = ds.load("spin-principal-500")
+    results = ds.run(scene, "mujoco", dt=4e-3)
     replay = replay_of(results, scene.name)
     assert 500.0 * replay.interval > np.pi
     for motion in replay.motions:
@@ -85,11 +88,11 @@ def test_between_frames_it_turns_as_it_spins():
             expected = multiply(
                 about(np.array(scene.start.angular_velocity) / 500.0, 125.0 * replay.interval), motion.frames.orientation[frame]
             )
-            assert angle_between_orientations(q, expected) < (1e-9 if motion.label == "truth" else 0.05)
+            assert angle_between_orientations(q, expected) < (1e-9 if motion.label == EXACT else 0.05)
 
 
-def test_the_last_state_is_a_frame():
-    """Whatever the number of steps, if it can be divided."""
+def test_last_state_is_a_frame():
+    """For every number of steps that has a suitable divisor."""
     for steps in (150, 375, 2500, 1750, 10_000):
         every = _stride(steps)
         assert steps % every == 0
@@ -97,8 +100,8 @@ def test_the_last_state_is_a_frame():
     assert 631 / _stride(631) <= MOST_FRAMES  # a prime
 
 
-def test_one_that_flies_off_hides_no_one(results):
-    """Its places are given whole, others' as exactly as ever; the view stays with those that are there."""
+def test_motion_that_flies_off_does_not_blur_the_others(results):
+    """Its positions are stored as float64, those of the others as precisely as before; the view covers those that stay."""
     key = ("drop-ball", "document", 4e-3)
     motion = results.trajectories[key]
     away = np.where(motion.t > 0.3, 2.0 ** np.minimum(10.0 * (motion.t - 0.3) / 4e-3, 900.0), 0.0)
@@ -111,8 +114,8 @@ def test_one_that_flies_off_hides_no_one(results):
     np.testing.assert_allclose(unpacked(shown["position"], shown["count"])[:, 1], kept[:, 1], atol=1e-9)
 
 
-def test_an_impulse_is_the_truths(results):
-    """M (v⁺ − v⁻), through the corner that strikes; measured 2e-16 N s and 3e-15 m."""
+def test_impulse_and_its_point_are_those_of_the_exact_impact(results):
+    """M (v⁺ − v⁻), through the corner in contact; measured 2e-16 N s and 3e-15 m."""
     scene = results.scenes["drop-box-corner"]
     [impact] = truth_for(scene).events
     motion = Trajectory.from_states(np.array([0.0, 1e-9]), np.array([impact.before, impact.after]))
@@ -126,19 +129,19 @@ def test_an_impulse_is_the_truths(results):
     np.testing.assert_allclose(point[0], lowest, atol=1e-12)
 
 
-def test_impulses_of_an_engine_stop_what_fell(results):
-    """A ball: all impulses and gravity's together are the change of momentum, to rounding; each goes through the point below the centre."""
+def test_impulses_and_gravity_add_up_to_the_change_of_momentum(results):
+    """A ball, to rounding; each impulse acts through the point below the centre."""
     replay = replay_of(results, "drop-ball")
     for motion in replay.motions:
         v, spent = motion.frames.velocity, replay.interval * np.sum(~np.isin(np.arange(1, len(motion.frames)), motion.struck))
         gained = motion.impulses.sum(axis=0) + replay.scene.body.mass * replay.scene.acceleration * replay.interval * len(motion.struck)
         left = replay.scene.body.mass * (v[-1] - v[0] - spent * replay.scene.acceleration)
-        np.testing.assert_allclose(gained, left, atol=2e-2 if motion.label == "truth" else 1e-9)
+        np.testing.assert_allclose(gained, left, atol=2e-2 if motion.label == EXACT else 1e-9)
         np.testing.assert_allclose(motion.points[:, [0, 2]], 0.0, atol=1e-9)
         np.testing.assert_allclose(motion.points[:, 1], 0.0, atol=1e-12)
 
 
-def test_no_floor_no_impulse(results):
+def test_scene_without_floor_has_no_impulses(results):
     assert all(len(motion.struck) == 0 for motion in replay_of(results, "spin-asymmetric").motions)
 
 
@@ -154,10 +157,10 @@ SOLIDS = {
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_faces_close_a_solid(name):
-    """So many faces, all seen from outside counterclockwise: by the divergence theorem they hold the solid's volume."""
+def test_faces_of_a_body_enclose_its_volume(name):
+    """The faces, all counterclockwise seen from outside, enclose the volume of the body by the divergence theorem."""
     body, faces, volume = SOLIDS[name]
-    shape = outline(scenarios.load({"duration": 1.0, "body": body}).body)
+    shape = outline(ds.load({"duration": 1.0, "body": body}).body)
     assert len(shape.faces) == faces
     held = 0.0
     for face in shape.faces:
@@ -166,19 +169,18 @@ def test_faces_close_a_solid(name):
     assert held == pytest.approx(volume, rel=1e-12)
 
 
-def test_a_plane_figure_is_one_face():
-    """A square of points, turned anyhow: one face of four corners, in order."""
+def test_plane_body_is_one_face():
+    """A square of points in a general attitude: one face of four corners, in order."""
     corners = np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
     points = rotate(np.array([0.1, 0.2, 0.3, 0.4]) / np.sqrt(0.3), corners)
-    shape = outline(scenarios.load({"duration": 1.0, "body": {"shape": "vertices", "points": points.tolist(), "mass": 1.0}}).body)
+    shape = outline(ds.load({"duration": 1.0, "body": {"shape": "vertices", "points": points.tolist(), "mass": 1.0}}).body)
     assert shape.is_flat
     [face] = shape.faces
     sides = np.linalg.norm(np.diff(shape.vertices[[*face, face[0]]], axis=0), axis=1)
     np.testing.assert_allclose(sides, 2.0, rtol=1e-12)
 
 
-def test_a_motion_ends_where_it_is_not_finite(results):
-    """A diverged engine is shown as far as it goes."""
+def test_motion_of_a_diverged_engine_ends_at_its_last_finite_state(results):
     key = ("spin-asymmetric", "document", 4e-3)
     motion = results.trajectories[key]
     broken = replace(motion, position=np.where(motion.t[:, None] < 1.0, motion.position, np.nan))
@@ -187,11 +189,10 @@ def test_a_motion_ends_where_it_is_not_finite(results):
     assert shown.frames.t[-1] == pytest.approx(1.0, abs=replay.interval)
 
 
-def test_names_are_text(results):
-    """A hostile name stays within its element and its data."""
+def test_hostile_scene_name_is_escaped(results):
     hostile = "</script><b>&"
     content = results.scenes["spin-asymmetric"].model_dump(exclude_none=True)
-    scene = scenarios.load({**content, "name": hostile})
+    scene = ds.load({**content, "name": hostile})
     trajectories = {
         (hostile, engine, dt): motion for (name, engine, dt), motion in results.trajectories.items() if name == "spin-asymmetric"
     }
@@ -200,15 +201,16 @@ def test_names_are_text(results):
     assert text.count("</script>") == 2
 
 
-def called(*arguments):
-    return CliRunner().invoke(dropspin, ["replay", *map(str, arguments), "--no-open"])
+def replay(*arguments):
+    return dropspin("replay", *arguments, "--no-open", cwd=".")
 
 
-def test_the_verb_writes_a_page(folder):
-    """Into the run's folder, whole, and without any address."""
-    done = called(folder)
-    assert done.exit_code == 0, done.output
-    text = (folder / "replay.html").read_text(encoding="utf-8")
+def test_replay_command_writes_one_page_without_links(folder, tmp_path):
+    copied = shutil.copytree(folder, tmp_path / "run")
+    done = replay(copied)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == f"Written: {copied / 'replay.html'}\n"
+    text = (copied / "replay.html").read_text(encoding="utf-8")
     assert not re.search(r"(?:src|href)=|@import|url\((?!#)", text.replace("xlink:href", "").replace('href="#', ""))
     assert [json.loads(found)["scene"] for found in re.findall(r'type="application/json"[^>]*>(.*?)</script>', text)] == [
         "drop-box-corner",
@@ -217,60 +219,54 @@ def test_the_verb_writes_a_page(folder):
     ]
 
 
-def test_a_clip_has_all_of_a_motion(folder, tmp_path):
-    """0.6 s, four times slowed down, 25 frames a second: 61 pictures."""
-    done = called(folder, "drop-box-corner", "--gif", tmp_path / "clip.gif")
-    assert done.exit_code == 0, done.output
+def test_gif_shows_all_of_a_motion(folder, tmp_path):
+    """0.6 s at twice real time, 25 frames per second: 8 frames."""
+    done = replay(folder, "drop-box-corner", "--gif", tmp_path / "clip.gif", "--speed", 2)
+    assert done.returncode == 0, done.stderr
     with Image.open(tmp_path / "clip.gif") as clip:
-        assert clip.n_frames == 61
+        assert clip.n_frames == 8
         assert clip.info["duration"] == 40
 
 
-def test_a_video(folder, tmp_path):
-    """The file that a player expects."""
-    done = called(folder, "drop-box-corner", "--mp4", tmp_path / "clip.mp4", "--speed", 2)
-    assert done.exit_code == 0, done.output
-    assert (tmp_path / "clip.mp4").read_bytes()[4:8] == b"ftyp"
+def test_gif_is_four_times_slower_than_real_time_by_default():
+    assert [option.default for option in replay_command.params if option.name == "speed"] == [0.25]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
-        (["no-such-scene"], "it has drop-box-corner, spin-asymmetric, drop-ball"),
-        (["drop-ball", "--dt", "0.5"], "this run has 0.004, 0.002"),
+        (["no-such-scene"], "this run has no scene 'no-such-scene'; choose one of drop-box-corner, spin-asymmetric, drop-ball."),
+        (["drop-ball", "--dt", "0.5"], "drop-ball was not run at 0.5 s; choose one of 0.004, 0.002 s."),
         (["drop-ball", "--gif", "clip.avi"], "--gif clip.avi: give the file the ending .gif"),
-        (["drop-ball", "--mp4", "clip.gif"], "--mp4 clip.gif: give the file the ending .mp4"),
-        (["drop-ball", "--gif", "clip.gif", "--speed", "nan"], "more than 5,000 frames; choose one of at least 0.0075"),
-        (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "more than 5,000 frames"),
-        (["drop-ball", "--gif", "absent/clip.gif"], "absent/clip.gif: cannot be written"),
+        (["drop-ball", "--gif", "clip.gif", "--speed", "nan"], "more than 5,000 frames; choose a speed of at least 0.0075."),
+        (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "a GIF at a speed of 1e-09 has more than 5,000 frames"),
+        (["drop-ball", "--gif", "absent/clip.gif"], "absent/clip.gif: cannot be written: No such file or directory; choose another file."),
         (["drop-ball", "--gif", "clip.gif", "-o", "page.html"], "-o page.html is for the page"),
         (["--gif", "clip.gif"], "name it: drop-box-corner"),
         (["drop-ball", "--dt", "-1"], "--dt"),
     ],
 )
-def test_bad_requests(folder, arguments, said, monkeypatch, capsys):
-    """One message, exit code 2."""
-    told(monkeypatch, capsys, ["replay", str(folder), *arguments, "--no-open"], said)
+def test_bad_request_ends_in_one_message_and_exit_code_2(folder, arguments, message):
+    assert_refused(replay(folder, *arguments), message)
 
 
-def told(monkeypatch, capsys, arguments, said):
-    """What the command says of bad input, as its caller sees it."""
-    monkeypatch.setattr("sys.argv", ["dropspin", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    err = capsys.readouterr().err
-    assert said in err
-    assert "Traceback" not in err
+def assert_refused(done, message):
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
 
 
-def test_a_clip_that_is_interrupted_leaves_the_old_one(folder, results, tmp_path):
-    """Nothing of the new one is there."""
+def test_gif_file_name_must_end_in_gif(results, tmp_path):
+    with pytest.raises(DropspinError, match=r"clip\.mp4: an animation is written as GIF; give the file the ending \.gif\."):
+        write_clip(replay_of(results, "drop-ball"), tmp_path / "clip.mp4", 1.0)
+
+
+def test_interrupted_gif_leaves_the_old_one(results, tmp_path):
     file = tmp_path / "clip.gif"
     file.write_bytes(b"old")
 
-    def stop(share):
-        if share > 0.3:
+    def stop(fraction):
+        if fraction > 0.3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -279,24 +275,16 @@ def test_a_clip_that_is_interrupted_leaves_the_old_one(folder, results, tmp_path
     assert [one.name for one in tmp_path.iterdir()] == ["clip.gif"]
 
 
-def test_a_video_without_a_program(folder, results, tmp_path, monkeypatch):
-    """It is the program that is missing, not the file."""
-    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/no/such/ffmpeg")
-    with pytest.raises(DropspinError, match="no ffmpeg that can be run at '/no/such/ffmpeg'"):
-        write_clip(replay_of(results, "drop-ball"), tmp_path / "clip.mp4", 1.0)
-
-
-def test_a_report_again_keeps_the_replay(folder, tmp_path):
-    made = tmp_path / "run"
-    shutil.copytree(folder, made)
-    assert called(made).exit_code == 0
-    before = (made / "replay.html").read_bytes()
-    assert CliRunner().invoke(dropspin, ["report", str(made)]).exit_code == 0
-    assert (made / "replay.html").read_bytes() == before
+def test_report_command_keeps_the_replay(folder, tmp_path):
+    copied = shutil.copytree(folder, tmp_path / "run")
+    (copied / "replay.html").write_text("a replay")
+    assert dropspin("report", copied, cwd=tmp_path).returncode == 0
+    assert (copied / "report.html").exists()
+    assert (copied / "replay.html").read_text() == "a replay"
 
 
 def without(name):
-    """Damage of run.json: an entry is gone."""
+    """A function that removes an entry of run.json."""
 
     def damage(folder):
         content = json.loads((folder / "run.json").read_text())
@@ -311,12 +299,11 @@ def junk(folder):
 
 
 @pytest.mark.parametrize("damage", [*map(without, ("engines", "provenance", "trajectories", "origins", "scenes")), junk])
-def test_a_damaged_run(folder, tmp_path, damage, monkeypatch, capsys):
-    made = tmp_path / "run"
-    shutil.copytree(folder, made)
-    damage(made)
+def test_damaged_run_is_refused(folder, tmp_path, damage):
+    copied = shutil.copytree(folder, tmp_path / "run")
+    damage(copied)
     for verb in ("report", "replay"):
-        told(monkeypatch, capsys, [verb, made], "not the folder of a run, or damaged")
+        assert_refused(dropspin(verb, copied, cwd=tmp_path), "not the folder of a run, or damaged")
 
 
 @pytest.mark.parametrize(
@@ -328,6 +315,6 @@ def test_a_damaged_run(folder, tmp_path, damage, monkeypatch, capsys):
         '{"title": "a", "parts": [{"kind": "table", "rows": []}]}',
     ],
 )
-def test_a_damaged_study(folder, tmp_path, content, monkeypatch, capsys):
+def test_damaged_study_is_refused(folder, tmp_path, content):
     (tmp_path / "section.json").write_text(content)
-    told(monkeypatch, capsys, ["report", folder, "--add", tmp_path], "holds no study, or a damaged one")
+    assert_refused(dropspin("report", folder, "--add", tmp_path, cwd=tmp_path), "holds no study, or a damaged one")

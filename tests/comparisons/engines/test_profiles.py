@@ -7,12 +7,12 @@ import pytest
 
 from comparisons.engines.base import calibrated_label
 from comparisons.engines.registry import engine
-from comparisons.running.recording import simulate
+from comparisons.running.recording import record, simulate
 from comparisons.running.run import run
 from scenarios import DropspinError, Trajectory, load, truth_for
 from scenarios.mechanics import kinetic_energy
 
-U = math.sqrt(2 * 9.81)
+SPIN = load("spin-asymmetric").model_copy(update={"duration": 2.0})
 
 
 def ball(e):
@@ -85,7 +85,7 @@ def test_mujoco_has_no_restitution_by_default():
 
 def test_error_of_the_defaults_alone_is_a_setting_error():
     """It does not vanish as dt → 0 and the calibrated profile does not have it; without that profile in the run it is a model error."""
-    both = run([load("spin-asymmetric"), load("drop-ball")], ["pybullet", "pybullet[profile=default]"])
+    both = run([SPIN, load("drop-ball")], ["pybullet", "pybullet[profile=default]"])
     lasting = both.asymptotic_errors("setting")
     assert set(lasting["engine"]) == {"pybullet[profile=default]"}
     assert {"energy_error", "bounce_height_error"} <= set(lasting["metric"])
@@ -97,7 +97,7 @@ def test_error_of_the_defaults_alone_is_a_setting_error():
 
 
 def test_engine_without_profiles_keeps_its_model_errors():
-    found = run([load("spin-asymmetric")], ["document", "mujoco", "mujoco[profile=default]"])
+    found = run(SPIN, ["document", "mujoco", "mujoco[profile=default]"])
     assert set(found.asymptotic_errors("model")["engine"]) == {"document"}
     assert found.asymptotic_errors("setting").empty  # free spin has no settings to get wrong in MuJoCo
 
@@ -132,13 +132,17 @@ def test_bullet_reports_short_rotations_and_clamped_friction():
     """Rotations are too small beyond π/4 rad a step; a contact slips that needs friction above 10 times its normal force."""
 
     def limits_of(scene, dt):
-        found = run([scene], ["pybullet"], [dt]).table
+        return [limitation.message for limitation in record(engine("pybullet"), scene, dt).limitations]
+
+    def limited_in_a_run(scene, dt):
+        found = run(scene, "pybullet", dt).table
         return list(found.loc[found["verdict"] == "limited", "reason"])
 
     fast = load("spin-principal-500")
     assert limits_of(fast, 1.5e-3) == []  # .75 rad
     [message] = limits_of(fast, 1.6e-3)
     assert "turns by up to 0.8 rad a step" in message
+    assert limited_in_a_run(fast, 1.6e-3) == [message]
     gripping = ball(0.5).model_copy(update={"floor": ball(0.5).floor.model_copy(update={"friction": "infinite"})})
     u = 1.0 + 9.81 * 1e-3
 
@@ -147,5 +151,6 @@ def test_bullet_reports_short_rotations_and_clamped_friction():
         return gripping.starting_at(np.array([0, 0.1 + 1e-9, 0, 0, 0, 0, 1, 0, -1.0, 0, 0, 0, spin]))
 
     assert not [message for message in limits_of(spinning(9.9), 1e-4) if "slips" in message]
-    assert [message for message in limits_of(spinning(10.5), 1e-4) if "slips" in message]
+    [message] = [message for message in limits_of(spinning(10.5), 1e-4) if "slips" in message]
+    assert message in limited_in_a_run(spinning(10.5), 1e-4)
     assert limits_of(load("rock-block"), 2e-3) == []

@@ -1,32 +1,35 @@
-"""What accuracy costs."""
+"""Error over cost."""
 
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from comparisons.tradeoff import SIDE_BY_SIDE
+from comparisons.tradeoff.costs import BATCH
 from reports.plots.colours import engine_colours, engine_markers
 from reports.plots.style import ROUNDING, ink, label_powers, metric_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from comparisons.tradeoff import Point, TradeOff
+    from comparisons.tradeoff.points import CostPoint, TradeOff
 
 
-def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -> None:
-    """Draw error over cost, both logarithmic: each engine's steps joined, and the front, which nothing beats in both.
+def plot_tradeoff(found: "TradeOff", axes: "Axes", batch: bool = False) -> None:
+    """Draw error over cost, both logarithmic: each engine's time steps joined, and the Pareto front.
 
-    `side_by_side` draws the cost of each of many bodies instead, of the engines that take them together.
+    Args:
+        found: The trade-off.
+        axes: The axes to draw into.
+        batch: Whether to draw the cost per world in a batch, of the engines that can step batches.
     """
-    front = found.front_side_by_side if side_by_side else found.front
+    front = found.batch_pareto_front if batch else found.pareto_front
 
-    def cost(point: "Point") -> float:
-        return point.side_by_side if side_by_side else point.typical
+    def cost(point: "CostPoint") -> float:
+        return point.cost_per_world if batch else point.typical_cost
 
     engines = list(dict.fromkeys(point.engine for point in found.points))
     colours, markers = engine_colours(engines), engine_markers(engines)
     cheapest, best = zip(*((cost(point), max(point.error, ROUNDING)) for point in front), strict=True)
-    axes.loglog(cheapest, best, color=ink(), linewidth=5.0, alpha=0.25, label="front")
+    axes.loglog(cheapest, best, color=ink(), linewidth=5.0, alpha=0.25, label="Pareto front")
     for engine in engines:
         mine = [point for point in found.points if point.engine == engine and isfinite(cost(point))]
         axes.loglog(
@@ -40,5 +43,5 @@ def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -
         )
     label_powers(axes, "x")
     label_powers(axes, "y")
-    axes.set_xlabel(f"time per simulated second{f', each of {SIDE_BY_SIDE}' if side_by_side else ''} [s]")
+    axes.set_xlabel(f"time per simulated second{f', per world (batch of {BATCH})' if batch else ''} [s]")
     axes.set_ylabel(metric_label(found.metric))

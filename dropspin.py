@@ -50,8 +50,8 @@ if TYPE_CHECKING:
     from comparisons.sweeps.running import read_sweep as read_sweep
     from comparisons.sweeps.running import run_sweep as run_sweep
     from comparisons.sweeps.spec import load_sweep as load_sweep
-    from comparisons.tradeoff import TradeOff as TradeOff
-    from comparisons.tradeoff import tradeoff as tradeoff
+    from comparisons.tradeoff.points import TradeOff as TradeOff
+    from comparisons.tradeoff.study import tradeoff as tradeoff
     from reports.run_folder import write_report as write_report
     from reports.terminal.run_table import print_table as print_table
     from scenarios.errors import DropspinError as DropspinError
@@ -92,7 +92,8 @@ _HOMES = {
     "comparisons.running.run": ("DEFAULT_DTS", "measure", "run"),
     "comparisons.sweeps.running": ("read_sweep", "run_sweep"),
     "comparisons.sweeps.spec": ("load_sweep",),
-    "comparisons.tradeoff": ("TradeOff", "tradeoff"),
+    "comparisons.tradeoff.points": ("TradeOff",),
+    "comparisons.tradeoff.study": ("tradeoff",),
     "reports.run_folder": ("write_report",),
     "reports.terminal.run_table": ("print_table",),
     "scenarios.errors": ("DropspinError", "SceneError", "UnknownName"),

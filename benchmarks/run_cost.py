@@ -19,8 +19,10 @@ import reference_impl
 import reports
 import scenarios
 from comparisons.engines.document import Document, DocumentSimulation, reference_body, reference_world
-from comparisons.engines.mujoco_engine import MuJoCo, MuJoCoSimulation
-from comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
+from comparisons.engines.mujoco_engine import MuJoCo
+from comparisons.engines.mujoco_simulation import MuJoCoSimulation
+from comparisons.engines.pybullet_engine import PyBullet
+from comparisons.engines.pybullet_simulation import PyBulletSimulation
 from comparisons.running.recording import run_engine
 from comparisons.sweeps import load_sweep, run_sweep
 

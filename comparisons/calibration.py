@@ -1,6 +1,6 @@
-"""Calibration: the settings that make an engine do what is asked, ready to paste, and what they were measured to do.
+"""Calibration: the settings that give an engine a restitution, ready to paste, and what was measured with them.
 
-What is measured is the very text that is pasted: it is run here, and its motion is looked at.
+The measured program is the one that is pasted: it is executed here, and its motion is measured.
 """
 
 import math
@@ -19,7 +19,7 @@ from scenarios import DropspinError, Scenario, load
 
 Array = NDArray[np.float64]
 Motion = Callable[[float, int, float], tuple[list[float], list[float]]]
-"""Height of a fall [m], steps and step [s] to heights of the lowest point [m] and vertical speeds [m/s]."""
+"""From the height of a fall [m], steps and time step [s] to heights of the lowest point [m] and vertical speeds [m/s]."""
 Shape = Literal["ball", "box"]
 
 HALF_HEIGHT = 0.1  # m
@@ -31,19 +31,20 @@ GRAVITY = 9.81
 DROP = 1.0  # m
 IMPACT = math.sqrt(2.0 * GRAVITY * DROP)  # m/s
 LOW_DROP = 0.01  # m
-SETTLING, WATCHED = 5.0, 1.0  # s
-LARGEST_STEP = 0.1  # s, as far as is looked
+SETTLING, WATCHED = 5.0, 1.0  # s; the body is measured at rest in the last second of settling
+LARGEST_STEP = 0.1  # s; the search for the largest stable step ends here
 LONG = 3.0  # s
 DROPS = 8
 SUNK = 0.1  # m
 GAIN = 1.02
-"""Of the height of the drop; a body that comes higher has gained energy."""
+"""Relative to the height of the drop; a body that rises higher has gained energy."""
 FINELY = 1.01
+"""The ratio to which the largest stable step is bisected."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One figure: what it is, its value and unit, and how it was come by."""
+    """A measured value: its name, value and unit, and how it was measured."""
 
     name: str
     value: float
@@ -53,14 +54,14 @@ class Measured:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What to set, and what comes of it.
+    """The settings of an engine for a restitution, and what was measured with them.
 
     Attributes:
         engine: The engine's label.
-        settings: By name; what the engine is built with.
-        reasons: Why each of them is what it is.
-        programs: Texts to paste, by language; `python` runs by itself.
-        measured: What that program does.
+        settings: The settings that the engine is built with, by name.
+        reasons: The reason for each value, by the same names.
+        programs: Programs and models to paste, by language; `python` runs by itself.
+        measured: The measurements of that program.
     """
 
     engine: str
@@ -76,22 +77,41 @@ def calibrate(
     dt: float,
     friction: str | float = "none",
     shape: Shape = "ball",
+    *,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
 ) -> Calibration:
     """The settings that give a restitution at a time step, measured.
 
     Args:
-        engine: The engine; its options choose among the ways it has.
+        engine: The engine; its options choose among its contact models.
         restitution: From 0 to 1.
         dt: Time step [s].
         friction: 'none', 'infinite' or a coefficient.
-        shape: What falls, flat onto a floor.
+        shape: The body that falls flat onto a floor.
         resources: What the measurement may use.
 
     Raises:
         DropspinError: The engine has no such settings, or broke down with them.
     """
-    scene = load(
+    scene = drop(restitution, friction, shape)
+    verify_time_step(scene, dt)
+    refusal = engine.declines(scene)
+    if refusal is not None:
+        raise DropspinError(f"{engine.label} cannot be calibrated: {refusal}.")
+    programs = engine.programs(scene, dt)
+    if not programs:
+        raise DropspinError(f"{engine.label} has no settings to calibrate; use mujoco or pybullet.")
+    with EngineProcesses(resources) as processes:
+        try:
+            settings, measured = processes.call(EngineEntry(engine.label, engine), _measured, scene, dt, programs["python"])
+        except Failed as failure:
+            raise DropspinError(f"{engine.label} broke down with these settings: {failure.reason}.") from None
+    return Calibration(engine.label, settings, engine.reasons, programs, measured)
+
+
+def drop(restitution: float, friction: str | float = "none", shape: Shape = "ball") -> Scenario:
+    """The scene of a calibration: a body that falls flat onto a floor from 1 m."""
+    return load(
         {
             "name": f"a {shape} on a floor",
             "duration": LONG,
@@ -101,23 +121,10 @@ def calibrate(
             "floor": {"restitution": restitution, "friction": friction},
         }
     )
-    verify_time_step(scene, dt)
-    refusal = engine.declines(scene)
-    if refusal is not None:
-        raise DropspinError(f"{engine.label} cannot be calibrated for that: {refusal}.")
-    programs = engine.programs(scene, dt)
-    if not programs:
-        raise DropspinError(f"{engine.label} has no settings to calibrate; engines that have are mujoco and pybullet.")
-    with EngineProcesses(resources) as processes:
-        try:
-            settings, measured = processes.call(EngineEntry(engine.label, engine), _measured, scene, dt, programs["python"])
-        except Failed as failure:
-            raise DropspinError(f"{engine.label} broke down with these settings: {failure.reason}.") from None
-    return Calibration(engine.label, settings, engine.reasons, programs, measured)
 
 
 def _measured(entry: EngineEntry, scene: Scenario, dt: float, program: str) -> tuple[dict[str, Any], tuple[Measured, ...]]:
-    """What the engine sets, and what a program does."""
+    """In the engine's process: its settings, and the measurements of a program."""
     assert entry.engine is not None
     with entry.engine.prepare(scene, dt) as simulation:
         settings = dict(simulation.settings)
@@ -127,7 +134,7 @@ def _measured(entry: EngineEntry, scene: Scenario, dt: float, program: str) -> t
 
 
 def measurements(motion: Motion, dt: float) -> list[Measured]:
-    """What a falling body does with settings made for a step [s]."""
+    """The measurements of drops with settings made for a time step [s]."""
     speeds, heights, deepest = _bounces(motion, dt)
     settling, watched = math.ceil(SETTLING / dt), math.ceil(WATCHED / dt)
     low, slow = (np.array(values[settling - watched :]) for values in motion(LOW_DROP, settling, dt))
@@ -135,29 +142,29 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
     if not rests:
         low, slow = np.full_like(low, np.nan), np.full_like(slow, np.nan)
     half, _, _ = _bounces(motion, dt / 2.0)
-    at_impact = f"over {START_PHASES} drops from {DROP:g} m, which strike at as many places in a step"
-    at_rest = f"dropped from {1e3 * LOW_DROP:g} mm, in the fifth second" if rests else "it does not come to rest within 5 s"
+    at_impact = f"over {START_PHASES} drops from {DROP:g} m, whose impacts are spread evenly within a step"
+    at_rest = f"dropped from {1e3 * LOW_DROP:g} mm, in the fifth second" if rests else "the body does not come to rest within 5 s"
     step, how = _largest_step(motion, dt)
     return [
-        Measured("restitution", float(speeds.mean()), "1", f"speed just after the impact over just before, mean {at_impact}"),
+        Measured("restitution", float(speeds.mean()), "1", f"speed just after the impact over the speed just before, mean {at_impact}"),
         Measured("restitution, least", float(speeds.min()), "1", "of those"),
         Measured("restitution, most", float(speeds.max()), "1", "of those"),
-        Measured("restitution by height", float(heights.mean()), "1", "√(height of the rebound / of the drop), mean of those"),
-        Measured("penetration", deepest, "m", f"deepest of those; the way of a step is {IMPACT * dt:.3g} m there"),
+        Measured("restitution by height", float(heights.mean()), "1", "√(height of the rebound / height of the drop), mean of those"),
+        Measured("penetration", deepest, "m", f"deepest of those; at impact a step covers {IMPACT * dt:.3g} m"),
         Measured("depth at rest", float(-low.mean()), "m", at_rest),
-        Measured("jitter at rest", float(np.ptp(low)), "m", f"highest less lowest, {at_rest}"),
+        Measured("jitter at rest", float(np.ptp(low)), "m", f"highest minus lowest position, {at_rest}"),
         Measured("speed at rest", float(np.abs(slow).max()), "m/s", f"greatest, {at_rest}"),
-        Measured("restitution at half the step", float(half.mean()), "1", "with these same settings, which may belong to their step"),
+        Measured("restitution at half the step", float(half.mean()), "1", "with the same settings, which may hold for their step only"),
         Measured("largest stable step", step, "s", how),
     ]
 
 
 def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
-    """Of drops that strike at as many places in a step: ratios of speeds, roots of ratios of heights, and the greatest depth [m]."""
+    """Ratios of speeds, roots of ratios of heights, and the greatest depth [m], of drops whose impacts are spread within a step."""
     ratios, roots, deepest = [], [], 0.0
     for part in (np.arange(START_PHASES) + 0.5) / START_PHASES:
         drop = DROP + IMPACT * dt * part
-        # The fall, and as long as the highest rebound takes to its apex; some steps more for those that take several.
+        # The fall, the time of the highest rebound to its apex, and some steps for impacts that take several.
         heights, speeds = map(np.array, motion(drop, math.ceil(2.0 * IMPACT / GRAVITY / dt) + START_PHASES, dt))
         down = int(np.argmin(speeds))
         up = down + int(np.argmax(speeds[down:]))
@@ -168,19 +175,19 @@ def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
 
 
 def _largest_step(motion: Motion, dt: float) -> tuple[float, str]:
-    """The largest step with which a body neither gains energy nor sinks, and how that was found."""
+    """The largest time step at which a body neither gains energy nor sinks, and how it was found."""
     if not _is_stable(motion, dt):
-        return math.nan, f"at {dt:g} s already it gains 2 % of its height, or sinks by {SUNK:g} m"
-    sound = dt
-    while (longer := min(2.0**0.125 * sound, LARGEST_STEP)) > sound and _is_stable(motion, longer):
-        sound = longer
-    if sound >= LARGEST_STEP:
-        return LARGEST_STEP, "as far as was looked: it gains no energy and does not sink"
-    unsound = longer
-    while unsound > FINELY * sound:
-        middle = math.sqrt(sound * unsound)
-        sound, unsound = (middle, unsound) if _is_stable(motion, middle) else (sound, middle)
-    return sound, f"with these same settings; beyond, a drop from {DROP:g} m gains 2 % of its height or ends {SUNK:g} m below the floor"
+        return math.nan, f"at {dt:g} s already the body gains 2 % of its height, or sinks by {SUNK:g} m"
+    stable = dt
+    while (longer := min(2.0**0.125 * stable, LARGEST_STEP)) > stable and _is_stable(motion, longer):
+        stable = longer
+    if stable >= LARGEST_STEP:
+        return LARGEST_STEP, "the largest step tested: the body gains no energy and does not sink"
+    unstable = longer
+    while unstable > FINELY * stable:
+        middle = math.sqrt(stable * unstable)
+        stable, unstable = (middle, unstable) if _is_stable(motion, middle) else (stable, middle)
+    return stable, f"with the same settings; beyond it a drop from {DROP:g} m gains 2 % of its height or ends {SUNK:g} m below the floor"
 
 
 def _is_stable(motion: Motion, dt: float) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from comparisons.regressions.history import History
 from comparisons.robustness.study import RobustnessStudy
-from comparisons.tradeoff import TradeOff
+from comparisons.tradeoff.points import TradeOff
 from reports.markdown import history_markdown
 from reports.output import write_table
 from reports.plots import history_figure, limits_figure, tradeoff_figure
@@ -31,19 +31,19 @@ def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
 
 
 def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: Path) -> None:
-    """`tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot for each scene."""
+    """Write `tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot per scene."""
     write_table(folder, "tradeoff", tradeoff.COLUMNS, [row for one in found for row in tradeoff.rows(one)])
     section = Section("What accuracy costs")
     for one in found:
         section.add_heading(one.scene.name)
         section.add_picture(one.scene.name, tradeoff_figure(one))
-        section.add_table(tradeoff.front_rows(one))
+        section.add_table(tradeoff.pareto_front_rows(one))
         section.add_list(tradeoff.sentences(one, within))
     section.write(folder, "tradeoff")
 
 
 def write_history(found: History, folder: Path) -> None:
-    """`history.csv` and `history.json` with every result of every run, `history.md`, and a plot for each scene."""
+    """Write `history.csv` and `history.json` with every result of every run, `history.md`, and a plot per scene."""
     results = found.results.drop(columns="verdict").assign(run=[found.names[number] for number in found.results["run"]])
     table = results.merge(found.stamps, on="run")
     known = table.astype(object).where(table.notna(), None)  # JSON knows no NaN

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @cache
 def version(package: str) -> str:
-    """The installed version of a distribution; looked up once, because each look parses its metadata."""
+    """The installed version of a distribution; cached, because each query parses its metadata."""
     return metadata.version(package)
 
 
@@ -32,7 +32,7 @@ class Diverged(Exception):
 
 @dataclass(frozen=True)
 class AsBuilt:
-    """What an engine says it has built, read back from it.
+    """The body and gravity that an engine built, read back from it.
 
     Attributes:
         mass: [kg].
@@ -124,23 +124,23 @@ class NumericOption(NamedTuple):
 
 
 PROFILES = ("calibrated", "default")
-"""The scene as meant, by whatever settings that takes; and what a user gets who leaves all settings but the obvious."""
+"""Settings that reproduce the scene as closely as the engine can; and the engine's defaults, with only the obvious settings made."""
 
-LATE_IMPACTS = "impacts noticed late"
+LATE_IMPACTS = "impacts detected late"
 SEMI_IMPLICIT_EULER = "semi-implicit Euler"
 EXPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term explicit"
 IMPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term implicit"
-MIDPOINT_GYROSCOPIC = "semi-implicit Euler with turns by the implicit midpoint rule"
+MIDPOINT_GYROSCOPIC = "semi-implicit Euler with rotations by the implicit midpoint rule"
 
 
 def may_tumble(scene: Scenario) -> bool:
-    """Whether a body of unequal moments spins at the start, or may after an impact: only then do gyroscopic terms matter."""
+    """Whether a body of unequal moments of inertia spins at the start, or may after an impact; only then do gyroscopic terms matter."""
     moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
     return bool(np.ptp(moments) > 1e-12 * moments[-1]) and (any(scene.start.angular_velocity) or scene.floor is not None)
 
 
 def calibrated_label(label: str) -> str | None:
-    """The label of the same engine, calibrated, of the label of one that has its defaults; else None."""
+    """The label of the calibrated profile of an engine whose label has profile=default; None for any other label."""
     name, _, listed = label.removesuffix("]").partition("[")
     options = listed.split(",")
     if "profile=default" not in options:
@@ -161,13 +161,13 @@ class Engine:
     order: ClassVar[float | None] = None
     """Claimed order of accuracy in free flight; inf for exact, None for no claim."""
     precision: ClassVar[type] = np.float64
-    """What the engine's state carries: numpy.float64 or numpy.float32."""
+    """The precision of the engine's state: numpy.float64 or numpy.float32."""
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Each option's values, the default first."""
     numbers: ClassVar[Mapping[str, NumericOption]] = {}
     """Each numeric option's default and range."""
     reasons: ClassVar[Mapping[str, str]] = {}
-    """Why each setting of a calibrated simulation is what it is, by the names in `Simulation.settings`."""
+    """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
 
     options: Mapping[str, str] = field(default_factory=dict)
 
@@ -187,7 +187,7 @@ class Engine:
         return f"{self.numbers[option].default:g}" if option in self.numbers else self.choices[option][0]
 
     def _canonical_number(self, option: str, value: str) -> str:
-        """One way to write each number, so that equal options have equal labels."""
+        """The canonical spelling of a number, so that equal options have equal labels."""
         allowed = self.numbers[option]
         try:
             number = float(value)
@@ -208,26 +208,26 @@ class Engine:
         return f"{self.name}[{listed}]" if listed else self.name
 
     def order_in(self, scene: Scenario) -> float | None:
-        """The order claimed for a scene's errors: `order` in free flight, none where there is a floor to hit."""
+        """The order claimed for a scene's errors: `order` in free flight, None with a floor."""
         return self.order if scene.floor is None else None
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """The discretisation of a scene's motion, by the name it is known by; None if it is not known.
+        """The name of the discretisation of a scene's motion; None if it is not known.
 
         Two engines of the same one make the same errors: that they agree is no evidence that either is right.
         """
         return None
 
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
-        """What the error of a metric must be by the way the engine works, or None: that is not known."""
+        """The error of a metric that follows from the engine's scheme; None if it is not known."""
         return None
 
     def declines(self, scene: Scenario) -> str | None:
-        """Why this engine cannot run a scene as meant, or None: it can."""
+        """Why this engine cannot reproduce a scene; None if it can."""
         return None
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
-        """Texts that have the settings of a scene at a time step [s], ready to paste, by their language; empty: there are none.
+        """Programs and models with the settings of a scene at a time step [s], ready to paste, by language; may be empty.
 
         The one in `python` runs by itself, and has `motion(height, steps, step)`: heights of the body's lowest point [m] and vertical
         speeds [m/s] after each step of a fall from that height.

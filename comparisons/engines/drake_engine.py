@@ -1,4 +1,4 @@
-"""The engine `drake`: Drake's discrete plant, a body of corners over a half-space. Its contacts only dissipate: restitution is 0."""
+"""The engine `drake`: Drake's discrete plant, a body's corners over a half-space. Its contacts only dissipate: restitution is 0."""
 
 import logging
 from typing import Any
@@ -21,32 +21,32 @@ logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.
 STICKING = 1e6
 LONGEST = 1e150
 REASONS = {
-    "discrete_contact_approximation": "tamsi for a coefficient, else sap; lagged, the default, stops a sliding box at once",
-    "sap_near_rigid_threshold": "left at 1, a flat box lies 0.3 mm deep, instead of 0.014, and a rocking block is twice as far off",
-    "relaxation_time": "s, for sap; depth is left at depth over this; at 0.1, as it comes, a ball rebounds at 10 mm/s, instead of 1",
-    "dissipation": "s/m, for tamsi; 1 over the rebound that stays; as it comes, that is 20 mm/s, at any step",
-    "stiffness": "N/m, floor and body; contacts lie on the stiffer; alike, they are half a depth inside, and a gripped ball is 13 mm/s off",
-    "friction": "the scene's; 1e6 where the floor grips (1e3 does the same)",
+    "discrete_contact_approximation": "tamsi for a coefficient, else sap; the default, lagged, stops a sliding box at once",
+    "sap_near_rigid_threshold": "at the default 1, a flat box rests 0.3 mm deep instead of 0.014, and a rocking block's error doubles",
+    "relaxation_time": "s, for sap; a body leaves the floor at depth over this; at the default 0.1 a ball rebounds at 10 mm/s instead of 1",
+    "dissipation": "s/m, for tamsi; the remaining rebound speed is 1 over this; at the default it is 20 mm/s, at any step",
+    "stiffness": "N/m, floor and body; contacts lie on the stiffer; if equal, half a depth inside, and a gripped ball errs by 13 mm/s",
+    "friction": "the scene's coefficient; 1e6 where the floor grips (1e3 gives the same)",
 }
-"""Effects were measured at 1 ms on boxes and a ball with backspin that lands at 3 m/s, with the one setting left out."""
+"""Effects were measured at 1 ms on boxes and a ball with backspin that lands at 3 m/s, without the one setting."""
 
 
 class Drake(Engine):
-    """Drake's rigid body, by the plant that contacts need, in free flight too."""
+    """Drake's rigid body, in the discrete plant that contacts need, in free flight too."""
 
     name = "drake"
     order = 1.0
     reasons = REASONS
 
     def discretisation(self, scene: Scenario) -> str | None:
-        """Where nothing turns; else angular velocity is MuJoCo's Euler's, but a step turns by 2 atan(|ω| dt/2), as in the note."""
+        """Semi-implicit Euler without spin; else ω is as in MuJoCo's Euler, but a step turns by 2 atan(|ω| dt/2), as in Wang's method."""
         falls = scene.floor is None and scene.damping is None and not any(scene.start.angular_velocity)
         return SEMI_IMPLICIT_EULER if falls else None
 
     def declines(self, scene: Scenario) -> str | None:
         moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
         if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
-            return "Drake damps a free joint's rotation by one coefficient; angular damping needs a body of equal moments"
+            return "Drake damps a free joint's rotation with one coefficient; angular damping needs a body of equal moments of inertia"
         if scene.floor is not None and scene.floor.restitution > 0.0:
             return "Drake's contacts only dissipate; it has no coefficient of restitution"
         return None
@@ -56,7 +56,7 @@ class Drake(Engine):
 
 
 class DrakeSimulation(Simulation):
-    """A plant in a simulator, with a scene graph only where there is a floor."""
+    """A plant in a simulator, with a scene graph if the scene has a floor."""
 
     staggered = True
 
@@ -90,7 +90,7 @@ class DrakeSimulation(Simulation):
             surface.AddProperty("material", "relaxation_time", chosen["relaxation_time"])
         upward = RigidTransform(RotationMatrix.MakeXRotation(-np.pi / 2))
         plant.RegisterCollisionGeometry(plant.world_body(), upward, HalfSpace(), "floor", surfaces[0])
-        # A shape would have one contact with the floor; of balls of no radius, each corner has its own.
+        # One shape would have one contact with the floor; balls of radius 0 give each corner its own.
         for number, corner in enumerate(body.vertices):
             plant.RegisterCollisionGeometry(self._body, RigidTransform(corner), Sphere(body.rounding), f"corner {number}", surfaces[1])
         return {"discrete_contact_approximation": approximation, "stiffness": stiffness} | chosen
@@ -106,7 +106,7 @@ class DrakeSimulation(Simulation):
 
     def state(self) -> Array:
         state = self._plant.GetPositionsAndVelocities(self._context)[[4, 5, 6, 1, 2, 3, 0, 10, 11, 12, 7, 8, 9]]
-        state[ORIENTATION] /= np.linalg.norm(state[ORIENTATION])  # which Drake does wherever it uses it, and never to the state itself
+        state[ORIENTATION] /= np.linalg.norm(state[ORIENTATION])  # Drake normalises where it uses the quaternion, not in its state
         return state
 
     def as_built(self) -> AsBuilt:

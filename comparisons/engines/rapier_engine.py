@@ -1,7 +1,7 @@
-"""The engine `rapier`: the scene as meant, by settings that Rapier has but does not default to; in single precision.
+"""The engine `rapier`: settings that reproduce the scene, which are not Rapier's defaults; in single precision.
 
-Rapier solves a step's contacts as if nothing bounced; one pass over them then turns each new contact's normal velocity v into -e v.
-So one contact rebounds exactly, several at once undo one another, and friction does not answer the rebound.
+Rapier solves the contacts of a step without restitution; one pass over them then turns each new contact's normal velocity v into -e v.
+So a single contact rebounds exactly, several at once undo one another, and friction does not respond to the rebound.
 """
 
 import os
@@ -18,28 +18,28 @@ from scenarios import Scenario, truth_for
 from scenarios.body import Box, Sphere
 from scenarios.mechanics import principal_axes
 from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from scenarios.state import ORIENTATION, PARTS
 
 FRICTION = {"none": 0.0, "infinite": 1e6}
 LARGEST = float(np.finfo(np.float32).max)
-FIRST_PROCESS = cache(os.getpid)  # to simulate; Rapier's threads, which all worlds share, are started there
+FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapier's threads, which all worlds share
 PARAMETERS = {
-    "num_solver_iterations": (1, "substeps; at the default 4 velocity lags by an eighth of a step, a ball gains 1.7e-3 of its energy"),
-    "num_internal_pgs_iterations": (50, "for positions; at 1 a turning box on a rough floor errs by 1e-4 in energy, not 8e-6"),
-    "num_internal_stabilization_iterations": (50, "for velocities; with 1 of both a gripping corner goes on down at 1.4 of 3.8 m/s"),
-    "normalized_max_corrective_velocity": (LARGEST, "back onto the floor in one step, apart from the velocity; 3 m/s by default"),
-    "static_contact_softness": ((1e9, 1.0), "Hz, damping ratio; at 60 Hz a bounce errs by 4.6e-3, not 8e-4, boxes rest 0.1 mm deep"),
+    "num_solver_iterations": (1, "substeps; at the default 4 velocity lags by an eighth of a step, and a ball gains 1.7e-3 of its energy"),
+    "num_internal_pgs_iterations": (50, "for positions; at 1 a turning box on a rough floor errs by 1e-4 in energy instead of 8e-6"),
+    "num_internal_stabilization_iterations": (50, "for velocities; with 1 for both, a gripping corner keeps moving down at 1.4 of 3.8 m/s"),
+    "normalized_max_corrective_velocity": (LARGEST, "corrects depth in one step without changing the velocity; 3 m/s by default"),
+    "static_contact_softness": ((1e9, 1.0), "Hz, damping ratio; at 60 Hz a bounce errs by 4.6e-3, not 8e-4; boxes rest 0.1 mm deep"),
     "normalized_max_linear_velocity": (LARGEST, "no clamp of the speed, at 400 m/s by default"),
-    "friction_in_bias_pass": (True, "positions feel friction too; without, a rocking block gains 3.7e-5 of its energy, not 4e-6"),
+    "friction_in_bias_pass": (True, "also in position corrections; without it a rocking block gains 3.7e-5 of its energy, not 4e-6"),
 }
 REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
     "normalized_prediction_distance": "a step's fall; at 0 turning on a rough floor errs by 0.19 rad, not 5e-3; at 2 cm landings by 1.5%",
-    "gyroscopic_forces": "not in steady flight, where there are none, and rounding L = I ω and back adds 1.2e-4 of it in 1000 steps",
-    "allow_fast_rotation": "no clamp of the spin, at π/4 a step by default",
-    "linear_damping": "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which is then the scene's decay; so angular_damping",
-    "friction": f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution: Rapier takes the average",
+    "gyroscopic_forces": "off in steady flight, where they are 0; rounding in L = I ω and back would add 1.2e-4 of L in 1000 steps",
+    "allow_fast_rotation": "no clamp of the angular velocity, at π/4 a step by default",
+    "linear_damping": "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives the scene's decay; angular_damping is the same",
+    "friction": f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution, because Rapier takes the average",
 }
-"""Effects were measured at 1 ms with the one setting left out."""
+"""Effects were measured at 1 ms without the one setting."""
 
 
 class Rapier(Engine):
@@ -48,7 +48,6 @@ class Rapier(Engine):
     name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
 
     def declines(self, scene: Scenario) -> str | None:
-        """What Rapier has no setting for."""
         body, floor = scene.body, scene.floor
         if floor is None:
             return None
@@ -57,16 +56,15 @@ class Rapier(Engine):
         if floor.rest_speed > 0.0:
             return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
         if isinstance(body, Box) and not isinstance(floor.friction, str):
-            return "Rapier's friction of a face that slides depends on the direction, by up to 3 degrees of its way"
+            return "Rapier's friction on a sliding face depends on the direction and turns the motion by up to 3 degrees"
         if floor.restitution == 0.0:
             return None
         if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):
-            return "Rapier's friction does not answer the rebound; a rough floor needs restitution 0, or a ball that it grips"
+            return "Rapier's friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
         truth = truth_for(scene)
-        before = [event.before for event in truth.events] if truth else []
-        landings = np.array([rotate(state[ORIENTATION], body.vertices)[:, 1] for state in before]) if truth else np.empty((0, 1))
+        landings = np.array([rotate(hit.before[ORIENTATION], body.vertices)[:, 1] for hit in truth.events]) if truth else np.empty((0, 1))
         if np.any(np.sum(landings <= landings.min(axis=1, keepdims=True) + 1e-6 * body.size, axis=1) > 1):
-            return "Rapier's contacts rebound one after another, once, each undoing those before; here several corners land at once"
+            return "Rapier applies restitution to one contact after another, each undoes those before; here several corners land at once"
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
@@ -74,14 +72,14 @@ class Rapier(Engine):
 
 
 class RapierSimulation(Simulation):
-    """A world of its own."""
+    """A Rapier world."""
 
     staggered = True
 
     def __init__(self, scene: Scenario, dt: float) -> None:
-        start, body, floor = scene.initial_state, scene.body, scene.floor
+        body, floor = scene.body, scene.floor
         self._world = rapier3d.PhysicsWorld(gravity=scene.acceleration)
-        if FIRST_PROCESS() != os.getpid():  # forked, it has none of those threads, and would wait for them for ever
+        if FIRST_PROCESS() != os.getpid():  # a forked process has none of those threads and would wait for them forever
             self._world.set_num_threads(1)
         parameters: dict[str, Any] = {name: value for name, (value, _) in PARAMETERS.items()}
         parameters |= {"dt": dt, "normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
@@ -92,10 +90,9 @@ class RapierSimulation(Simulation):
         for motion, rate in scene.damping.model_dump().items() if scene.damping else ():
             dynamics[f"{motion}_damping"] = float(np.expm1(rate * dt)) / dt
         moments, axes = principal_axes(body.inertia_tensor)
-        frame = Rotation.from_matrix(axes).as_quat()
-        moving = rapier3d.RigidBody.dynamic(**dynamics).position((start[POSITION], start[ORIENTATION]))
-        moving = moving.linvel(start[VELOCITY]).angvel(start[SPIN])
-        moving = moving.additional_mass_properties(rapier3d.MassProperties(np.zeros(3), body.mass, moments, frame))
+        inertia = rapier3d.MassProperties(np.zeros(3), body.mass, moments, Rotation.from_matrix(axes).as_quat())
+        x, q, v, w = (scene.initial_state[part] for part in PARTS.values())
+        moving = rapier3d.RigidBody.dynamic(**dynamics).position((x, q)).linvel(v).angvel(w).additional_mass_properties(inertia)
         handle, surface = self._world.add_body(moving), {}
         if floor is not None:
             surface = {"restitution": floor.restitution, "friction": FRICTION.get(str(floor.friction), floor.friction)}
@@ -103,14 +100,14 @@ class RapierSimulation(Simulation):
             self._world.add_collider(rapier3d.Collider.new(shape, density=0.0, **surface), handle)
             self._world.add_collider(rapier3d.Collider.halfspace((0.0, 1.0, 0.0), **surface))
         self._body = self._world.rigid_bodies[handle]
-        self._body.recompute_mass_properties_from_colliders(self._world.colliders)  # else it has none until the first step
+        self._body.recompute_mass_properties_from_colliders(self._world.colliders)  # else it has none before the first step
         self.settings = {"version": version("rapier3d"), **parameters, **dynamics, **surface}
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):
             self._world.step()
         if not self._body.is_enabled:
-            raise Diverged("Rapier put the body out of action: its state is not finite")
+            raise Diverged("Rapier disabled the body: its state is not finite")
 
     def state(self) -> Array:
         x, q, v, w = self._body.translation, self._body.rotation, self._body.linvel, self._body.angvel

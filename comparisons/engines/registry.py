@@ -1,4 +1,4 @@
-"""Engines by name: `mujoco`, `mujoco[integrator=rk4]`; other packages' by the name they registered; anybody's as `my_module:MyEngine`."""
+"""Engines by name: built in, such as `mujoco[integrator=rk4]`; registered by another package; or a class, `my_module:MyEngine`."""
 
 import re
 import sys
@@ -13,7 +13,7 @@ from scenarios.errors import DropspinError, UnknownName
 
 
 class _Home(NamedTuple):
-    """Where an engine's adapter is, and what it needs installed."""
+    """The module and class of an engine's adapter, and the package that it needs."""
 
     module: str
     adapter: str
@@ -40,7 +40,7 @@ BUILT_IN = {
 
 
 def engine_names() -> list[str]:
-    """The engines that can be named, installed or not: dropspin's own, then those that other packages bring."""
+    """All engine names, installed or not: the built-in ones, then those that other packages register."""
     return [*BUILT_IN, *sorted(_entry_points())]
 
 
@@ -50,7 +50,7 @@ def engine(name: str) -> Engine:
     Raises:
         UnknownName: There is no such engine, option or value.
         EngineMissing: A package it needs is not installed; the text says how to get it.
-        DropspinError: It is no engine, or cannot be imported or created.
+        DropspinError: It is not an engine, or cannot be imported or created.
     """
     match = re.fullmatch(r"\s*([\w.:-]+)\s*(?:\[(.*)\])?\s*", name)
     if match is None:
@@ -69,7 +69,7 @@ def _adapter(base: str) -> type[Engine]:
     """The class of an engine's name."""
     if base in BUILT_IN:
         home = BUILT_IN[base]
-        # Before the adapter, which imports its engine.
+        # Checked before the import of the adapter, which imports its engine.
         if home.package and find_spec(home.package) is None:
             raise EngineMissing(f"{base} is not installed: {home.how_to_install}.")
         adapter: type[Engine] = getattr(import_module(home.module), home.adapter)
@@ -79,17 +79,17 @@ def _adapter(base: str) -> type[Engine]:
         return _imported(base, module, attribute)
     brought = _entry_points()
     if base not in brought:
-        raise DropspinError(f"{UnknownName('engine', base, engine_names())} One of your own is my_module:MyEngine.")
+        raise DropspinError(f"{UnknownName('engine', base, engine_names())} Name an engine of your own as my_module:MyEngine.")
     return _imported(base, brought[base].module, brought[base].attr)
 
 
 def _entry_points() -> dict[str, EntryPoint]:
-    """Engines of other packages, by name; dropspin's own names are its own."""
+    """Engines of other packages, by name; they cannot replace the built-in ones."""
     return {point.name: point for point in entry_points(group=GROUP) if point.name not in BUILT_IN}
 
 
 def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
-    """The class of a module, which must be an engine; what its import prints goes to the standard error."""
+    """The engine class of a module; what the import prints goes to the standard error."""
     if not re.fullmatch(r"\w+(\.\w+)*", module_name) or not re.fullmatch(r"\w+(\.\w+)*", attribute):
         raise DropspinError(f"engine {name!r}: write my_module:MyEngine, or my_package.my_module:MyEngine.")
     try:
@@ -97,7 +97,7 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
             module = import_module(module_name)
     except ModuleNotFoundError as error:
         if error.name is not None and f"{module_name}.".startswith(f"{error.name}."):
-            raise DropspinError(f"engine {name!r}: no module {module_name!r} here, nor where Python looks.") from None
+            raise DropspinError(f"engine {name!r}: no module {module_name!r} here or on Python's path.") from None
         raise EngineMissing(f"{name} needs the module {error.name}, which is not installed.") from None
     except (Exception, SystemExit) as error:
         raise DropspinError(f"engine {name!r}: {module_name} cannot be imported ({type(error).__name__}: {error}).") from error
@@ -107,13 +107,15 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
             raise UnknownName(f"{module_name}'s engine", attribute, [key for key, value in vars(module).items() if _is_engine(value)])
         found = getattr(found, part)
     if not _is_engine(found):
-        raise DropspinError(f"engine {name!r}: {attribute} is no engine; an engine is a class that inherits from comparisons.Engine.")
+        raise DropspinError(f"engine {name!r}: {attribute} is not an engine; an engine is a class that inherits from dropspin.Engine.")
     adapter = cast(type[Engine], found)
     given = getattr(adapter, "name", "")
     if not re.fullmatch(r"[A-Za-z][\w-]*", given):
-        raise DropspinError(f"engine {name!r}: {attribute}.name is what results call it: letters, digits, - and _, such as 'my-engine'.")
+        raise DropspinError(
+            f"engine {name!r}: {attribute}.name is {given!r}; give it a name for results, of letters, digits, - and _, such as 'my-engine'."
+        )
     if given in BUILT_IN:
-        raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is an engine of dropspin's own; results need another.")
+        raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is a built-in engine; results need another name.")
     return adapter
 
 
@@ -126,7 +128,7 @@ def _options(name: str, listed: str) -> dict[str, str]:
     for item in filter(None, (part.strip() for part in listed.split(","))):
         key, equals, value = (part.strip() for part in item.partition("="))
         if not (key and equals and value):
-            raise DropspinError(f"engine {name!r}: {item!r} is not option=value.")
+            raise DropspinError(f"engine {name!r}: {item!r} must be option=value.")
         if key in options:
             raise DropspinError(f"engine {name!r}: {key} is given twice; give each option once.")
         options[key] = value

@@ -1,1 +1,1 @@
-"""Robustness: where engines break, along axes such as step, spin, height, inertia, mass, restitution, duration and size."""
+"""Robustness: the failure modes of engines along axes such as step, spin, height, inertia, mass, restitution, duration and size."""

@@ -1,6 +1,6 @@
-"""What has become of an engine: a condition, by the worst of named criteria that its motion meets.
+"""Failure modes of an engine's motion, and the criteria by which it is diagnosed: the worst that it meets counts.
 
-Accuracy is judged over the scene's own duration, everything else over the whole of a run that may go on for longer.
+Accuracy is measured over the scene's own duration, every other criterion over the whole of a motion that may be longer.
 """
 
 import math
@@ -22,23 +22,23 @@ Array = NDArray[np.float64]
 
 FailureMode = Literal["declined", "sound", "inaccurate", "gains_energy", "sinks", "tunnels", "clamped", "diverged", "crashed", "timed_out"]
 FAILURE_MODES: tuple[FailureMode, ...] = get_args(FailureMode)
-"""From the mildest to the worst; `declined` is none, but what an engine says instead."""
+"""From the mildest to the worst; `declined` is not a failure, but an engine's refusal."""
 
 ERRORS_OF_FEW_ROWS = ("orientation_error", "angular_momentum_error", "energy_error")
 ERRORS = (*ERRORS_OF_FEW_ROWS, "bounce_height_error", "landing_error")
-"""What must be within the tolerance for a motion to be accurate: ratios, and angles in radians; an impact needs every step to be seen."""
+"""The metrics that must be within the tolerance: ratios, and angles in radians. Those of impacts need every step recorded."""
 GAIN, GAIN_BY_LAW = 0.01, 10.0  # of the scene's energy; the latter where Newton's restitution may itself add some
-ASTRAY = 0.5  # of the truth's way, or of the body's size if it stays where it is
+POSITION_OFF = 0.5  # of the distance that the exact solution covers, or of the body's size if it does not move
 BLOWN_UP = 1e6  # times the scene's energy
-DEEPER = 1e-3  # of the body's size; less is no way to speak of
-RESTLESS = 1.5  # times what gravity adds to a speed in a step; 1 is what a resting body may have between two solutions
-ULPS = 1e-15  # of a speed; what is the same to the last digit, of a norm
-HELD = 3  # rows in which a speed stays the same to the last digit
-SUDDEN = 1e-6  # of a speed; how much it still changes from row to row before that, while one that settles has come to rest by then
+DEEPER = 1e-3  # of the body's size; smaller distances are ignored
+NEVER_RESTS = 1.5  # times the speed that gravity adds in a step, which a resting body may have between two solutions
+ULPS = 1e-15  # relative; speeds closer than this are equal to the last digit, also if they are norms
+HELD = 3  # rows in which a clamped speed is equal to the last digit
+SUDDEN = 1e-6  # relative; the least change of a speed from row to row just before a clamp; one that settles changes less
 
 
 class Diagnosis(NamedTuple):
-    """A condition, the criterion it is met by, the criterion's figure, and all of it in words."""
+    """A failure mode, the criterion that shows it, the criterion's value, and a message."""
 
     mode: FailureMode
     criterion: str
@@ -50,14 +50,14 @@ SOUND = Diagnosis("sound", "", 0.0, "")
 
 
 class ExtendedMotion(NamedTuple):
-    """What an engine did with a scene.
+    """An engine's motion of a scene, and beyond its end.
 
     Attributes:
         scene: The scene.
-        dt: The engine's step [s].
-        own: Its motion for as long as the scene lasts.
-        whole: Its motion to the end; it begins with `own`.
-        truth: The scene's.
+        dt: The engine's time step [s].
+        own: The motion for the scene's duration.
+        whole: The whole motion; it begins with `own`.
+        truth: The scene's exact solution.
     """
 
     scene: Scenario
@@ -67,26 +67,27 @@ class ExtendedMotion(NamedTuple):
     truth: Truth | None
 
 
-def worst(findings: list[Diagnosis]) -> Diagnosis:
-    """The worst of several, of equals the one with the largest figure; sound without errors if there is none."""
-    return max(findings, key=lambda one: (FAILURE_MODES.index(one.mode), one.size), default=SOUND)
+def worst(diagnoses: list[Diagnosis]) -> Diagnosis:
+    """The worst of several, of equal modes the one with the largest size; `SOUND` if there are none."""
+    return max(diagnoses, key=lambda one: (FAILURE_MODES.index(one.mode), one.size), default=SOUND)
 
 
-def diagnose(run: ExtendedMotion, within: float) -> Diagnosis:
-    """The worst that a run shows; `within` is how large an error may be."""
-    bad = run.whole.first_bad_row
+def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
+    """The worst diagnosis of a motion; `within` is the largest error that counts as accurate."""
+    bad = motion.whole.first_bad_row
     if bad is not None:
-        return Diagnosis("diverged", "not finite", math.inf, f"the state is not finite at t = {run.whole.t[bad]:g} s")
-    with np.errstate(all="ignore"):  # numbers may be too large for their squares
-        whole = Comparison.with_truth(run.scene, run.whole, run.truth)
-        exact = None if whole.reference is None else whole.reference[: len(run.own)]
-        own = Comparison.with_truth(run.scene, run.own, run.truth, exact)
-        found = [*_energy_that_rises(whole), *_tunnels(run), *_sinks(run), *_errors(run, own, within), *_lost(own), *_restless(run, whole)]
-    return worst(found)
+        return Diagnosis("diverged", "not finite", math.inf, f"the state is not finite at t = {motion.whole.t[bad]:g} s")
+    with np.errstate(all="ignore"):  # the squares of large numbers overflow
+        whole = Comparison.with_truth(motion.scene, motion.whole, motion.truth)
+        exact = None if whole.reference is None else whole.reference[: len(motion.own)]
+        own = Comparison.with_truth(motion.scene, motion.own, motion.truth, exact)
+        stability = [*_energy_gain(whole), *_tunnels(motion), *_sinks(motion)]
+        accuracy = [*_errors(motion, own, within), *_position_off(own), *_never_rests(motion, whole)]
+    return worst(stability + accuracy)
 
 
-def _energy_that_rises(whole: Comparison) -> Iterator[Diagnosis]:
-    """Above the start's; on a floor that grips, Newton's restitution may add some, and more is allowed there."""
+def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
+    """Energy above the start's; more is allowed on a floor that grips, where Newton's restitution may add some."""
     try:
         scale = whole.energy_scale
     except Unresolved:
@@ -103,31 +104,32 @@ def _may_gain(scene: Scenario) -> bool:
     return floor is not None and floor.friction != "none" and floor.restitution > 0.0 and not isinstance(scene.body, Sphere)
 
 
-def _tunnels(run: ExtendedMotion) -> Iterator[Diagnosis]:
-    if run.scene.floor is None:
+def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:
+    if motion.scene.floor is None:
         return
-    end = run.whole[-1:]
-    body = run.scene.body
+    end = motion.whole[-1:]
+    body = motion.scene.body
     highest = float(end.position[0, 1] + rotate(end.orientation[0], body.vertices)[:, 1].max() + body.rounding)
     if highest < -TOUCHING * body.size:
-        depth = -float(lowest_height(run.scene, end)[0])
-        yield Diagnosis("tunnels", "below the floor", depth, f"all of it is below the floor at the end, down to {depth:.3g} m")
+        depth = -float(lowest_height(motion.scene, end)[0])
+        yield Diagnosis("tunnels", "below the floor", depth, f"the whole body is below the floor at the end, down to {depth:.3g} m")
 
 
-def _sinks(run: ExtendedMotion) -> Iterator[Diagnosis]:
-    """Under the floor half way through a run, for a tenth of it, and deeper all through the last tenth: it does not come up in between."""
-    if run.scene.floor is None:
+def _sinks(motion: ExtendedMotion) -> Iterator[Diagnosis]:
+    """Below the floor for the tenth of the motion after its middle, and deeper throughout the last tenth."""
+    if motion.scene.floor is None:
         return
-    heights, share = lowest_height(run.scene, run.whole), run.whole.t / run.whole.t[-1]
-    half_way, end = (float(-heights[(share >= since) & (share <= since + 0.1)].max(initial=-math.inf)) for since in (0.5, 0.9))
-    deeper = DEEPER * run.scene.body.size
-    if half_way > 0.0 and end > half_way + deeper:
-        yield Diagnosis("sinks", "sinks", end, f"{end:.3g} m below the floor after {run.whole.t[-1]:.3g} s, {half_way:.3g} m half way")
+    heights, share = lowest_height(motion.scene, motion.whole), motion.whole.t / motion.whole.t[-1]
+    middle, end = (float(-heights[(share >= since) & (share <= since + 0.1)].max(initial=-math.inf)) for since in (0.5, 0.9))
+    deeper = DEEPER * motion.scene.body.size
+    if middle > 0.0 and end > middle + deeper:
+        message = f"the body is {end:.3g} m below the floor after {motion.whole.t[-1]:.3g} s, {middle:.3g} m after half of that"
+        yield Diagnosis("sinks", "sinks", end, message)
 
 
-def _errors(run: ExtendedMotion, own: Comparison, within: float) -> Iterator[Diagnosis]:
-    known = ERRORS if own.dt < 1.5 * run.dt else ERRORS_OF_FEW_ROWS
-    for metric in metrics_for(run.scene, run.truth):
+def _errors(motion: ExtendedMotion, own: Comparison, within: float) -> Iterator[Diagnosis]:
+    known = ERRORS if own.dt < 1.5 * motion.dt else ERRORS_OF_FEW_ROWS
+    for metric in metrics_for(motion.scene, motion.truth):
         if metric.name not in known:
             continue
         try:
@@ -139,39 +141,39 @@ def _errors(run: ExtendedMotion, own: Comparison, within: float) -> Iterator[Dia
         else:
             unit = "" if metric.unit == "1" else f" {metric.unit}"
             name = metric.name.replace("_", " ")
-            said = f"{name} is {size:.2g}{unit}" if math.isfinite(size) else f"no {name} to be had: nothing like the impact happened"
-            yield Diagnosis("inaccurate", metric.name, size if math.isfinite(size) else math.inf, said)
+            message = f"{name} is {size:.2g}{unit}" if math.isfinite(size) else f"{name} is undefined: no impact was detected"
+            yield Diagnosis("inaccurate", metric.name, size if math.isfinite(size) else math.inf, message)
 
 
-def _lost(own: Comparison) -> Iterator[Diagnosis]:
-    """Somewhere else than the truth, whatever the metrics can resolve."""
+def _position_off(own: Comparison) -> Iterator[Diagnosis]:
+    """Far from the exact position, even where the metrics cannot resolve the motion."""
     if own.reference is None:
         return
     exact = own.reference.position
-    way, size = float(length(exact - exact[0]).max()), own.scene.body.size
-    way = way if way > DEEPER * size else size
-    astray = float(length(own.motion.position[: len(exact)] - exact).max()) / way
-    if not astray <= ASTRAY:
-        yield Diagnosis("inaccurate", "astray", astray, f"its place is off by {astray:.2g} of the way it goes")
+    distance, size = float(length(exact - exact[0]).max()), own.scene.body.size
+    distance = distance if distance > DEEPER * size else size
+    error = float(length(own.motion.position[: len(exact)] - exact).max()) / distance
+    if not error <= POSITION_OFF:
+        yield Diagnosis("inaccurate", "position", error, f"the position error is {error:.2g} of the distance covered")
 
 
-def _restless(run: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosis]:
-    """Moving on where the truth rests, in the last tenth of the run."""
-    exact, late = whole.reference, run.whole.t >= 0.9 * run.whole.t[-1]
-    if exact is None or run.scene.floor is None or len(exact) < len(run.whole) or exact.velocity[late].any():
+def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosis]:
+    """Moving in the last tenth of the motion, in which the exact solution rests."""
+    exact, late = whole.reference, motion.whole.t >= 0.9 * motion.whole.t[-1]
+    if exact is None or motion.scene.floor is None or len(exact) < len(motion.whole) or exact.velocity[late].any():
         return
-    fastest = float(np.linalg.norm(run.whole.velocity[late], axis=1).max())
-    allowed = run.dt * float(np.linalg.norm(run.scene.acceleration))
-    if fastest > RESTLESS * allowed:
-        said = f"never rests: moves at {fastest:.2g} m/s, {fastest / allowed:.3g} times g dt, when the truth is at rest"
-        yield Diagnosis("inaccurate", "never rests", fastest / allowed, said)
+    fastest = float(np.linalg.norm(motion.whole.velocity[late], axis=1).max())
+    allowed = motion.dt * float(np.linalg.norm(motion.scene.acceleration))
+    if fastest > NEVER_RESTS * allowed:
+        message = f"the body never rests: it moves at {fastest:.2g} m/s, {fastest / allowed:.3g} times g dt, where the exact solution rests"
+        yield Diagnosis("inaccurate", "never rests", fastest / allowed, message)
 
 
 def held_speeds(motion: Trajectory) -> dict[str, float]:
-    """Components of velocity [m/s] and angular velocity [rad/s], or norms, that look as if cut off there.
+    """The largest speeds [m/s, rad/s], components or norms, that look clamped.
 
-    They are less than the start's after one step already, or stay the same to the last digit, all of a sudden. That may have other reasons;
-    that the same value comes of another start has not.
+    Such a speed is below the start's after one step already, or suddenly constant to the last digit. Either may have other causes, unless
+    another start gives the same value.
     """
     found: dict[str, float] = {}
     for name in ("velocity", "angular_velocity"):
@@ -184,7 +186,7 @@ def held_speeds(motion: Trajectory) -> dict[str, float]:
 
 
 def _is_held(sizes: Array, largest: float) -> bool:
-    """Whether a component, or the norm, that varied or was larger at the start, stays at the largest value for some rows."""
+    """Whether a component or norm that varied, or was larger at the start, stays at its largest value for some rows."""
     held = np.abs(sizes - largest) <= ULPS * largest
     if sizes[0] > largest * (1.0 + SUDDEN) and held[1]:
         return True
@@ -194,11 +196,11 @@ def _is_held(sizes: Array, largest: float) -> bool:
 
 
 def clamped(motion: Trajectory, other: Trajectory) -> list[Diagnosis]:
-    """Speeds that come out the same, to the last digit, of two different starts."""
+    """Speeds that look clamped and are equal, to the last digit, from two different starts."""
     units = {"velocity": "m/s", "angular_velocity": "rad/s"}
     first, second = held_speeds(motion), held_speeds(other)
     return [
-        Diagnosis("clamped", f"{name} clamped", value, f"{name.replace('_', ' ')} is cut off at {value:.6g} {units[name]}")
+        Diagnosis("clamped", f"{name} clamped", value, f"{name.replace('_', ' ')} is clamped at {value:.6g} {units[name]}")
         for name, value in first.items()
         if math.isclose(value, second.get(name, math.nan), rel_tol=1e-9)
     ]

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.robustness.axes import Axis, OperatingPoint, restored
+from comparisons.robustness.axes import Axis
 from comparisons.robustness.failure_modes import SOUND, Diagnosis, ExtendedMotion, FailureMode, clamped, diagnose, held_speeds, worst
+from comparisons.robustness.operating_point import OperatingPoint
+from comparisons.robustness.transformations import in_nominal_units
 from comparisons.running.processes import EngineProcesses, Failed
 from comparisons.running.recording import Breakdown, EngineEntry, Recording, try_record
 from comparisons.running.start_phases import start_phases
@@ -19,14 +21,14 @@ from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
 Array = NDArray[np.float64]
 
 FEWEST_STEPS_WITHOUT_GRAVITY = 1000
-"""Steps of a run without gravity, to see whether it is stable; with gravity a longer run would be another motion."""
+"""Steps of a run without gravity, which show whether it is stable; with gravity a longer run would be another motion."""
 BROKEN = frozenset({"declined", "diverged", "crashed", "timed_out"})
 """Failure modes without a motion to compare."""
 MOST_ROWS = 20_000
 STARTS = 4
 """Starts of a scene with an impact, evenly spread within a step: one start may be right by chance."""
 OTHER_START = 1.25
-"""Factor on speed and height of another start, to see whether speeds are clamped."""
+"""Factor on speed and height of another start, which shows whether speeds are clamped."""
 SAME_MOTION = 1e-6
 """Relative to sizes and speeds of the scene: how much motions may differ whose scenes differ by a scale only."""
 
@@ -44,7 +46,7 @@ class Runner:
         """The function from a value on an axis to a diagnosis."""
         if axis.name == "duration":
             return _AlongDuration(self, nominal, axis)
-        unscaled = _Unscaled(self, nominal, axis) if axis.promised else None
+        unscaled = _Unscaled(self, nominal, axis) if axis.invariant else None
 
         def diagnose_at(value: float) -> Diagnosis:
             try:
@@ -114,7 +116,7 @@ class _Unscaled:
             return self.diagnosis
         scene = self._nominal.scene
         own, other = self._recordings[0].motion, recordings[0].motion
-        found = restored(other.states, self._axis, self._axis.base(self._nominal), value)
+        found = in_nominal_units(other.states, self._axis.name, self._axis.base(self._nominal), value)
         rows = min(len(own), len(found))
         for truth, times in ((truth_for(scene), own.t[:rows]), (truth_for(moved.scene), other.t[:rows])):
             if truth is not None:
@@ -156,7 +158,7 @@ def _difference(first: Array, second: Array, size: float, g: float) -> float:
     if not (np.isfinite(first).all() and np.isfinite(second).all()):
         return math.inf
     turned = float(angle_between_orientations(first[:, ORIENTATION], second[:, ORIENTATION]).max())
-    # Relative to what moves the body at all: a speed that is rounding is no scale.
+    # Relative to the speeds that the body or gravity gives: a speed of rounding errors is not a scale.
     speed = max(float(np.abs(first[:, VELOCITY]).max()), size * float(np.abs(first[:, SPIN]).max()), math.sqrt(g * size))
     scales = ((POSITION, size), (VELOCITY, speed), (SPIN, speed / size))
     ratios = [float(np.abs(first[:, part] - second[:, part]).max()) / scale for part, scale in scales if scale > 0.0]

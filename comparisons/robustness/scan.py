@@ -1,25 +1,26 @@
-"""Where an engine breaks: a few values along an axis, and between any two with different conditions, bisection."""
+"""The scan of an axis: a few values, and bisection between neighbours with different failure modes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
-from comparisons.robustness.axes import Axis, OperatingPoint
+from comparisons.robustness.axes import Axis
 from comparisons.robustness.failure_modes import Diagnosis, FailureMode
+from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
 from scenarios import Scenario
 
 NEAR = 1.03
-"""How near to each other, as a ratio, the two values of an edge are."""
-MOST_EDGES = 3
-"""Between two of the first values; more are a matter of chance."""
+"""The ratio of the two values of a transition, at most."""
+MOST_TRANSITIONS = 3
+"""Between two of the first values; more of them would be chance."""
 UNSTEADY = "timed_out"
-"""The condition whose edges depend on the machine, and are not looked for."""
+"""The failure mode whose transitions depend on the machine, and are not bisected."""
 
 
 @dataclass(frozen=True)
 class ScanPoint:
-    """What becomes of an engine at a value."""
+    """The diagnosis of an engine at one value of an axis."""
 
     value: float
     diagnosis: Diagnosis
@@ -32,7 +33,7 @@ class ScanPoint:
 
 @dataclass(frozen=True)
 class Transition:
-    """Two neighbouring values of different conditions."""
+    """Two neighbouring points with different failure modes."""
 
     before: ScanPoint
     after: ScanPoint
@@ -40,7 +41,7 @@ class Transition:
 
 @dataclass(frozen=True)
 class AxisScan:
-    """An engine along an axis: its points, by value; `base` is the scene's own value."""
+    """An engine along an axis: its points in the order of their values; `base` is the nominal value."""
 
     scene: Scenario
     axis: Axis
@@ -55,12 +56,12 @@ class AxisScan:
 
     @property
     def transitions(self) -> list[Transition]:
-        """Where the condition changes."""
+        """The pairs of neighbours between which the failure mode changes."""
         return [Transition(first, second) for first, second in pairwise(self.points) if first.mode != second.mode]
 
     @property
     def sound_range(self) -> tuple[int, int] | None:
-        """From the scene's own value, which point is the first and which the last that is sound; None if it is not at its own."""
+        """The numbers of the first and the last point of the sound range around the nominal value; None if that is not sound."""
         sound = [point.mode == "sound" for point in self.points]
         first = last = next(number for number, point in enumerate(self.points) if point.value == self.base)
         if not sound[first]:
@@ -73,28 +74,28 @@ class AxisScan:
 
 
 def scan_axis(
-    runner: Runner, setting: OperatingPoint, axis: Axis, near: float = NEAR, on_progress: Callable[[float], None] = lambda value: None
+    runner: Runner, nominal: OperatingPoint, axis: Axis, near: float = NEAR, on_progress: Callable[[float], None] = lambda value: None
 ) -> AxisScan:
-    """An engine along an axis; `on_progress` is called with each value that is done."""
-    base = axis.base(setting)
-    look = runner.along(setting, axis)
+    """Scan an axis with an engine; `on_progress` is called with each value that is done."""
+    base = axis.base(nominal)
+    diagnose = runner.along(nominal, axis)
     points: dict[float, ScanPoint] = {}
 
     def point(value: float) -> ScanPoint:
         if value not in points:
-            points[value] = ScanPoint(value, look(value))
+            points[value] = ScanPoint(value, diagnose(value))
             on_progress(value)
         return points[value]
 
-    first = [point(value) for value in sorted({*axis.values(setting), base})]
+    first = [point(value) for value in sorted({*axis.values(nominal), base})]
     for low, high in pairwise(first):
-        _find_edges(point, axis, near, low, high)
-    return AxisScan(setting.scene, axis, runner.label, base, tuple(points[value] for value in sorted(points)))
+        _find_transitions(point, axis, near, low, high)
+    return AxisScan(nominal.scene, axis, runner.label, base, tuple(points[value] for value in sorted(points)))
 
 
-def _find_edges(point: Callable[[float], ScanPoint], axis: Axis, near: float, low: ScanPoint, high: ScanPoint) -> None:
-    """Bisect to where the lower value's condition ends, and go on from there."""
-    for _ in range(MOST_EDGES):
+def _find_transitions(point: Callable[[float], ScanPoint], axis: Axis, near: float, low: ScanPoint, high: ScanPoint) -> None:
+    """Bisect to where the lower point's failure mode ends, and continue from there."""
+    for _ in range(MOST_TRANSITIONS):
         if low.mode == high.mode or UNSTEADY in (low.mode, high.mode):
             return
         below, above = low, high

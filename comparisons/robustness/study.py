@@ -7,7 +7,8 @@ from functools import partial
 from itertools import product, takewhile
 
 from comparisons.engines.base import Engine
-from comparisons.robustness.axes import AXES, Axis, OperatingPoint
+from comparisons.robustness.axes import AXES, Axis
+from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
 from comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
 from comparisons.running.processes import EngineProcesses, ResourceLimits
@@ -33,7 +34,7 @@ ON_A_FLOOR = (
     "pybullet[coordinates=multibody,velocity_clamp=kept]",
 )
 SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")
-"""A spin that every method knows, one that few do, a ball and a box that bounce, and a block that comes to rest."""
+"""A spin that every method reproduces, one that few do, a ball and a box that bounce, and a block that comes to rest."""
 DT = 5e-3  # s
 WITHIN = 0.1
 RESOURCES = ResourceLimits(processor_time=60.0)
@@ -42,12 +43,12 @@ ACCURATE, STABLE = ("sound",), ("sound", "inaccurate")
 
 @dataclass(frozen=True)
 class RobustnessStudy:
-    """What becomes of engines at a scene's extremes.
+    """The failure modes of engines at a scene's extremes.
 
     Attributes:
         scene: The scene.
-        dt: The step where it is not the step that is varied [s].
-        within: How large an error may be.
+        dt: The time step where it is not varied [s].
+        within: The largest error that counts as accurate.
         scans: Each engine along each axis.
         left_out: Engines that do not run the scene, and why.
     """
@@ -59,12 +60,13 @@ class RobustnessStudy:
     left_out: dict[str, str]
 
     def largest_steps(self, engine: str) -> tuple[float | None, float | None]:
-        """The largest steps that an engine is accurate at, and stable, together with all finer ones [s]; None if the finest is not."""
+        """The largest time steps at and below which an engine is accurate, and stable [s]; None if it is not at the finest."""
         points = next((one.points for one in self.scans if one.axis.name == "step" and one.engine == engine), ())
-        return _last_before_any_other(points, ACCURATE), _last_before_any_other(points, STABLE)
+        return _last_in_a_row(points, ACCURATE), _last_in_a_row(points, STABLE)
 
 
-def _last_before_any_other(points: Sequence[ScanPoint], allowed: Sequence[str]) -> float | None:
+def _last_in_a_row(points: Sequence[ScanPoint], allowed: Sequence[str]) -> float | None:
+    """The last value of the first points in a row whose modes are allowed."""
     values = [point.value for point in takewhile(lambda point: point.mode in allowed, points)]
     return values[-1] if values else None
 
@@ -85,7 +87,7 @@ def find_limits(
         scene: A scene, its catalogue name, or the path of its file.
         engines: Engines or names with options; by default the methods that differ on such a scene.
         axes: Names of axes; by default all that the scene has, see `AXES`.
-        dt: Time step [s], where it is not what is varied.
+        dt: Time step where it is not varied [s].
         within: The largest error that counts as accurate: a ratio, or an angle in radians.
         on_progress: Called with what is done, and the share of all of it.
         resources: What an engine may use for one point.

@@ -31,7 +31,7 @@ def tradeoff_command(
 
     Without arguments: the scene spin-asymmetric and the methods that differ on it.
     """
-    from comparisons.tradeoff import tradeoff
+    from comparisons.tradeoff.study import tradeoff
     from reports.output import folder_made
     from reports.study_files import write_tradeoff
     from reports.terminal.progress import share_bar
@@ -50,7 +50,7 @@ def tradeoff_command(
 
                 found.append(tradeoff(load(name), engines, metric, on_progress=on_progress))
             if not json_output:
-                print_rows(view.front_rows(found[-1]), json_output=False)
+                print_rows(view.pareto_front_rows(found[-1]), json_output=False)
                 for sentence in view.sentences(found[-1], within):
                     click.echo(sentence)
         write_tradeoff(found, within, folder)

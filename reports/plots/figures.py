@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from comparisons.regressions.history import History
-    from comparisons.tradeoff import TradeOff
+    from comparisons.tradeoff.points import TradeOff
 
 CONVERGENCE = (
     "energy_error",
@@ -48,11 +48,11 @@ def report_figures(results: Results) -> "Iterator[tuple[str, Figure]]":
 
 
 def tradeoff_figure(found: "TradeOff") -> "Figure":
-    """Error over cost in a scene: for one world, and per world of a batch if an engine simulates batches."""
-    together = [False, True] if found.front_side_by_side else [False]
-    with _figure([""] * (len(together) + 1)) as (figure, panels):
-        for axes, side_by_side in zip(panels, together, strict=False):
-            plot_tradeoff(found, axes, side_by_side)
+    """Error over cost in one scene: of one world, and per world in a batch if an engine can step batches."""
+    kinds = [False, True] if found.batch_pareto_front else [False]
+    with _figure([""] * (len(kinds) + 1)) as (figure, panels):
+        for axes, batch in zip(panels, kinds, strict=False):
+            plot_tradeoff(found, axes, batch)
         panels[0].set_title(found.scene.name)
         panels[-1].axis("off")
         panels[-1].legend(*panels[0].get_legend_handles_labels(), loc="center left", frameon=False)

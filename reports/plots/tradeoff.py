@@ -3,28 +3,28 @@
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from comparisons.tradeoff import SIDE_BY_SIDE
+from comparisons.tradeoff.costs import BATCH
 from reports.plots.colours import engine_colours, engine_markers
 from reports.plots.style import ROUNDING, ink, label_powers, metric_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from comparisons.tradeoff import Point, TradeOff
+    from comparisons.tradeoff.points import CostPoint, TradeOff
 
 
-def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -> None:
-    """Draw error over cost, both logarithmic: the time steps of each engine joined by a line, and the Pareto front.
+def plot_tradeoff(found: "TradeOff", axes: "Axes", batch: bool = False) -> None:
+    """Draw error over cost, both logarithmic: each engine's time steps joined, and the Pareto front.
 
     Args:
-        found: The study.
+        found: The trade-off.
         axes: The axes to draw into.
-        side_by_side: Draw the cost per world of a batch, of the engines that simulate batches.
+        batch: Whether to draw the cost per world in a batch, of the engines that can step batches.
     """
-    front = found.front_side_by_side if side_by_side else found.front
+    front = found.batch_pareto_front if batch else found.pareto_front
 
-    def cost(point: "Point") -> float:
-        return point.side_by_side if side_by_side else point.typical
+    def cost(point: "CostPoint") -> float:
+        return point.cost_per_world if batch else point.typical_cost
 
     engines = list(dict.fromkeys(point.engine for point in found.points))
     colours, markers = engine_colours(engines), engine_markers(engines)
@@ -43,5 +43,5 @@ def plot_tradeoff(found: "TradeOff", axes: "Axes", side_by_side: bool = False) -
         )
     label_powers(axes, "x")
     label_powers(axes, "y")
-    axes.set_xlabel("time per simulated second [s]" + (f",\nper world (batch of {SIDE_BY_SIDE})" if side_by_side else ""))
+    axes.set_xlabel(f"time per simulated second{f', per world (batch of {BATCH})' if batch else ''} [s]")
     axes.set_ylabel(metric_label(found.metric))

@@ -1,4 +1,4 @@
-"""What a trade-off between error and cost says: rows, sentences, files."""
+"""`dropspin tradeoff` in words: rows of points, the Pareto front, and sentences of advice."""
 
 import math
 from collections.abc import Sequence
@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from comparisons.measuring.metrics import METRICS
-from comparisons.tradeoff import SIDE_BY_SIDE, Point, TradeOff
+from comparisons.tradeoff.costs import BATCH
+from comparisons.tradeoff.points import CostPoint, TradeOff
 
-COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "side_by_side", "on_front")
+COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "cost_per_world", "on_pareto_front")
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
     """All points: error, and time per simulated second as median, best and quartiles of the rounds [s]."""
-    front = found.front
+    front = found.pareto_front
     return [
         {
             "scene": found.scene.name,
@@ -22,62 +23,61 @@ def rows(found: TradeOff) -> list[dict[str, Any]]:
             "engine": point.engine,
             "dt": point.dt,
             "error": point.error,
-            "cost": point.typical,
+            "cost": point.typical_cost,
             "cost_best": float(point.cost.min()),
             "cost_quartiles": [float(value) for value in np.quantile(point.cost, [0.25, 0.75])],
-            "side_by_side": None if math.isnan(point.side_by_side) else point.side_by_side,
-            "on_front": point in front,
+            "cost_per_world": None if math.isnan(point.cost_per_world) else point.cost_per_world,
+            "on_pareto_front": point in front,
         }
         for point in found.points
     ]
 
 
-def front_rows(found: TradeOff) -> list[dict[str, str]]:
-    """The front, in words: from the cheapest to the most accurate."""
+def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
+    """The Pareto front as text, from the cheapest to the most accurate point."""
     unit = _unit(found)
     return [
         {
             "engine": point.engine,
             "step": f"{1e3 * point.dt:.4g} ms",
             "error": f"{point.error:.2e}{unit}",
-            "a simulated second": _time(point.typical),
+            "time per simulated second": _time(point.typical_cost),
             "best": _time(float(point.cost.min())),
-            f"each of {SIDE_BY_SIDE}": "–" if math.isnan(point.side_by_side) else _time(point.side_by_side),
+            f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else _time(point.cost_per_world),
         }
-        for point in found.front
+        for point in found.pareto_front
     ]
 
 
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
-    """What to take within each tolerance, by how much, what is next best; and what is never worth its time."""
+    """The cheapest configuration within each tolerance and the next best; then what is dominated or left out."""
     unit = _unit(found)
     name = found.metric.replace("_", " ")
-    told = []
+    lines = []
     for tolerance in within:
         goal = f"{found.scene.name}, {name} within {tolerance:g}{unit}"
         advice = found.recommendation(tolerance)
         if advice is None:
             nearest = min(found.points, key=lambda point: point.error)
-            told.append(f"{goal}: nothing gets there; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}.")
+            lines.append(f"{goal}: no tested configuration reaches it; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}.")
             continue
-        sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical)} a simulated second"
+        sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical_cost)} per simulated second"
         if advice.next_best is None:
-            sentence += "; nothing else gets there."
+            sentence += "; no other engine or method reaches it."
         elif advice.level:
-            sentence += f"; level with {_named(advice.next_best)}, {advice.ratio:.2f} times that."
+            sentence += f"; level with {_named(advice.next_best)}, {advice.ratio:.2f} times as long."
         else:
-            sentence += f"; next best {_named(advice.next_best)}, {advice.ratio:.1f} times that."
-        together = found.best_side_by_side(tolerance)
-        if together is not None:
-            sentence += f" Of {SIDE_BY_SIDE} side by side, {_named(together)}: {_time(together.side_by_side)} each."
-        told.append(sentence)
+            sentence += f"; the next best is {_named(advice.next_best)}, {advice.ratio:.1f} times as long."
+        batched = found.best_in_batch(tolerance)
+        if batched is not None:
+            sentence += f" In a batch of {BATCH}: {_named(batched)}, {_time(batched.cost_per_world)} per world."
+        lines.append(sentence)
     if found.dominated:
-        told.append(f"Dominated, less accurate or slower than something else at every step: {', '.join(found.dominated)}.")
-    told += [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
-    return told
+        lines.append(f"Dominated (less accurate or slower than another configuration at every step): {', '.join(found.dominated)}.")
+    return lines + [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
 
 
-def _named(point: Point) -> str:
+def _named(point: CostPoint) -> str:
     return f"{point.engine} at {1e3 * point.dt:.4g} ms"
 
 

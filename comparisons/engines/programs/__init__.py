@@ -1,4 +1,4 @@
-"""Texts that have an engine's settings, ready to paste: templates, and what they have in common."""
+"""Programs and models with an engine's settings, ready to paste, rendered from templates."""
 
 from functools import cache
 from typing import Any
@@ -11,12 +11,12 @@ from scenarios.body import Box, Sphere
 
 @cache
 def _templates() -> Environment:
-    # Programs and models of our own figures, not pages of anybody's text: nothing to escape.
+    # Programs and models made of numbers, not pages of user text: nothing to escape.
     return Environment(loader=PackageLoader(__name__, "."), undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False)
 
 
 def rendered(template: str, scene: Scenario, **values: Any) -> str:
-    """The text of a template for a ball or a flat box that falls onto a floor; in it, z is up."""
+    """The text of a template for a ball or a flat box that falls onto a floor, with z up."""
     assert scene.floor is not None
     body = scene.body
     if isinstance(body, Sphere):
@@ -24,7 +24,7 @@ def rendered(template: str, scene: Scenario, **values: Any) -> str:
     else:
         assert isinstance(body, Box)
         shape, extents = "box", [body.half_extents[axis] for axis in (2, 0, 1)]
-    text = (
+    return (
         _templates()
         .get_template(template)
         .render(
@@ -37,10 +37,9 @@ def rendered(template: str, scene: Scenario, **values: Any) -> str:
             **values,
         )
     )
-    return text
 
 
 def can_be_pasted(scene: Scenario) -> bool:
-    """Whether the templates know the scene: a ball or a box on a floor, under gravity along -y."""
+    """Whether the templates support the scene: a ball or a box on a floor, under gravity along -y."""
     falls = bool(scene.acceleration[1] < 0.0) and not any(scene.acceleration[::2])
     return falls and scene.floor is not None and isinstance(scene.body, (Sphere, Box))

@@ -1,4 +1,4 @@
-"""Every engine on every scene: built as meant, uniform, repeatable, and leaving nothing behind."""
+"""Every engine on every scene: builds the scene, records at every step, repeats to the last bit and leaves no files."""
 
 import math
 import re
@@ -24,7 +24,7 @@ CASES = list(product(ENGINES, QUICK))
 
 
 @pytest.mark.parametrize(("name", "scene_name"), CASES)
-def test_contract(name, scene_name):
+def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
     """State, mass, inertia and gravity to 8 ulp; shapes; finite; advance and record take the same steps, bit for bit."""
     chosen, scene = engine(name), scenarios.load(scene_name)
     refusal = chosen.declines(scene)
@@ -55,7 +55,7 @@ def test_contract(name, scene_name):
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_no_state_is_left_in_the_process(name):
+def test_scene_gives_the_same_bits_after_and_beside_others(name):
     """A, B, A: a scene gives the same bits whatever ran before it, and while another simulation is open."""
     a, b = scenarios.load("spin-asymmetric"), scenarios.load("spin-dzhanibekov")
     if engine(name).declines(scenarios.load("drop-ball")) is None:
@@ -69,7 +69,7 @@ def test_no_state_is_left_in_the_process(name):
 
 
 def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
-    """MuJoCo logs its warnings to a file unless told otherwise; a diverging run must say so instead."""
+    """MuJoCo logs warnings to a file by default; a run that diverges must raise instead."""
     from comparisons.engines.base import Diverged
 
     monkeypatch.chdir(tmp_path)
@@ -80,9 +80,9 @@ def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
     }
     steps = {}
     for every in (1, 2):
-        with pytest.raises(Diverged, match=r"BADQVEL|BADQACC|BADQPOS") as told:
+        with pytest.raises(Diverged, match=r"BADQVEL|BADQACC|BADQPOS") as error:
             simulate(scenarios.load(wild), "mujoco", 5e-3, every=every)
-        steps[every] = int(re.search(r"in step (\d+)$", str(told.value))[1])
+        steps[every] = int(re.search(r"in step (\d+)$", str(error.value))[1])
     assert list(tmp_path.iterdir()) == []
     assert abs(steps[1] - steps[2]) <= 2  # to a row
     with engine("mujoco").prepare(scenarios.load(wild), 5e-3) as simulation:
@@ -121,8 +121,8 @@ def test_damping_decays_exponentially(name, tolerance):
     np.testing.assert_allclose(motion.angular_velocity[-1], [0, 0.5 * math.exp(-1.3), 0], rtol=tolerance, atol=1e-15)
 
 
-def test_inertia_off_the_axes():
-    """MuJoCo takes a skew tensor and reads back the same; PyBullet says that it cannot."""
+def test_tensor_with_products_of_inertia_is_exact_or_declined():
+    """MuJoCo simulates it; PyBullet declines."""
     skew = {"shape": "vertices", "points": [[0, 0, 0], [1, 0.2, 0], [0.1, 1, 0], [0, 0.3, 1]], "mass": 2.0}
     scene = scenarios.load({"duration": 1.0, "body": skew, "start": {"angular_velocity": [1, 2, 3]}})
     assert "principal axes" in engine("pybullet").declines(scene)
@@ -131,8 +131,8 @@ def test_inertia_off_the_axes():
     np.testing.assert_allclose(motion.angular_velocity[-1], exact.angular_velocity[0], rtol=0, atol=1e-11)
 
 
-def test_engines_say_what_they_cannot():
-    """Coulomb friction, a rest speed, vertices on a floor: declined with a reason, and simulate says so."""
+def test_engines_decline_scenes_with_a_reason():
+    """Coulomb friction and a rest speed; `simulate` raises with the reason."""
     ball = scenarios.load("drop-ball")
     coulomb = ball.model_copy(update={"floor": ball.floor.model_copy(update={"friction": 0.3})})
     slow = ball.model_copy(update={"floor": ball.floor.model_copy(update={"rest_speed": 0.1})})
@@ -145,8 +145,8 @@ def test_engines_say_what_they_cannot():
         simulate(coulomb, "document", 1e-3)
 
 
-def test_names_with_options():
-    """The canonical form sorts options and leaves defaults out; slips are named."""
+def test_labels_are_canonical_and_unknown_options_get_suggestions():
+    """The canonical form sorts options and leaves defaults out."""
     assert engine("mujoco[integrator=euler]").label == "mujoco"
     assert engine(" mujoco[ integrator = rk4 ]").label == "mujoco[integrator=rk4]"
     assert engine_names() == ["document", "mujoco", "pybullet", "rapier", "dart", "drake"]
@@ -161,8 +161,8 @@ def test_names_with_options():
             engine(bad)
 
 
-def test_what_bullet_leaves_out_is_declined():
-    """The gyroscopic term of a body of 1e-4 kg; a decay of 40 per second. Just above, it has them, to first order in the step."""
+def test_bullet_declines_small_inertia_and_fast_decay():
+    """Bullet omits the gyroscopic term of a body of 3e-4 kg; at 1e-3 kg it has it, to first order in the step."""
     box = {"shape": "box", "half_extents": [0.1, 0.15, 0.25]}
     start = {"angular_velocity": [1.0, 3.0, 2.0]}
 
@@ -173,14 +173,14 @@ def test_what_bullet_leaves_out_is_declined():
     assert engine("pybullet[coordinates=multibody]").declines(spinning(3e-4)) is None
     allowed = spinning(1e-3)
     assert engine("pybullet").declines(allowed) is None
-    off = np.abs(simulate(allowed, "pybullet", 1e-3).angular_velocity[-1] - scenarios.truth_for(allowed)(1.0).angular_velocity[0]).max()
-    assert off < 0.02  # measured 6e-3; without the term 2.7
+    error = np.abs(simulate(allowed, "pybullet", 1e-3).angular_velocity[-1] - scenarios.truth_for(allowed)(1.0).angular_velocity[0]).max()
+    assert error < 0.02  # measured 6e-3; without the term 2.7
     thick = scenarios.load({"duration": 1.0, "body": box | {"mass": 1.0}, "start": start, "damping": {"linear": 40.0}})
     assert "no decay faster than 30" in engine("pybullet").declines(thick)
 
 
-def test_rapier_declines_what_it_does_otherwise():
-    """Corners that land together, spin about their edge included; a box that slides on a face."""
+def test_rapier_declines_corners_that_land_together_and_sliding_faces():
+    """Corners that land together while the box turns about their edge as well."""
     fall = {"duration": 1.0, "gravity": {"acceleration": [0.0, -9.8, 0.0]}}
     box = {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0}
     tilted = {"position": [0.0, 0.8, 0.0], "orientation": [0.25, 0.0, 0.0, 0.97], "angular_velocity": [1.0, 0.0, 0.0]}

@@ -1,4 +1,4 @@
-"""The adapter of MuJoCo with versions that are not installed, by their numbers; and, slowly, with the versions themselves."""
+"""MuJoCo's adapter with other versions: by their numbers alone, and in slow tests with those versions installed."""
 
 import csv
 import json
@@ -16,7 +16,7 @@ from comparisons.engines.mujoco_versions import flight_of, numbers_of
 from comparisons.engines.registry import engine
 from comparisons.regressions.comparing import compare
 from comparisons.regressions.history import history
-from comparisons.results.store import restore
+from comparisons.results.store import load_results
 from comparisons.running.recording import simulate
 from scenarios.mechanics import kinetic_energy
 
@@ -30,12 +30,12 @@ mass = 1.0
 angular_velocity = [1.0, 2.0, 3.0]
 """
 PUBLISHED = {EXPLICIT_GYROSCOPIC: 1.0868946, MIDPOINT_GYROSCOPIC: 1.0, IMPLICIT_GYROSCOPIC: 0.9260083}
-"""E/E₀ at the end of that, MuJoCo's own free-body test, in steps of 10 ms."""
+"""E/E₀ at the end of that scene, MuJoCo's own free-body test, in steps of 10 ms."""
 
 
 @pytest.fixture
 def installed(monkeypatch):
-    """A version takes the place of the installed one's, so that the adapter leaves out what it had not."""
+    """Replaces the installed version's number, so that the adapter uses only features of that version."""
     return lambda version: monkeypatch.setattr(mujoco_engine, "VERSION", numbers_of(version))
 
 
@@ -46,8 +46,8 @@ def energy_ratio(tmp_path, name):
     return energies[-1] / energies[0]
 
 
-def test_published_free_body_energies(tmp_path):
-    """Of each integrator, as its discretisation in the installed version says; Bullet's is the implicit one, RK4 keeps E to 2e-10."""
+def test_free_body_energies_are_the_published_ones(tmp_path):
+    """Each integrator by its discretisation in the installed version; Bullet's is the implicit one, RK4 keeps E to 2e-10."""
     for integrator in ("euler", "implicit", "implicitfast"):
         expected = PUBLISHED[flight_of(integrator, mujoco_engine.VERSION)]
         assert energy_ratio(tmp_path, f"mujoco[integrator={integrator}]") == pytest.approx(expected, abs=5e-8)
@@ -68,8 +68,8 @@ def test_published_free_body_energies(tmp_path):
         ("4.0.0", IMPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC),
     ],
 )
-def test_what_is_claimed_depends_on_the_version(version, implicit, implicitfast, installed):
-    """Gyroscopic terms as the changelog has them; only from 4.0 on are RK4's turns classical."""
+def test_discretisation_depends_on_the_version(version, implicit, implicitfast, installed):
+    """Gyroscopic terms as in the changelog; RK4's rotations are classical from 4.0 on."""
     installed(version)
     tumble, ball = scenarios.load("spin-asymmetric"), scenarios.load("drop-ball-backspin")
     claimed = {name: engine(f"mujoco[integrator={name}]").discretisation(tumble) for name in mujoco_engine.INTEGRATORS}
@@ -77,40 +77,40 @@ def test_what_is_claimed_depends_on_the_version(version, implicit, implicitfast,
     assert claimed == {"euler": EXPLICIT_GYROSCOPIC, "implicit": implicit, "implicitfast": implicitfast}
     assert (runge_kutta == "classical Runge-Kutta") == (version == "4.0.0")
     by_midpoint = engine("mujoco[integrator=implicitfast]").discretisation(ball).startswith(MIDPOINT_GYROSCOPIC)
-    assert by_midpoint == (implicitfast == MIDPOINT_GYROSCOPIC)  # a ball's too, where the floor turns it
+    assert by_midpoint == (implicitfast == MIDPOINT_GYROSCOPIC)  # also of a ball that the floor spins
 
 
-def test_boxes_need_the_exact_diagonal(installed):
-    """On a floor, in the calibrated profile; the sentence has the version, the needed one, and what to do."""
+def test_calibrated_boxes_need_the_exact_diagonal(installed):
+    """The refusal names the installed version, the version needed, and what to do."""
     box, flight = scenarios.load("drop-box-flat"), scenarios.load("spin-asymmetric")
     installed("3.9.0")
     assert engine("mujoco").declines(box) is None
     installed("3.8.1")
     for name in ("mujoco", "mujoco[kappa=0.002]", "mujoco[spring_steps=20]", "mujoco[integrator=rk4]"):
-        told = engine(name).declines(box)
-        assert "MuJoCo 3.8.1 is installed" in told
-        assert "from 3.9 on" in told
-        assert "profile=default" in told
+        refusal = engine(name).declines(box)
+        assert "MuJoCo 3.8.1 is installed" in refusal
+        assert "from 3.9 on" in refusal
+        assert "profile=default" in refusal
     assert engine("mujoco[profile=default]").declines(box) is None
     assert engine("mujoco").declines(flight) is None
     installed("3.2.3")
     for scene, name in ((flight, "mujoco"), (box, "mujoco[profile=default]")):
         assert "MuJoCo 3.2.3 is installed" in engine(name).declines(scene)
-        assert "3.2.4" in engine(name).declines(scene)
+        assert "update mujoco to 3.2.4 or later" in engine(name).declines(scene)
 
 
 @pytest.mark.parametrize("name", ["mujoco", "mujoco[spring_steps=20]", "mujoco[integrator=rk4,spring_steps=20]"])
 @pytest.mark.parametrize("scene_name", ["drop-ball", "drop-ball-backspin"])
-def test_balls_do_not_need_it(name, scene_name, installed):
-    """The same bits with the flags that a version lacks and without."""
+def test_balls_move_the_same_without_the_exact_diagonal(name, scene_name, installed):
+    """The same bits with and without the flags that a version lacks."""
     scene = scenarios.load(scene_name)
     with_all = simulate(scene, name, 2e-3)
     installed("3.3.5")
     np.testing.assert_array_equal(simulate(scene, name, 2e-3).states, with_all.states)
 
 
-def test_only_what_a_version_has_is_set(installed):
-    """Flags of the solver in settings and in texts to paste, where there is a contact; none in free flight."""
+def test_only_flags_of_the_version_are_set(installed):
+    """In settings and in programs to paste; without a contact, none but autoreset."""
     import mujoco
 
     def flags(scene_name):
@@ -136,8 +136,7 @@ def test_only_what_a_version_has_is_set(installed):
     assert calibrate(engine("mujoco"), 0.7, 2e-3).measured[0].value == pytest.approx(0.7, abs=1e-5)
 
 
-def test_ensembles_without_threads(installed):
-    """Bodies that a version cannot take side by side are taken one after the other."""
+def test_versions_without_threaded_rollouts_have_no_batches(installed):
     members = [scenarios.load("drop-ball"), scenarios.load("drop-ball-lively")]
     assert engine("mujoco").prepare_batch(members, 1e-3) is not None
     installed("3.2.6")
@@ -145,7 +144,7 @@ def test_ensembles_without_threads(installed):
 
 
 def older(version, folder):
-    """That version, installed from the package index into a folder of its own."""
+    """Install a version from the package index into a folder of its own."""
     there = folder / version
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     subprocess.run([*pip, "--no-deps", "--target", there, f"mujoco=={version}"], check=True)
@@ -153,36 +152,36 @@ def older(version, folder):
 
 
 def with_version(there, *arguments, cwd):
-    """The command, with what is installed in a folder before everything else."""
+    """Run the command with the packages in a folder first on the path."""
     program = f"import sys; sys.path.insert(0, {str(there)!r}); from reports.commands.main import main; main()"
     return subprocess.run([sys.executable, "-P", "-c", program, *arguments], cwd=cwd, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["3.2.4", "3.6.0", "3.10.0"])
-def test_older_versions_themselves(version, tmp_path):
-    """Installed beside, from the package index, and run: E/E₀ as published, the versions told are of what ran, boxes are declined."""
+def test_installed_older_versions_reproduce_published_energies(version, tmp_path):
+    """E/E₀ as published; provenance names the version that ran; boxes are declined where the flag diagexact is missing."""
     there = older(version, tmp_path)
     (tmp_path / "free-body.toml").write_text(FREE_BODY)
 
     def run(out, *arguments):
         done = with_version(there, "run", *arguments, "-o", out, cwd=tmp_path)
         assert done.returncode in (0, 1), done.stdout + done.stderr  # 1 where a default profile misses what is expected
-        provenance = json.loads((tmp_path / out / "run.json").read_text())
+        stored = json.loads((tmp_path / out / "run.json").read_text())
         rows = list(csv.DictReader((tmp_path / out / "results.csv").read_text().splitlines()))
-        return provenance["provenance"], rows
+        return stored["provenance"], rows
 
     implicitfast = "mujoco[integrator=implicitfast]"
     gyroscopic = flight_of("implicitfast", numbers_of(version))
     for scene in ("free-body.toml", "spin-asymmetric"):
-        told, rows = run(f"out-{scene}", scene, "-e", implicitfast, "--dt", "0.01")
+        provenance, rows = run(f"out-{scene}", scene, "-e", implicitfast, "--dt", "0.01")
         [drift] = [float(row["value"]) for row in rows if row["metric"] == "energy_drift"]
         if scene == "free-body.toml":
             assert 1.0 + drift == pytest.approx(PUBLISHED[gyroscopic], abs=5e-8)
         else:
             assert {EXPLICIT_GYROSCOPIC: drift > 1e-3, MIDPOINT_GYROSCOPIC: abs(drift) < 1e-11}[gyroscopic]
-        assert told["versions"]["mujoco"] == version
-        assert {settings["version"] for settings in told["settings"][implicitfast].values()} == {version}
+        assert provenance["versions"]["mujoco"] == version
+        assert {settings["version"] for settings in provenance["settings"][implicitfast].values()} == {version}
     _, rows = run("floor", "drop-box-flat", "drop-ball", "-e", "mujoco", "-e", "mujoco[profile=default]")
     verdicts = {(scene, name): set() for scene in ("drop-ball", "drop-box-flat") for name in ("mujoco", "mujoco[profile=default]")}
     for row in rows:
@@ -195,8 +194,8 @@ def test_older_versions_themselves(version, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_change_between_versions_is_found_and_is_the_engine_s(tmp_path):
-    """`compare` and `history` over five versions: the moves of implicitfast where they were, of Runge-Kutta's attitude at 4.0.0."""
+def test_changes_between_versions_are_attributed_to_the_engine(tmp_path):
+    """`compare` and `history` over five versions: implicitfast changed in two of them, the attitude of Runge-Kutta at 4.0.0."""
     (tmp_path / "free-body.toml").write_text(FREE_BODY)
     implicitfast, rk4 = "mujoco[integrator=implicitfast]", "mujoco[integrator=rk4]"
     versions = ["3.6.0", "3.7.0", "3.10.0", "3.11.0", "4.0.0"]
@@ -205,14 +204,14 @@ def test_a_change_between_versions_is_found_and_is_the_engine_s(tmp_path):
         engines = [word for name in (implicitfast, rk4, "document") for word in ("-e", name)]
         done = with_version(there, "run", "free-body.toml", *engines, "--dt", "0.01", "-o", f"runs/{version}", cwd=tmp_path)
         assert done.returncode == 0, done.stdout + done.stderr
-    runs = {version: restore(tmp_path / "runs" / version) for version in versions}
+    runs = {version: load_results(tmp_path / "runs" / version) for version in versions}
     changes = compare(runs["3.6.0"], runs["4.0.0"])
-    assert changes.blames[implicitfast].culprit == "engine"
-    assert changes.blames[implicitfast].said == "the engine's: mujoco 3.6.0 → 4.0.0"
-    assert "document" not in changes.blames
+    assert changes.attributions[implicitfast].origin == "engine"
+    assert "mujoco 3.6.0 → 4.0.0" in changes.attributions[implicitfast].message
+    assert "document" not in changes.attributions
     found = history(runs)
     moves = [(found.names[move.run], move.engine) for move in found.moves]
     assert moves == [("3.7.0", implicitfast), ("3.11.0", implicitfast), ("4.0.0", rk4)]
-    drifts = found.figures[(found.figures["metric"] == "energy_drift") & (found.figures["engine"] == implicitfast)]
+    drifts = found.results[(found.results["metric"] == "energy_drift") & (found.results["engine"] == implicitfast)]
     ratios = 1.0 + drifts.sort_values("run")["value"]
     np.testing.assert_allclose(ratios, [1.0868946, 1.0, 1.0, 0.9260083, 0.9260083], atol=5e-8)

@@ -1,18 +1,18 @@
-"""Calibrated and default profiles: what the defaults get wrong is told from what the engine cannot do."""
+"""Calibrated and default profiles: errors of the defaults are setting errors, errors of both are model errors."""
 
 import math
 
 import numpy as np
 import pytest
 
-import comparisons
 from comparisons.engines.base import calibrated_label
 from comparisons.engines.registry import engine
-from comparisons.running.recording import simulate
+from comparisons.running.recording import record, simulate
+from comparisons.running.run import run
 from scenarios import DropspinError, Trajectory, load, truth_for
 from scenarios.mechanics import kinetic_energy
 
-U = math.sqrt(2 * 9.81)
+SPIN = load("spin-asymmetric").model_copy(update={"duration": 2.0})
 
 
 def ball(e):
@@ -29,7 +29,7 @@ def ball(e):
 
 
 def apparent(name, e, dt):
-    """√(h₁/h₀) of a drop from 1 m: the restitution that a user sees."""
+    """√(h₁/h₀) of a drop from 1 m: the apparent restitution."""
     motion = simulate(ball(e), name, dt)
     after = int(np.argmin(motion.velocity[:, 1])) + 1
     return math.sqrt(max(motion.position[after:, 1].max() - 0.1, 0.0))
@@ -37,26 +37,26 @@ def apparent(name, e, dt):
 
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.5, 0.8, 0.95])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1e-3, 1 / 4000])
-def test_multibody_restitution(e, dt):
-    """Bullet's multibody collides after gravity, as the note does: e (1 + g dt/u), to a step's phase; measured .5185 at e = .5, 1/60 s."""
+def test_multibody_restitution_includes_a_step_of_gravity(e, dt):
+    """Bullet's multibody collides after gravity, as Wang's method does: e (1 + g dt/u); measured .5185 at e = .5, 1/60 s."""
     motion = simulate(ball(e), "pybullet[coordinates=multibody]", dt)
     last = int(np.argmin(motion.velocity[:, 1]))
     down, up = motion.velocity[last : last + 2, 1]
     assert -up / down == pytest.approx(e * (1 - 9.81 * dt / down), abs=1e-12)
 
 
-def test_pybullet_s_default_restitution_vanishes_with_the_step():
-    """A published table: .512 and less at 1/240 s, .1081 at 1 ms, .02 and less at 1/4000 s, for e = .5; of .95 .0319 is left."""
-    seen = [apparent("pybullet[profile=default]", 0.5, dt) for dt in (1 / 60, 1 / 240, 1e-3, 1 / 4000)]
-    np.testing.assert_allclose(seen[:3], [0.5143, 0.4963, 0.1081], atol=5e-5)
-    assert seen[3] < 0.03
+def test_default_restitution_of_pybullet_vanishes_with_the_step():
+    """Published for e = .5: up to .512 at 1/240 s, .1081 at 1 ms, up to .02 at 1/4000 s; for e = .95, .0319 at 1/4000 s."""
+    found = [apparent("pybullet[profile=default]", 0.5, dt) for dt in (1 / 60, 1 / 240, 1e-3, 1 / 4000)]
+    np.testing.assert_allclose(found[:3], [0.5143, 0.4963, 0.1081], atol=5e-5)
+    assert found[3] < 0.03
     assert apparent("pybullet[profile=default]", 0.95, 1 / 4000) < 0.04
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 @pytest.mark.parametrize("friction", ["none", "infinite"])
-def test_a_tilted_box_keeps_the_energy_of_a_rigid_impact(name, friction):
-    """Kinetic energy just after the first impact over that of the closed form: 1 to .2 % at 1/4000 s (measured 1.0002 to 1.0006)."""
+def test_tilted_box_keeps_the_energy_of_a_rigid_impact(name, friction):
+    """Kinetic energy just after the first impact over that of the exact solution: 1 to .2 % at 1/4000 s (measured 1.0002 to 1.0006)."""
     scene = load(
         {
             "name": "tilted",
@@ -77,34 +77,33 @@ def test_a_tilted_box_keeps_the_energy_of_a_rigid_impact(name, friction):
 
 
 def test_mujoco_has_no_restitution_by_default():
-    """The same whatever is asked for, and next to none."""
+    """The same for every restitution of the scene, and below 0.05."""
     for dt in (1 / 240, 1e-3):
         assert len({apparent("mujoco[profile=default]", e, dt) for e in (0.0, 0.5, 0.95)}) == 1
         assert apparent("mujoco[profile=default]", 0.95, dt) < 0.05
 
 
-def test_an_error_of_the_defaults_is_a_setting_s():
-    """It stays as the step goes to 0, and the calibrated profile does not have it; where that was not run it is the model's."""
-    both = comparisons.run([load("spin-asymmetric"), load("drop-ball")], ["pybullet", "pybullet[profile=default]"])
-    lasting = both.lasting_errors("setting")
+def test_error_of_the_defaults_alone_is_a_setting_error():
+    """It does not vanish as dt → 0 and the calibrated profile does not have it; without that profile in the run it is a model error."""
+    both = run([SPIN, load("drop-ball")], ["pybullet", "pybullet[profile=default]"])
+    lasting = both.asymptotic_errors("setting")
     assert set(lasting["engine"]) == {"pybullet[profile=default]"}
     assert {"energy_error", "bounce_height_error"} <= set(lasting["metric"])
-    assert both.lasting_errors("model").empty
+    assert both.asymptotic_errors("model").empty
     assert lasting["reason"].str.contains("it is a setting").all()
-    alone = comparisons.run([load("drop-ball")], ["pybullet[profile=default]"])
-    assert not alone.lasting_errors("model").empty
-    assert alone.lasting_errors("setting").empty
+    alone = run([load("drop-ball")], ["pybullet[profile=default]"])
+    assert not alone.asymptotic_errors("model").empty
+    assert alone.asymptotic_errors("setting").empty
 
 
-def test_what_the_note_lacks_is_no_setting():
-    """An engine without profiles keeps its model errors."""
-    found = comparisons.run([load("spin-asymmetric")], ["document", "mujoco", "mujoco[profile=default]"])
-    assert set(found.lasting_errors("model")["engine"]) == {"document"}
-    assert found.lasting_errors("setting").empty  # free spin has no settings to get wrong in MuJoCo
+def test_engine_without_profiles_keeps_its_model_errors():
+    found = run(SPIN, ["document", "mujoco", "mujoco[profile=default]"])
+    assert set(found.asymptotic_errors("model")["engine"]) == {"document"}
+    assert found.asymptotic_errors("setting").empty  # free spin has no settings to get wrong in MuJoCo
 
 
 def test_profiles_and_coordinates():
-    """Labels, the calibrated twin, and what does not go together."""
+    """Labels, the label of the calibrated profile, and options that exclude each other."""
     assert calibrated_label("pybullet[profile=default]") == "pybullet"
     assert calibrated_label("mujoco[integrator=implicitfast,profile=default]") == "mujoco[integrator=implicitfast]"
     assert calibrated_label("mujoco") is calibrated_label("mujoco[kappa=0.002]") is None
@@ -113,14 +112,14 @@ def test_profiles_and_coordinates():
         engine("pybullet[coordinates=multibody,profile=default]")
     with pytest.raises(DropspinError, match="only multibodies clamp speeds"):
         engine("pybullet[velocity_clamp=kept]")
-    assert "law of their own" in engine("pybullet[coordinates=multibody]").declines(load("fall-damped"))
+    assert "damp by another law" in engine("pybullet[coordinates=multibody]").declines(load("fall-damped"))
     for name in ("mujoco", "pybullet"):
         with engine(f"{name}[profile=default]").prepare(ball(0.5), 1e-3) as simulation:
             assert simulation.settings["profile"] == "default"
 
 
-def test_multibody_is_mujoco_s_euler_and_maximal_its_implicit():
-    """The same discretisation of a tumble, known by the same name: to 1e-9 of the angular momentum after a second."""
+def test_bullet_tumbles_as_mujoco_with_the_same_discretisation():
+    """Multibodies as MuJoCo's Euler, maximal coordinates as its implicitfast, to 1e-9 of the angular momentum after a second."""
     scene = load("spin-dzhanibekov")
     scene = scene.model_copy(update={"duration": 1.0})
     for one, other in (("pybullet[coordinates=multibody]", "mujoco"), ("pybullet", "mujoco[integrator=implicitfast]")):
@@ -129,24 +128,29 @@ def test_multibody_is_mujoco_s_euler_and_maximal_its_implicit():
         np.testing.assert_allclose(first, second, atol=1e-9 * 5)
 
 
-def test_what_bullet_cannot_do_is_said():
-    """It turns by too little beyond π/4 rad a step, and lets a contact slip that would need more than 10 times its normal push."""
+def test_bullet_reports_short_rotations_and_clamped_friction():
+    """Rotations are too small beyond π/4 rad a step; a contact slips that needs friction above 10 times its normal force."""
 
     def limits_of(scene, dt):
-        found = comparisons.run([scene], ["pybullet"], [dt]).table
+        return [limitation.message for limitation in record(engine("pybullet"), scene, dt).limitations]
+
+    def limited_in_a_run(scene, dt):
+        found = run(scene, "pybullet", dt).table
         return list(found.loc[found["verdict"] == "limited", "reason"])
 
     fast = load("spin-principal-500")
     assert limits_of(fast, 1.5e-3) == []  # .75 rad
-    [told] = limits_of(fast, 1.6e-3)
-    assert "turns by up to 0.8 rad a step" in told
+    [message] = limits_of(fast, 1.6e-3)
+    assert "turns by up to 0.8 rad a step" in message
+    assert limited_in_a_run(fast, 1.6e-3) == [message]
     gripping = ball(0.5).model_copy(update={"floor": ball(0.5).floor.model_copy(update={"friction": "infinite"})})
     u = 1.0 + 9.81 * 1e-3
 
-    def spinning(ratio):  # what stops the contact is 2/7 of its speed, what is there to push 1.5 u
+    def spinning(ratio):  # stopping the contact takes 2/7 of its speed; the normal impulse is 1.5 u
         spin = ratio * 1.5 * u * 3.5 / 0.1
         return gripping.starting_at(np.array([0, 0.1 + 1e-9, 0, 0, 0, 0, 1, 0, -1.0, 0, 0, 0, spin]))
 
-    assert not [told for told in limits_of(spinning(9.9), 1e-4) if "slips" in told]
-    assert [told for told in limits_of(spinning(10.5), 1e-4) if "slips" in told]
+    assert not [message for message in limits_of(spinning(9.9), 1e-4) if "slips" in message]
+    [message] = [message for message in limits_of(spinning(10.5), 1e-4) if "slips" in message]
+    assert message in limited_in_a_run(spinning(10.5), 1e-4)
     assert limits_of(load("rock-block"), 2e-3) == []

@@ -1,0 +1,102 @@
+"""MuJoCo models of a scene: a free body and, where the scene has a floor, one contact pair with it; or MuJoCo's defaults."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios import Scenario
+from scenarios.body import Box, Sphere
+from scenarios.mechanics import is_diagonal, principal_axes
+
+Array = NDArray[np.float64]
+
+DEFAULT_INFINITE_FRICTION = 10.0
+"""In the default profile; with the default's pyramidal cones a coefficient of 1e6 would leave no friction and no contact."""
+INTEGRATORS = {
+    "euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+    "rk4": mujoco.mjtIntegrator.mjINT_RK4,
+}
+FLOOR_QUATERNION = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: rotates the plane's normal from z to y
+
+
+def default_specification(scene: Scenario, dt: float, integrator: str) -> Any:
+    """The specification of a user who sets friction on both surfaces and nothing else: MuJoCo has no restitution to set."""
+    spec, body = _free_body(scene, dt, integrator)
+    if scene.floor is not None:
+        known = {"none": 0.0, "infinite": DEFAULT_INFINITE_FRICTION}
+        friction = known[scene.floor.friction] if isinstance(scene.floor.friction, str) else scene.floor.friction
+        surface = {"friction": [friction, 0.005, 0.0001]}  # sliding; torsion and rolling keep their defaults
+        _add_shape(body, scene, **surface)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **surface)
+    return spec
+
+
+def calibrated_specification(scene: Scenario, dt: float, integrator: str, pair: Mapping[str, Any], flags: Mapping[str, str]) -> Any:
+    """The specification of a calibrated simulation.
+
+    Args:
+        scene: The scene.
+        dt: Time step [s].
+        integrator: A key of `INTEGRATORS`.
+        pair: Settings of the contact pair; without any, MuJoCo looks for neither contacts nor constraints.
+        flags: Solver settings that the installed version has, by their names in MJCF.
+    """
+    spec, body = _free_body(scene, dt, integrator)
+    option, disable = spec.option, mujoco.mjtDisableBit
+    if not pair:
+        option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
+        return spec
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    if "island" in flags:
+        option.disableflags |= disable.mjDSBL_ISLAND
+    if "diagexact" in flags:
+        option.enableflags = mujoco.mjtEnableBit.mjENBL_DIAGEXACT
+    passive = {"contype": 0, "conaffinity": 0}  # the pair is the only contact
+    _add_shape(body, scene, name="shape", **passive)
+    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **passive)
+    spec.add_pair(geomname1="floor", geomname2="shape", **pair)
+    return spec
+
+
+def _free_body(scene: Scenario, dt: float, integrator: str) -> tuple[Any, Any]:
+    """The specification that all profiles share (step, gravity, integrator, a free body's mass and inertia), and its body.
+
+    The automatic reset is off: it would put a simulation that broke down back to its start without notice.
+    """
+    spec = mujoco.MjSpec()
+    spec.option.timestep = dt
+    spec.option.gravity = scene.acceleration
+    spec.option.integrator = INTEGRATORS[integrator]
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    body = spec.worldbody.add_body(name="body")
+    body.add_freejoint()
+    body.explicitinertial = True
+    body.mass = scene.body.mass
+    body.ipos = [0.0, 0.0, 0.0]
+    body.inertia, body.iquat = _principal(scene.body.inertia_tensor)
+    return spec, body
+
+
+def _principal(inertia: Array) -> tuple[Array, Array]:
+    """Principal moments and the quaternion [w, x, y, z] of their axes; the identity where the tensor is diagonal."""
+    if is_diagonal(inertia):
+        return np.diag(inertia), np.array([1.0, 0.0, 0.0, 0.0])
+    from scipy.spatial.transform import Rotation
+
+    moments, axes = principal_axes(inertia)
+    # A flat body's largest moment is the sum of the others; MuJoCo rejects one that exceeds it by rounding.
+    moments[2] = min(moments[2], np.nextafter(moments[0] + moments[1], 0.0))
+    return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)
+
+
+def _add_shape(body: Any, scene: Scenario, **properties: Any) -> None:
+    if isinstance(scene.body, Sphere):
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[scene.body.radius, 0.0, 0.0], **properties)
+    elif isinstance(scene.body, Box):
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=scene.body.half_extents, **properties)

@@ -1,0 +1,177 @@
+"""Simulations with PyBullet: the scene built in a physics server of this process, limitations reported."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from comparisons.engines.base import Array, AsBuilt, KnownLimitation, Simulation, version
+from comparisons.engines.pybullet_settings import (
+    FASTEST,
+    FLOOR_HALF_SIZE,
+    STRONGEST_FRICTION,
+    contact_properties,
+    damping_properties,
+    world_parameters,
+)
+from scenarios import Scenario
+from scenarios.body import Box, Sphere
+from scenarios.state import SPIN, VELOCITY
+
+ALMOST = 0.999
+NO_PUSH = 1e-6  # relative to what gravity adds in a step
+LARGEST_TURN = np.pi / 4  # rad a step; beyond it Bullet's rotation is too small
+
+
+class PyBulletSimulation(Simulation):
+    """A connection to the physics server in this process, which no other simulation uses until it is closed."""
+
+    staggered = True
+
+    def __init__(self, scene: Scenario, dt: float, *, default: bool, multibody: bool, unclamped: bool) -> None:
+        self._bullet = _import_quietly()
+        self._dt, self._fall = dt, dt * scene.acceleration
+        self._grips = scene.floor is not None and scene.floor.friction == "infinite"
+        self._idle = _idle.setdefault(default, [])
+        self._client = self._idle.pop() if self._idle else self._bullet.connect(self._bullet.DIRECT)
+        if self._client < 0:
+            raise RuntimeError("PyBullet returned no connection")
+        try:
+            self._build(scene, dt, default, multibody, unclamped)
+        except BaseException:
+            self.close()
+            raise
+
+    def _build(self, scene: Scenario, dt: float, default: bool, multibody: bool, unclamped: bool) -> None:
+        bullet, client = self._bullet, self._client
+        parameters = {"fixedTimeStep": dt} if default else world_parameters(scene, dt)
+        bullet.setPhysicsEngineParameter(physicsClientId=client, **parameters)
+        bullet.setGravity(*map(float, scene.acceleration), physicsClientId=client)
+        contact = {} if scene.floor is None else contact_properties(scene, default)
+        if scene.floor is not None:
+            self._add_floor(scene, contact, default, multibody)
+        self._body = bullet.createMultiBody(
+            baseMass=scene.body.mass,
+            baseCollisionShapeIndex=-1 if scene.floor is None else self._shape(scene),
+            basePosition=scene.start.position,
+            baseOrientation=scene.start.orientation,
+            useMaximalCoordinates=not multibody,
+            physicsClientId=client,
+        )
+        dynamics = contact | damping_properties(scene, default)
+        if not default:
+            dynamics["activationState"] = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
+        if unclamped:
+            dynamics["maxJointVelocity"] = FASTEST
+        bullet.changeDynamics(
+            self._body,
+            -1,
+            mass=scene.body.mass,
+            localInertiaDiagonal=[float(moment) for moment in np.diag(scene.body.inertia_tensor)],
+            physicsClientId=client,
+            **dynamics,
+        )
+        bullet.resetBaseVelocity(self._body, scene.start.velocity, scene.start.angular_velocity, physicsClientId=client)
+        self.settings = {
+            "version": version("pybullet"),
+            "profile": "default" if default else "calibrated",
+            "coordinates": "multibody" if multibody else "maximal",
+            **parameters,
+            **dynamics,
+        }
+
+    def _shape(self, scene: Scenario) -> int:
+        bullet, client = self._bullet, self._client
+        if isinstance(scene.body, Sphere):
+            return int(bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=scene.body.radius, physicsClientId=client))
+        assert isinstance(scene.body, Box)
+        return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=scene.body.half_extents, physicsClientId=client))
+
+    def _add_floor(self, scene: Scenario, contact: dict[str, float], default: bool, multibody: bool) -> None:
+        bullet, client = self._bullet, self._client
+        if default or isinstance(scene.body, Sphere):
+            shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0], physicsClientId=client)
+            top = 0.0
+        else:  # on a plane, Bullet gives a box one contact point per step
+            shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3, physicsClientId=client)
+            top = FLOOR_HALF_SIZE
+        floor = bullet.createMultiBody(0, shape, basePosition=[0, -top, 0], useMaximalCoordinates=not multibody, physicsClientId=client)
+        # Bullet multiplies the coefficients of the two bodies; with 1 for the floor, the product is the scene's value.
+        bullet.changeDynamics(floor, -1, **contact | {"restitution": 1.0, "lateralFriction": 1.0}, physicsClientId=client)
+
+    def advance(self, steps: int) -> None:
+        step, client = self._bullet.stepSimulation, self._client
+        for _ in range(steps):
+            step(client)
+
+    def state(self) -> Array:
+        position, orientation = self._bullet.getBasePositionAndOrientation(self._body, self._client)
+        velocity, angular_velocity = self._bullet.getBaseVelocity(self._body, self._client)
+        return np.array(position + orientation + velocity + angular_velocity)
+
+    def record(self, steps: int, every: int = 1) -> Array:
+        rows = super().record(steps, every)
+        self.known_limitations = list(_limitations_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
+        return rows
+
+    def as_built(self) -> AsBuilt:
+        dynamics = self._bullet.getDynamicsInfo(self._body, -1, physicsClientId=self._client)
+        world = self._bullet.getPhysicsEngineParameters(physicsClientId=self._client)
+        gravity = np.array([world[f"gravityAcceleration{axis}"] for axis in "XYZ"])
+        return AsBuilt(dynamics[0], np.diag(dynamics[2]), gravity)
+
+    def close(self) -> None:
+        self._bullet.resetSimulation(physicsClientId=self._client)
+        self._idle.append(self._client)
+
+
+_idle: dict[bool, list[int]] = {}
+"""Unused connections, by profile (True: default); to clear one takes a fifth of the time of opening one, for the same bits."""
+
+
+def _limitations_met(rows: Array, dt: float, fall: Array | None) -> Iterator[KnownLimitation]:
+    """Bullet's known limitations that a motion met.
+
+    Args:
+        rows: States at every step, shape (n, 13).
+        dt: Time step [s].
+        fall: The velocity that gravity adds in a step [m/s], shape (3,), where the floor grips; else None.
+    """
+    turn = float(np.linalg.norm(rows[:, SPIN], axis=1).max()) * dt
+    if turn > LARGEST_TURN:
+        yield KnownLimitation(
+            f"the body turns by up to {turn:.3g} rad a step; Bullet's rotations are too small beyond π/4", {"orientation_error": np.pi}
+        )
+    if fall is None:
+        return
+    pushes = np.diff(rows[:, VELOCITY], axis=0) - fall
+    along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
+    if bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
+        yield KnownLimitation(
+            f"a contact needs more than {STRONGEST_FRICTION:g} times its normal force to stick; Bullet clamps friction there, so it slips"
+        )
+
+
+@cache
+def _import_quietly() -> Any:
+    """Import pybullet without the build date that it writes to the standard error of every process."""
+    with _no_standard_error():
+        return import_module("pybullet")
+
+
+@contextmanager
+def _no_standard_error() -> Iterator[None]:
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

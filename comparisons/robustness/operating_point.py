@@ -1,0 +1,42 @@
+"""A point at which an engine is tested, a scene and a time step, and the times and speeds by which it is fast or coarse."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from scenarios import Scenario
+
+
+class OperatingPoint(NamedTuple):
+    """A scene and a time step [s]."""
+
+    scene: Scenario
+    dt: float
+
+
+def natural_time(scene: Scenario) -> float:
+    """The time that makes a step coarse or fine [s]: of a turn by 1 rad, of the fall, or in which gravity moves a body by its size."""
+    speed = spin(scene)
+    if scene.floor is None and speed > 0.0:
+        return 1.0 / speed
+    if falls(scene):
+        return fall_time(scene)
+    g = float(np.linalg.norm(scene.acceleration))
+    return math.sqrt(scene.body.size / g) if g > 0.0 else scene.duration / 8.0
+
+
+def fall_time(scene: Scenario) -> float:
+    """The time at which a body that does not rotate reaches the floor [s]."""
+    g, upward = -float(scene.acceleration[1]), scene.start.velocity[1]
+    return (upward + math.sqrt(upward**2 + 2.0 * g * scene.clearance)) / g
+
+
+def spin(scene: Scenario) -> float:
+    """The angular velocity at the start [rad/s]."""
+    return float(np.linalg.norm(scene.start.angular_velocity))
+
+
+def falls(scene: Scenario) -> bool:
+    """Whether the body starts above the floor and gravity pulls it down."""
+    return scene.starts_above_floor and bool(scene.acceleration[1] < 0.0)

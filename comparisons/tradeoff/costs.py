@@ -1,0 +1,78 @@
+"""The cost of native stepping, in an engine's process: wall time per simulated second, of one world and of a batch of worlds."""
+
+import math
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from comparisons.engines.base import Diverged, Engine
+from comparisons.running.recording import MOST_STEPS, EngineEntry, time_steps
+from scenarios import Scenario
+
+LONG_ENOUGH = 2e-3
+"""The least wall time of a timing [s]."""
+MOST_RUNS = 200
+BATCH = 256
+"""Worlds in a batch."""
+BATCH_ROUNDS = 3
+MOST_BATCH_STEPS = 100_000
+"""Steps of all worlds together in one timing."""
+
+
+def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
+    """Wall time per simulated second of native stepping [s/s]; NaN if the state after it is not finite.
+
+    In free flight every step takes the same time. One call is timed, of so many steps that the call itself does not count, past the
+    scene's end if the engine does not break down there. With a floor the time depends on the motion, so whole runs are timed.
+    """
+    if scene.floor is None:
+        steps = 16
+        while (taken := _timed(entry, scene, dt, steps)) < LONG_ENOUGH and steps < MOST_STEPS:
+            steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * LONG_ENOUGH / taken))))
+        if np.isfinite(taken):
+            return taken / (steps * dt)
+    steps, total, runs = scene.steps(dt), 0.0, 0
+    while total < LONG_ENOUGH and runs < MOST_RUNS:
+        total, runs = total + _timed(entry, scene, dt, steps), runs + 1
+    return total / runs / (steps * dt)
+
+
+def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
+    """Wall time of some native steps [s]; NaN if the state after them is not finite."""
+    assert entry.engine is not None
+    try:
+        taken, state = time_steps(entry.engine, scene, dt, steps)
+    except Diverged:
+        return math.nan
+    return taken if np.isfinite(state).all() else math.nan
+
+
+def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float]) -> list[float]:
+    """Wall time per simulated second and world [s/s] of a batch at each time step; NaN if the engine cannot step batches.
+
+    In free flight a step takes the same time at any dt; with a floor whole runs are timed, unless they are too long.
+    """
+    assert entry.engine is not None
+    if scene.floor is not None:
+        return [_timed_batch(entry.engine, scene, dt, scene.steps(dt)) / (scene.steps(dt) * dt) for dt in dts]
+    steps = MOST_BATCH_STEPS // BATCH
+    taken = _timed_batch(entry.engine, scene, dts[-1], steps)
+    return [taken / (steps * dt) for dt in dts]
+
+
+def _timed_batch(engine: Engine, scene: Scenario, dt: float, steps: int) -> float:
+    """The least wall time per world of some native steps of a batch [s]; NaN if there is none or its states are not finite."""
+    members, timings = [scene] * BATCH, []
+    if steps * BATCH > MOST_BATCH_STEPS:
+        return math.nan
+    for _ in range(1 + BATCH_ROUNDS):
+        batch = engine.prepare_batch(members, dt)
+        if batch is None:
+            return math.nan
+        start = time.perf_counter()
+        batch.advance(steps)
+        timings.append(time.perf_counter() - start)
+        if not np.isfinite(batch.states()).all():
+            return math.nan
+    return min(timings[1:]) / BATCH  # the first round compiles

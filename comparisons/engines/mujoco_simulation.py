@@ -9,7 +9,7 @@ import numpy as np
 from mujoco import rollout
 
 from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, KnownLimitation, Simulation
-from reference_impl.simulate import usable_cores
+from reference_impl.threads import usable_cores
 from scenarios import Scenario
 from scenarios.rotations import conjugate, cross, rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY

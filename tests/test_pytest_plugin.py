@@ -1,175 +1,122 @@
-"""The pytest plugin in repositories of users', which have packages named like dropspin's."""
+"""The pytest plugin in a user's repository: marked tests, fixtures, options, messages.
 
-import os
+The sessions run in this process, and so does the command that they start: it takes a third of the time.
+"""
+
 import re
 import shlex
 import shutil
-import subprocess
-import sys
-from itertools import product
 from pathlib import Path
 
 import pytest
+from support.cli import dropspin
+from support.repositories import ENGINES, SCENE_TEST, fill, options
 
+import dropspin_pytest
 import scenarios
 
 pytest_plugins = ["pytester"]
 
-DROPSPIN = Path(sys.executable).with_name("dropspin")
 DOCS = Path(__file__).parents[1] / "docs"
-ENGINES = """
-import os
-import numpy as np
-from comparisons.engines.base import Engine, Simulation
-from scenarios import truth_for
-
-print("imported", file=open("imports.log", "a"))
-
-class Exact(Simulation):
-    def __init__(self, scene, dt, fault):
-        self.truth, self.start, self.dt, self.step, self.fault = truth_for(scene), scene.initial_state, dt, 0, fault
-        self.settings = {"version": "1"}
-
-    def advance(self, steps):
-        self.step += steps
-
-    def state(self):
-        state = self.truth(np.array([self.step * self.dt])).states[0] if self.step else self.start.copy()
-        state[10:] *= 1.0 + self.fault * (self.step > 0)
-        return state
-
-class Mine(Engine):
-    name = "mine"
-    order = float("inf")
-
-    def prepare(self, scene, dt):
-        return Exact(scene, dt, float(os.environ.get("FAULT", "0")))
-
-class Faulty(Engine):
-    name = "faulty"
-
-    def prepare(self, scene, dt):
-        return Exact(scene, dt, 1e-3)
-
-class Dying(Mine):
-    name = "dying"
-
-    def prepare(self, scene, dt):
-        os.abort()
-
-class Shy(Mine):
-    name = "shy"
-
-    def declines(self, scene):
-        return "I do not spin"
-"""
-NEEDLE = """
-duration = 1.0
-[body]
-shape = "box"
-half_extents = [0.01, 0.5, 0.01]
-mass = 1.0
-[start]
-angular_velocity = [0.0, 3.0, 0.0]
-[[expect]]
-metric = "energy_error"
-below = 1e-9
-reason = "nothing acts on it"
-"""
-SCENE = ("--dropspin-scene", "spin-principal", "--dropspin-dt", "0.004")
 
 
-def asked(*engines):
-    return [word for engine in engines for word in ("--dropspin-engine", f"engines:{engine}")]
+@pytest.fixture(scope="module", autouse=True)
+def _imported(tmp_path_factory):
+    """Import what the command needs before the first session in this process, which forgets the modules that it has imported."""
+    folder = tmp_path_factory.mktemp("imported")
+    (folder / "engines.py").write_text(ENGINES)
+    assert dropspin("run", "spin-principal", "-e", "engines:Mine", "--dt", "0.004", cwd=folder).returncode == 0
 
 
 @pytest.fixture
-def repository(pytester):
-    """With an engine module and a scene; a run of ours has options that are not the user's."""
-    pytester.makepyfile(engines=ENGINES, test_own="def test_own(): pass")
-    (pytester.path / "needle.toml").write_text(NEEDLE)
-    return pytester
+def repository(pytester, monkeypatch):
+    """A user's repository with engines and a scene; the plugin's command runs in this process."""
+    monkeypatch.setattr(dropspin_pytest.Runs, "_dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=runs.root))
+    return fill(pytester)
 
 
-def test_scenes_as_tests(repository):
-    """Each metric of each engine is a test: what passes, fails, breaks down, declines, is missing, and what is said of it."""
-    repository.makepyfile(absent="import no_such_engine")
-    engines = [*asked("Mine", "Faulty", "Dying", "Shy"), "--dropspin-engine", "absent:Engine"]
-    done = repository.runpytest_subprocess("-rs", "-v", *SCENE, *engines, "-k", "energy_error or own")
+def test_marked_test_is_called_for_each_engine(repository):
+    """It passes, fails, or is skipped by the verdicts; the messages, the commands and the summary say which."""
+    repository.makepyfile(absent="import no_such_engine", test_own=SCENE_TEST)
+    engines = [*options("Mine", "Faulty", "Dying", "Shy"), "--dropspin-engine", "absent:Engine"]
+    done = repository.runpytest_inprocess("-rs", "-v", *engines)
+    reasons = {one.metric: one.reason for one in scenarios.load("spin-principal").expect}
     done.stdout.fnmatch_lines(
         [
-            "test_own.py::test_own PASSED*",
-            "dropspin::spin-principal::energy_error[[]mine] PASSED*",
-            "dropspin::spin-principal::energy_error[[]faulty] FAILED*",
-            "dropspin::spin-principal::energy_error[[]dying] FAILED*",
-            "dropspin::spin-principal::energy_error[[]shy] SKIPPED*",
-            "dropspin::spin-principal::energy_error[[]absent:Engine] FAILED*",
-            "spin-principal, faulty: energy_error at 0.004 s is 0.002, expected ± 1e-06: 2e+03 times its bound",
-            "    nothing changes; measured 1.2e-13, single precision would give 1e-7",
-            "Again: dropspin run spin-principal -e engines:Faulty --dt 0.004 -o out/again",
-            "Accept: dropspin accept .pytest_cache/d/dropspin/spin-principal-* --baseline dropspin-baseline.toml --known-failures *",
+            "test_own.py::test_scene[[]spin-principal-engines:Mine] PASSED*",
+            "test_own.py::test_scene[[]spin-principal-engines:Faulty] FAILED*",
+            "test_own.py::test_scene[[]spin-principal-engines:Dying] ERROR*",
+            "test_own.py::test_scene[[]spin-principal-engines:Shy] SKIPPED*",
+            "test_own.py::test_scene[[]spin-principal-absent:Engine] ERROR*",
             "spin-principal, dying: crashed: its process was ended by SIGABRT",
+            "Reproduce: dropspin run spin-principal -e engines:Dying --dt 0.004 -o out/again",
             "spin-principal, absent:Engine: missing: *no_such_engine, which is not installed.",
+            "E * spin-principal, faulty: energy_error at 0.004 s is 0.002, expected ± 1e-06: 2e+03 times its bound",
+            f"E *    {reasons['energy_error']}",
+            "E *    Reproduce: dropspin run spin-principal -e engines:Faulty --dt 0.004 -o out/again",
+            "E *    If this change is intended: dropspin accept .pytest_cache/d/dropspin/spin-principal-* "
+            '--baseline dropspin-baseline.toml --known-failures --reason "…"; then use --dropspin-baseline dropspin-baseline.toml',
             "engine * scene * passed  failed  worst",
-            "mine * spin-principal * 1 * 0  energy_error at 0.004 s is 0, *",
-            "faulty * spin-principal * 0 * 1  energy_error at 0.004 s is 0.002, *",
+            "mine * spin-principal * 2 * 0  energy_error at 0.004 s is 0, expected ± 1e-06: 0 times its bound",
+            "faulty * spin-principal * 0 * 2  energy_error at 0.004 s is 0.002, *",
             "dying * spin-principal * 0 * 1  crashed: *",
+            "absent:Engine * spin-principal * 0 * 1  missing: *",
             "shy * spin-principal * 0 * 0  declined: I do not spin",
+            "Reports: .pytest_cache/d/dropspin/[*]",
             "SKIPPED * shy declined: I do not spin",
         ],
-        consecutive=False,
     )
+    done.assert_outcomes(passed=1, failed=1, errors=2, skipped=1)
     assert "Traceback" not in done.stdout.str()
-    [folder] = repository.path.glob(".pytest_cache/d/dropspin/spin-principal-*/")
-    assert (folder / "report.html").is_file()
-    accept = re.search(r"Accept: dropspin (accept .*), and from then on", done.stdout.str())
-    subprocess.run([DROPSPIN, *shlex.split(accept[1])], cwd=repository.path, check=True)
+    folders = list(repository.path.glob(".pytest_cache/d/dropspin/spin-principal-*/"))
+    assert len(folders) == 5
+    assert all((folder / "report.html").is_file() for folder in folders)
+    [accept] = re.findall(r"intended: dropspin (accept .*); then use", done.stdout.str())
+    assert dropspin(*shlex.split(accept), cwd=repository.path).returncode == 0
     assert "faulty" in (repository.path / "dropspin-baseline.toml").read_text(encoding="utf-8")
 
 
-def test_selected_without_a_run(repository):
-    """By node id, by the configuration file, by -k and -m; which engines are asked for is all that dropspin is started for."""
-    repository.makeini("[pytest]\ndropspin_engines = engines:Mine\n    engines:Shy\ndropspin_scenes = spin-principal\n    needle.toml")
-    engine = "[mine]"
+def test_collecting_runs_no_scene(repository):
+    """The engines of the configuration file; tests are selected by path, by -k and by -m."""
+    repository.makeini("[pytest]\ndropspin_engines = engines:Mine\n    engines:Shy")
+    repository.makepyfile(test_scenes=SCENE_TEST.replace('"spin-principal"', '"spin-principal", "needle.toml"'))
 
     def collected(*arguments):
-        lines = repository.runpytest_subprocess("--collect-only", "-q", *arguments).outlines
-        return [line for line in lines if "::" in line]
+        return [line for line in repository.runpytest_inprocess("--collect-only", "-q", *arguments).outlines if "::" in line]
 
-    everything = collected()
-    assert everything[0] == "test_own.py::test_own"
-    assert f"dropspin::needle::energy_error{engine}" in everything
-    assert {line.split("::")[1] for line in everything[1:]} == {"spin-principal", "needle"}
-    assert collected("test_own.py") == everything[:1]
-    one = f"dropspin::needle::energy_error{engine}"
-    assert collected("test_own.py", one, "dropspin::spin-principal::energy_drift", "-m", "dropspin", "-k", "not shy") == [
-        "dropspin::spin-principal::energy_drift[mine]",
-        one,
-    ]
+    ids = [f"test_scenes.py::test_scene[{scene}-engines:{one}]" for scene in ("spin-principal", "needle") for one in ("Mine", "Shy")]
+    assert collected() == ["test_own.py::test_own", *ids]
+    assert collected("-m", "dropspin") == ids
+    assert collected("-m", "not dropspin") == ["test_own.py::test_own"]
+    assert collected("-k", "needle and Mine") == [ids[2]]
+    assert collected("-m", "dropspin", *options("Faulty")) == [one.replace("Mine", "Faulty") for one in ids[::2]]
     assert not list(repository.path.glob(".pytest_cache/d/dropspin/*"))
 
 
-def test_the_documentation(repository):
-    """The page's tests in a repository as it has them."""
+def test_documentation(repository):
+    """The page's tests in a repository with its configuration file."""
     page = (DOCS / "pytest.md").read_text(encoding="utf-8")
     adapter = (DOCS / "bring-your-engine.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
-    configuration = page.split("```toml\n")[1].split("```")[0]
-    (repository.path / "pyproject.toml").write_text(configuration)
-    repository.makepyfile(my_module=adapter, test_page=page.split("```python\n")[1].split("```")[0])
-    done = repository.runpytest_subprocess("-v", "test_page.py")
+    (repository.path / "pyproject.toml").write_text(page.split("```toml\n")[1].split("```")[0])
+    first, second = (block.split("```")[0] for block in page.split("```python\n")[1:])
+    repository.makepyfile(my_module=adapter, test_first=first, test_second=second)
+    done = repository.runpytest_inprocess("-v", "test_first.py", "test_second.py", "--dropspin-dt", "0.004")
     done.stdout.fnmatch_lines(
         [
-            "test_page.py::test_nothing_fails PASSED*",
-            "test_page.py::test_figure PASSED*",
-            "test_page.py::test_each[[]spin-principal-my_module:Flyer] PASSED*",
-            "test_page.py::test_each[[]needle-my_module:Flyer] PASSED*",
-            "test_page.py::test_mapping PASSED*",
+            "test_first.py::test_scene[[]spin-principal-my_module:Flyer] PASSED*",
+            "test_first.py::test_scene[[]fall-spin-my_module:Flyer] PASSED*",
+            "test_second.py::test_expectations_hold PASSED*",
+            "test_second.py::test_energy_error PASSED*",
+            "test_second.py::test_each[[]spin-principal-my_module:Flyer] PASSED*",
+            "test_second.py::test_each[[]needle-my_module:Flyer] PASSED*",
+            "test_second.py::test_mapping PASSED*",
         ]
     )
+    done.assert_outcomes(passed=7)
 
 
-def test_a_test_that_fails(repository):
-    """It says what failed where the test called; and what it asked for that there is not."""
+def test_messages_of_failing_tests(repository):
+    """What failed, where the test called; a metric that was not measured; an unknown scene; a fixture without a scene."""
     repository.makepyfile(
         test_own="""
         import pytest
@@ -187,72 +134,97 @@ def test_a_test_that_fails(repository):
             pass
         """
     )
-    done = repository.runpytest_subprocess("-p", "no:cacheprovider", "--dropspin-dt", "0.004", *asked("Faulty"))
+    done = repository.runpytest_inprocess("-p", "no:cacheprovider", "--dropspin-dt", "0.004", *options("Faulty"))
     done.stdout.fnmatch_lines(
         [
-            "dropspin_result is for tests with a scene, such as @pytest.mark.dropspin('drop-ball')",
+            "dropspin_result needs a marker with a scene, such as @pytest.mark.dropspin('drop-ball')",
             '>*dropspin_check("spin-principal")',
             "E * spin-principal, faulty: energy_error at 0.004 s is 0.002, *",
-            "E * LookupError: penetration of spin-principal at any step was not measured; measured is energy_error, *",
+            "E * LookupError: penetration of spin-principal at any time step was not measured; available: energy_error, *",
             "dropspin: *spin-prinzipal* Did you mean 'spin-principal'?*",
             "faulty * spin-principal * 0 * 2 *",
-            "Reports and figures: */dropspin-*",
+            "Reports: */dropspin-*",
         ]
     )
-    [kept] = re.findall(r"Reports and figures: (\S+)/\*", done.stdout.str())
+    done.assert_outcomes(failed=3, errors=1)
+    [kept] = re.findall(r"Reports: (\S+)/\*", done.stdout.str())
     shutil.rmtree(repository.path / kept)
 
 
+def test_value_of_a_metric():
+    """The finest time step by default; NaN if undefined; ambiguous and absent metrics are errors that say what there is."""
+    row = {"kind": "truth", "metric": "energy_error", "verdict": "measured", "reason": ""}
+    rows = [row | {"engine": "mine", "dt": 0.002, "value": None}, row | {"engine": "mine", "dt": 0.004, "value": 0.5}]
+    rows += [row | {"engine": "other", "dt": 0.004, "value": 0.25}, {"engine": "shy", "kind": "", "metric": ""}]
+    rows[-1] |= {"verdict": "declined", "reason": "I do not spin"}
+    result = dropspin_pytest.Result("spin", rows, Path("out"), "spin", {}, ())
+    assert result.value("energy_error", engine="mine", dt=0.004) == 0.5
+    assert result.value("energy_error", engine="other") == 0.25
+    assert str(result.value("energy_error", engine="mine")) == "nan"
+    with pytest.raises(LookupError, match=r"^energy_error was measured for several engines, mine, other; choose one with engine=$"):
+        result.value("energy_error")
+    with pytest.raises(
+        LookupError, match=r"^energy_error of shy at 0\.004 s was not measured; available: no metric; shy declined: I do not spin$"
+    ):
+        result.value("energy_error", engine="shy", dt=0.004)
+
+
 BASELINE = """
-format = 2
-accepted.a0b1c2d = {{date = 2026-01-31, reason = "as it was", versions = {{}}}}
+format = 3
+accepted.a0b1c2d = {{date = 2026-01-31, reason = "first measured", versions = {{}}}}
 scenes.spin-principal = "{digest}"
-figures.spin-principal.mine."0.004".angular_momentum_error = {{value = 1e-4, tolerance = 1e-9, by = "a0b1c2d"}}
-figures.spin-principal.faulty."0.004".angular_momentum_error = {{value = 1e-4, tolerance = 1e-6, by = "a0b1c2d"}}
+results.spin-principal.mine."0.004".angular_momentum_error = {{value = 1e-4, tolerance = 1e-9, by = "a0b1c2d"}}
+results.spin-principal.faulty."0.004".angular_momentum_error = {{value = 1e-4, tolerance = 1e-6, by = "a0b1c2d"}}
 """
 
 
-def test_accepted_figures(repository):
-    """What is worse than accepted fails, with the bound that it has by then; what is better passes; what is missing is skipped."""
+@pytest.fixture
+def baseline(repository):
     (repository.path / "base.toml").write_text(BASELINE.format(digest=scenarios.load("spin-principal").digest))
+
+
+@pytest.mark.usefixtures("baseline")
+def test_result_worse_than_accepted_fails(repository):
+    """With the bound of the baseline; a better one passes, and a missing engine that only the configuration file names does not fail."""
     repository.makeini("[pytest]\ndropspin_baseline = base.toml\ndropspin_engines = engines:Mine\n  engines:Faulty\n  absent:Engine")
-    repository.makepyfile(absent="import no_such_engine")
-    done = repository.runpytest_subprocess("-v", *SCENE, "-k", "angular_momentum_error")
+    repository.makepyfile(
+        absent="import no_such_engine",
+        test_own="""
+        def test_all(dropspin_check):
+            dropspin_check("spin-principal", dt=0.004)
+        """,
+    )
+    done = repository.runpytest_inprocess()
+    done.assert_outcomes(failed=1)
     done.stdout.fnmatch_lines(
         [
-            "dropspin::spin-principal::angular_momentum_error[[]mine] PASSED*",
-            "dropspin::spin-principal::angular_momentum_error[[]faulty] FAILED*",
-            "dropspin::spin-principal::angular_momentum_error[[]absent:Engine] SKIPPED*",
-            "spin-principal, faulty: accepted angular_momentum_error at 0.004 s is 0.001, expected -1e-06 … 0.000101: 9.9 times its bound",
-            "    accepted 0.0001 ± 1e-06 on 2026-01-31, as it was; worse by 900 times its tolerance",
-            "Again: dropspin run spin-principal -e engines:Faulty --dt 0.004 --baseline base.toml -o out/again",
-            "Accept: dropspin accept .pytest_cache/d/dropspin/spin-principal-* --baseline base.toml --known-failures --reason *",
+            "E * faulty: accepted angular_momentum_error at 0.004 s is 0.001, expected -1e-06 … 0.000101: 9.9 times its bound",
+            "E * accepted 0.0001 ± 1e-06 on 2026-01-31, first measured; worse by 900 times its tolerance",
+            "E * Reproduce: dropspin run spin-principal -e engines:Faulty --dt 0.004 --baseline base.toml -o out/again",
+            "E * If this change is intended: dropspin accept .pytest_cache/d/dropspin/spin-principal-* "
+            '--baseline base.toml --known-failures --reason "…"',
+            "mine * spin-principal * 3 * 0  *",
+            "faulty * spin-principal * 0 * 3  *",
+            "absent:Engine * spin-principal * 0 * 0  missing: *",
         ]
     )
 
 
-def test_what_is_not_accepted_yet_does_not_fail(repository):
-    """A scene that the baseline knows nothing of is judged by what it expects; that nothing was held against it is told."""
-    (repository.path / "base.toml").write_text(BASELINE.format(digest=scenarios.load("spin-principal").digest))
+@pytest.mark.usefixtures("baseline")
+def test_scene_without_accepted_results_is_judged_by_its_expectations(repository):
+    """The summary says that no results were compared with the baseline."""
     repository.makepyfile(
         test_own="""
         def test_new(dropspin_check):
             dropspin_check("needle.toml", dt=0.004)
     """
     )
-    done = repository.runpytest_subprocess("--dropspin-baseline", "base.toml", *asked("Mine"))
+    done = repository.runpytest_inprocess("--dropspin-baseline", "base.toml", *options("Mine"))
     done.assert_outcomes(passed=1)
-    done.stdout.fnmatch_lines(["No figure of these runs has been accepted in base.toml: nothing was held against it."])
+    done.stdout.fnmatch_lines(["base.toml has no accepted results of these runs; no results were compared with it."])
 
 
-def test_what_failed_last(repository):
-    """By --lf, as any test's."""
-    repository.runpytest_subprocess(*SCENE, *asked("Mine", "Faulty")).assert_outcomes(passed=3, failed=2, skipped=12)
-    repository.runpytest_subprocess("--lf", *SCENE, *asked("Mine", "Faulty")).assert_outcomes(failed=2, deselected=15)
-
-
-def test_markers_lose_no_scene(repository):
-    """Of the same name, on top of each other; one that does nothing is an error."""
+def test_markers_with_scenes_of_one_name_add_up(repository):
     scene = {"body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}}
     repository.makepyfile(
         test_own=f"""
@@ -262,102 +234,55 @@ def test_markers_lose_no_scene(repository):
         @pytest.mark.dropspin({scene | {"duration": 1.0}}, {scene | {"duration": 2.0}})
         def test_each(dropspin_result):
             pass
-        """,
+        """
+    )
+    collected = repository.runpytest_inprocess("--collect-only", "-q", "test_own.py", *options("Mine")).outlines
+    assert len({line for line in collected if "::" in line}) == 4
+
+
+def test_marker_without_the_fixture_is_an_error(repository):
+    repository.makepyfile(
         test_idle="""
         import pytest
 
         @pytest.mark.dropspin("spin-prinzipal")
         def test_idle():
             pass
-        """,
+        """
     )
-    collected = repository.runpytest_subprocess("--collect-only", "-q", "test_own.py", *asked("Mine")).outlines
-    assert len({line for line in collected if "::" in line}) == 4
-    idle = repository.runpytest_subprocess("test_idle.py")
+    idle = repository.runpytest_inprocess("test_idle.py")
     assert idle.ret == pytest.ExitCode.INTERRUPTED
     idle.stdout.fnmatch_lines(["test_idle is marked with scenes, but does not take dropspin_result"])
 
 
-def test_workers_share_a_run(repository):
-    """Two workers: the engine's module is imported to plan and to run, not again; the summary has what both said."""
-    done = repository.runpytest_subprocess("-n", "2", *SCENE, *asked("Mine", "Faulty"))
-    assert done.ret == pytest.ExitCode.TESTS_FAILED
-    assert len((repository.path / "imports.log").read_text().splitlines()) == 2
-    done.stdout.fnmatch_lines(["mine * spin-principal * 2 * 0  *", "faulty * spin-principal * 0 * 2  *"])
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--dropspin-dt", "0"], "--dropspin-dt: got 0; a time step is a positive number of seconds."),
+        (["--dropspin-dt", "0.004", "--dropspin-dt", "nan"], "--dropspin-dt: got nan; a time step is a positive number of seconds."),
+        (["--dropspin-baseline", "none.toml"], "--dropspin-baseline: none.toml: No such file or directory."),
+    ],
+    ids=["zero", "nan", "baseline"],
+)
+def test_invalid_option_ends_the_session_with_one_line(repository, arguments, message):
+    """And exit code 4, before any test runs."""
+    done = repository.runpytest_inprocess(*arguments)
+    assert done.ret == pytest.ExitCode.USAGE_ERROR
+    done.stderr.fnmatch_lines([f"ERROR: {message}"])
+    assert "Traceback" not in done.stderr.str() + done.stdout.str()
+    assert "test_own" not in done.stdout.str()
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--dropspin-engine", "mujocco"], "dropspin: engine 'mujocco' is unknown.*"),
-        (["--dropspin-scene", "drop-bal"], "dropspin: *Did you mean 'drop-ball'?*"),
-        (["--dropspin-scene", "drop-ball", "--dropspin-baseline", "none.toml"], "dropspin: *none.toml: No such file or directory*"),
-        ([*SCENE, "dropspin::spin-principal::energy_eror"], "not found: dropspin::spin-principal::energy_eror*"),
+        (["--dropspin-baseline", "engines.py"], "dropspin: engines.py: not TOML: *"),
     ],
-    ids=["engine", "scene", "baseline", "node id"],
+    ids=["engine", "baseline"],
 )
-def test_bad_input(repository, arguments, message):
-    """One line and exit code 4, before anything runs."""
-    done = repository.runpytest_subprocess(*arguments)
-    assert done.ret == pytest.ExitCode.USAGE_ERROR
-    done.stderr.fnmatch_lines([f"ERROR: {message}"])
-    assert "Traceback" not in done.stderr.str() + done.stdout.str()
-
-
-OURS = ("scenarios", "reports", "comparisons", "reference_impl")
-OF_THE_USER = """
-import sys
-{own}
-
-def test_whose(dropspin_check):
-    dropspin_check("spin-principal", engine="engines:Mine", dt=0.004)
-    assert WHOSE == "the user's"
-    assert not {{"numpy", "pandas", "click"}} & set(sys.modules)
-"""
-
-
-def run(*command, cwd, **environment):
-    inherited = {key: value for key, value in os.environ.items() if key != "PYTHONPATH" and not key.startswith("PYTEST_")}
-    done = subprocess.run(
-        command, cwd=cwd, env=inherited | environment, capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
-WAYS = {"pytest": [DROPSPIN.with_name("pytest")], "python -m pytest": [sys.executable, "-m", "pytest"], "dropspin": [DROPSPIN]}
-QUICK = {("pytest", ""), ("python -m pytest", "."), ("dropspin", ".")}
-
-
-@pytest.mark.parametrize(
-    ("command", "path"),
-    [pytest.param(*way, marks=[] if way in QUICK else pytest.mark.slow) for way in product(WAYS, ["", "."])],
-)
-def test_packages_named_like_ours(command, path, tmp_path):
-    """Neither side imports the other's, whichever way they are started; what the user's tests do not import may as well raise."""
-    imported = command == "pytest"
-    for name in OURS:
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "__init__.py").write_text('WHOSE = "the user\'s"' if imported else "raise ImportError('the user's')")
-    (tmp_path / "engines.py").write_text(ENGINES)
-    (tmp_path / "conftest.py").write_text("import scenarios, reports\n" if imported else "")
-    (tmp_path / "test_own.py").write_text(OF_THE_USER.format(own="from reports import WHOSE" if imported else 'WHOSE = "the user\'s"'))
-    asked = ["run", "spin-principal", "-e", "engines:Mine", "--dt", "0.004"] if command == "dropspin" else ["-W", "error"]
-    run(*WAYS[command], *asked, cwd=tmp_path, **({"PYTHONPATH": path} if path else {}))
-
-
-def test_unused(repository):
-    """Nothing of it is there where it is switched off; nothing is started where it is not used, nor written."""
-    repository.makepyfile(
-        test_own="""
-        import sys
-
-        def test_own():
-            assert not {"numpy", "pandas", "click", "filelock", "tomlkit", "scenarios", "reports"} & set(sys.modules)
-        """
-    )
-    for arguments in ([], ["-p", "no:dropspin"], ["-p", "no:cacheprovider", "-n", "1"]):
-        done = repository.runpytest_subprocess("-W", "error", *arguments)
-        done.assert_outcomes(passed=1)
-        assert "dropspin" not in done.stdout.str().replace("plugins: ", "").partition("collected")[2]
-    assert not list(repository.path.glob(".pytest_cache/d/dropspin"))
-    assert not (repository.path / "imports.log").exists()
+def test_invalid_request_fails_the_test_with_one_line(repository, arguments, message):
+    repository.makepyfile(test_own=SCENE_TEST)
+    done = repository.runpytest_inprocess(*arguments)
+    done.assert_outcomes(errors=1)
+    done.stdout.fnmatch_lines(["_* ERROR at setup of test_scene* _*", message, "*short test summary info*"], consecutive=True)

@@ -17,7 +17,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 from scenarios.body import Sphere
 from scenarios.mechanics import lowest_height
@@ -151,6 +150,7 @@ def _next_impact(scene: Scenario, start: Array, states: States, duration: float,
 
     `leaves` says that it just leaves the floor, after an impact.
     """
+    from scipy.optimize import brentq, minimize_scalar
 
     def height(t: Array) -> Array:
         return lowest_height(scene, Trajectory.from_states(t, states(t)))
@@ -191,6 +191,8 @@ def _next_impact(scene: Scenario, start: Array, states: States, duration: float,
 
 def _within_first_sample(at: Callable[[float], float], end: float) -> float:
     """When a body that leaves the floor is back, sooner than the first sample of its height."""
+    from scipy.optimize import brentq
+
     above = end
     for _ in range(HALVINGS):
         below, above = above, 0.5 * above

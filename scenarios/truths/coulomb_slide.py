@@ -11,7 +11,6 @@ coefficient above 0; gravity straight down, no damping. Restitution does not mat
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import rotate
@@ -46,6 +45,8 @@ def coulomb_slide(scene: Scenario) -> Truth | None:
 
 def _slides_flat(scene: Scenario, direction: Array, friction: float) -> bool:
     """Whether the floor can push where it must, ahead of the centre by friction times its height: within what the base spans."""
+    from scipy.spatial import ConvexHull, QhullError
+
     offsets = rotate(np.array(scene.start.orientation), scene.body.vertices)
     base = offsets[offsets[:, 1] <= offsets[:, 1].min() + TOUCHING * scene.body.size]
     if abs(scene.clearance) > TOUCHING * scene.body.size or len(base) < 3:

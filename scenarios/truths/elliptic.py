@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import elliprf, elliprj
 
 Array = NDArray[np.float64]
 
@@ -56,11 +55,15 @@ def jacobi(u: Array, m1: float | Array) -> Jacobi:
 
 def quarter_period(m1: float) -> float:
     """K, the complete integral of the first kind; infinite on the separatrix m₁ = 0."""
+    from scipy.special import elliprf
+
     return math.inf if m1 == 0.0 else float(elliprf(0.0, m1, 1.0))
 
 
 def argument(sn: float, cn: float, m1: float) -> float:
     """The u in (-2K, 2K] whose elliptic sine and cosine are these."""
+    from scipy.special import elliprf
+
     dn2 = m1 + (1.0 - m1) * cn * cn
     u = sn * float(elliprf(cn * cn, dn2, 1.0))
     return u if cn >= 0.0 else math.copysign(2.0 * quarter_period(m1), sn) - u
@@ -71,6 +74,8 @@ def integral_of_sn2(u: Array, at_u: Jacobi, n: float, m1: float) -> Array:
 
     Source: B. C. Carlson, DLMF 19.25.14: Π(n; φ, k) = F + n/3 sin³φ R_J(cos²φ, 1 - k² sin²φ, 1, 1 - n sin²φ).
     """
+    from scipy.special import elliprj
+
     K = quarter_period(m1)
     half_turns = np.round(u / (2.0 * K))
     sign = np.where(half_turns % 2 == 0, 1.0, -1.0)

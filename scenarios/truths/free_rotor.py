@@ -19,7 +19,6 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from scenarios.mechanics import principal_axes
 from scenarios.rotations import about, cross, multiply, unrotate
@@ -67,6 +66,8 @@ class AsymmetricTop:
     """The general free rotor; its period [s] is that of the angular velocity in the body."""
 
     def __init__(self, inertia: Array, orientation: Array, angular_velocity: Array) -> None:
+        from scipy.spatial.transform import Rotation
+
         moments, axes = principal_axes(inertia)
         spin = axes.T @ unrotate(orientation, angular_velocity)
         order = _circled_axis_last(moments, spin)
@@ -93,6 +94,8 @@ class AsymmetricTop:
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Orientations (n, 4) and angular velocities (n, 3), world frame, at times [s], shape (n,)."""
+        from scipy.spatial.transform import Rotation
+
         at = self._elliptic(t)
         triads, spins = self._body_frame(at)
         angle = self._precession(t, at)

@@ -22,7 +22,6 @@ from functools import partial
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import about, multiply
@@ -86,6 +85,8 @@ def _time_since_rest(stand: Stand, level: float, at_end: float) -> Chebyshev:
 
 def _inverse(since_rest: Chebyshev, pace: Callable[[Array], Array]) -> Callable[[Array], Array]:
     """The function from times since rest [s] to u: one step of Newton's from a cubic; before rest as after it, but for the sign."""
+    from scipy.interpolate import CubicHermiteSpline
+
     u = np.linspace(0.0, since_rest.domain[1], GUESSES)
     guess = CubicHermiteSpline(since_rest(u), u, 1.0 / pace(u))
 

@@ -1,4 +1,4 @@
-"""What a trade-off between error and cost says: rows, sentences, files."""
+"""`dropspin tradeoff` in words: the Pareto front, and the cheapest configuration within each tolerance."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cos
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
-    """All points: error, and time per simulated second as median, best and quartiles of the rounds [s]."""
+    """Every point: its error, and the time per simulated second as median, best and quartiles of the rounds [s]."""
     front = found.front
     return [
         {
@@ -33,48 +33,48 @@ def rows(found: TradeOff) -> list[dict[str, Any]]:
 
 
 def front_rows(found: TradeOff) -> list[dict[str, str]]:
-    """The front, in words: from the cheapest to the most accurate."""
+    """The Pareto front in words, from the cheapest to the most accurate."""
     unit = _unit(found)
     return [
         {
             "engine": point.engine,
             "step": f"{1e3 * point.dt:.4g} ms",
             "error": f"{point.error:.2e}{unit}",
-            "a simulated second": _time(point.typical),
+            "per simulated second": _time(point.typical),
             "best": _time(float(point.cost.min())),
-            f"each of {SIDE_BY_SIDE}": "–" if math.isnan(point.side_by_side) else _time(point.side_by_side),
+            f"per world (batch of {SIDE_BY_SIDE})": "–" if math.isnan(point.side_by_side) else _time(point.side_by_side),
         }
         for point in found.front
     ]
 
 
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
-    """What to take within each tolerance, by how much, what is next best; and what is never worth its time."""
-    unit = _unit(found)
-    name = found.metric.replace("_", " ")
-    told = []
-    for tolerance in within:
-        goal = f"{found.scene.name}, {name} within {tolerance:g}{unit}"
-        advice = found.recommendation(tolerance)
-        if advice is None:
-            nearest = min(found.points, key=lambda point: point.error)
-            told.append(f"{goal}: nothing gets there; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}.")
-            continue
-        sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical)} a simulated second"
-        if advice.next_best is None:
-            sentence += "; nothing else gets there."
-        elif advice.level:
-            sentence += f"; level with {_named(advice.next_best)}, {advice.ratio:.2f} times that."
-        else:
-            sentence += f"; next best {_named(advice.next_best)}, {advice.ratio:.1f} times that."
-        together = found.best_side_by_side(tolerance)
-        if together is not None:
-            sentence += f" Of {SIDE_BY_SIDE} side by side, {_named(together)}: {_time(together.side_by_side)} each."
-        told.append(sentence)
+    """The cheapest configuration within each tolerance, then the engines that are dominated and those that are left out."""
+    listed = [_recommendation(found, tolerance) for tolerance in within]
     if found.dominated:
-        told.append(f"Dominated, less accurate or slower than something else at every step: {', '.join(found.dominated)}.")
-    told += [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
-    return told
+        listed.append(f"Dominated, less accurate or slower than another engine at every time step: {', '.join(found.dominated)}.")
+    return listed + [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
+
+
+def _recommendation(found: TradeOff, tolerance: float) -> str:
+    """The cheapest configuration within a tolerance, the next best, and the best for a batch."""
+    unit = _unit(found)
+    goal = f"{found.scene.name}, {found.metric.replace('_', ' ')} within {tolerance:g}{unit}"
+    advice = found.recommendation(tolerance)
+    if advice is None:
+        nearest = min(found.points, key=lambda point: point.error)
+        return f"{goal}: no tested configuration reaches it; the most accurate is {_named(nearest)} with {nearest.error:.2e}{unit}."
+    sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical)} per simulated second"
+    if advice.next_best is None:
+        sentence += "; no other engine reaches it."
+    elif advice.level:
+        sentence += f"; {_named(advice.next_best)} takes about as long, {advice.ratio:.2f} times that."
+    else:
+        sentence += f"; the next best, {_named(advice.next_best)}, takes {advice.ratio:.1f} times that."
+    together = found.best_side_by_side(tolerance)
+    if together is not None:
+        sentence += f" In a batch of {SIDE_BY_SIDE}, {_named(together)}: {_time(together.side_by_side)} per world."
+    return sentence
 
 
 def _named(point: Point) -> str:

@@ -13,6 +13,7 @@ import pytest
 from comparisons.results.store import load_results
 from comparisons.running.run import run
 from reports import run_folder
+from reports.html.report import html_report
 from reports.plots.figures import report_figures
 from reports.plots.svg import svg
 from reports.run_folder import write_report
@@ -83,7 +84,7 @@ def test_the_folder_holds_the_documented_files(folder):
         others
     )
     assert len([name for name in others if name.endswith(".npz")]) == 3 * 2 * 2
-    assert sum(name.startswith("plots/") for name in others) == 8
+    assert sum(name.startswith("plots/") for name in others) == 7
 
 
 def test_the_page_is_valid_and_needs_no_network(folder):
@@ -99,7 +100,7 @@ def test_the_page_is_valid_and_needs_no_network(folder):
     assert not re.search(r"url\((?!#)", text)
     assert not re.search(r"@import|<script[^>]*src|<link", text)
     assert len(text) < 3_000_000
-    assert page.tags.count("svg") == 8
+    assert page.tags.count("svg") == 7
 
 
 def test_names_with_markup_are_inert(folder):
@@ -124,14 +125,14 @@ def test_the_page_states_the_verdict_before_any_table(results, folder):
     assert "stays as the step goes to 0" in text
 
 
-def test_failures_come_before_the_comparison(tmp_path):
+def test_failures_come_before_the_comparison():
     """With value, bound and reason."""
     ball = load("drop-ball")
     harsh = ball.model_dump(exclude_none=True, exclude={"expect"}) | {
         "expect": [{"metric": "bounce_height_error", "below": 1e-9, "reason": "too much to ask"}]
     }
     found = run(load(harsh), "mujoco", 1e-2)
-    text = write_report(found, tmp_path / "run").read_text(encoding="utf-8")
+    text = html_report(found, plots={})
     assert "1 of 1 checks fail." in text
     assert text.index("What failed") < text.index("Against the truth")
     assert "too much to ask" in text
@@ -279,11 +280,10 @@ def test_markdown_cells_hold_anything(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def studied(tmp_path_factory):
+def studied():
     """A run at three time steps, with an engine that has a model error, and its page."""
     found = run("spin-asymmetric", ["document", "mujoco"], [8e-3, 4e-3, 2e-3])
-    page = write_report(found, tmp_path_factory.mktemp("studied") / "run")
-    return found, page.read_text(encoding="utf-8")
+    return found, html_report(found, plots={})
 
 
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
@@ -357,7 +357,7 @@ def test_many_engines_split_the_table_and_cut_no_number(capsys):
                 assert formatted(value) in text
 
 
-def test_setting_errors_are_compared_with_the_calibrated_profile(tmp_path):
+def test_setting_errors_are_compared_with_the_calibrated_profile():
     """Beside its calibrated profile a default one gets the share of each error that is due to settings: in page, table and sentence."""
     found = run("drop-ball", ["pybullet", "pybullet[profile=default]"], [4e-3, 2e-3])
     [comparison] = profile_comparisons(found)
@@ -369,7 +369,7 @@ def test_setting_errors_are_compared_with_the_calibrated_profile(tmp_path):
         assert row["part"] == max(0.0, 1 - abs(calibrated) / abs(default))
     height = next(row for row in comparison.rows if row["metric"] == "bounce_height_error")
     assert height["part"] > 0.95  # measured .965; the rest is discretisation error
-    page = write_report(found, tmp_path / "run").read_text(encoding="utf-8")
+    page = html_report(found, plots={})
     assert "How much of the error is the setting" in page
     assert comparison.sentence in finding_sentences(found)
     assert profile_comparisons(run("drop-ball", "pybullet[profile=default]", 1e-2)) == []

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from comparisons.judging.verdicts import Cause
 
@@ -167,6 +166,8 @@ def _extrapolate(h: Array, e: Array, noise: Array, claimed: float | None) -> tup
     first, second = e[0] - e[1], e[1] - e[2]
     if abs(second) <= noise[1] + noise[2] or second == 0.0:
         return math.nan, math.nan, math.nan
+
+    from scipy.optimize import brentq
 
     def excess(p: float) -> float:
         return float((h[0] ** p - h[1] ** p) / (h[1] ** p - h[2] ** p) - first / second)

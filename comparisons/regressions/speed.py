@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from comparisons.results.results import Results
 
@@ -58,6 +57,8 @@ def _change(engine: str, other: str, before: pd.DataFrame, after: pd.DataFrame) 
     ratios = (after[engine] / after[other] / (before[engine] / before[other])).dropna().to_numpy()
     if len(ratios) == 0:
         return SpeedChange(engine, other, np.nan, np.nan, np.nan, 0)
+    from scipy import stats
+
     interval = stats.quantile_test(ratios, q=1.0).confidence_interval(CONFIDENCE)
     least, most = (float(np.nan_to_num(end, nan=missing)) for end, missing in zip(interval, (0.0, np.inf), strict=True))
     return SpeedChange(engine, other, float(np.median(ratios)), least, most, len(ratios))

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from comparisons.engines.base import Engine
 from comparisons.judging.verdicts import Judgement
@@ -73,6 +72,8 @@ def judge_differences(first: EnsembleOutcome, second: EnsembleOutcome) -> Iterat
 
 def _mean(values: Array) -> tuple[float, float]:
     """The mean, and half the width of its confidence interval."""
+    from scipy import stats
+
     mean, error = float(np.mean(values)), float(stats.sem(values))
     return mean, float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(values) - 1)) * error
 

@@ -34,7 +34,7 @@ INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor the user
 
 
 def main() -> None:
-    """Run the command line; every expected mistake ends in one line and exit code 2."""
+    """Run the command line; every expected error ends in one line and exit code 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a character gets a question mark, not a traceback
@@ -58,11 +58,14 @@ def main() -> None:
 
 
 def _run() -> int:
+    """Run the command, and return the exit code."""
     try:
-        return dropspin(standalone_mode=False) or 0
+        return dropspin(prog_name="dropspin", standalone_mode=False) or 0
     except click.ClickException as error:
         error.show()
         return 2
+    except SystemExit:  # click and Rich exit here only on a closed pipe, with code 1, which would mean a failed check
+        raise BrokenPipeError from None
     except Exception as error:
         from scenarios import DropspinError
 

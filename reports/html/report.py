@@ -22,7 +22,8 @@ from reports.views import numbers
 from reports.views.error_budget import error_budgets
 from reports.views.findings import NEGLIGIBLE, counts, profile_comparisons, verdicts
 from reports.views.leading_errors import leading_errors, step_costs
-from reports.views.run import LASTING, left_out, modelled, overview
+from reports.views.run import LASTING, overview
+from reports.views.scene import left_out, modelled
 from scenarios import truth_for
 
 

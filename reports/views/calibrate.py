@@ -11,17 +11,17 @@ Rows = list[dict[str, str]]
 
 
 def friction(text: str) -> str | float:
-    """A floor's friction as it is written on the command line.
+    """A friction option as a floor takes it.
 
     Raises:
-        DropspinError: It is none.
+        DropspinError: It is not a valid friction.
     """
     if text in ("none", "infinite"):
         return text
     try:
         return float(text)
     except ValueError:
-        raise DropspinError(f"friction: got {text!r}; it is none, infinite or a number.") from None
+        raise DropspinError(f"friction: got {text!r}; give none, infinite or a coefficient.") from None
 
 
 def measured_rows(found: Calibration) -> Rows:

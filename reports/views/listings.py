@@ -1,25 +1,24 @@
 """`dropspin list` in words: the scenes, the engines, the metrics."""
 
-from comparisons.engines.registry import engine, engine_names
-from comparisons.measuring.metrics import METRICS
-from comparisons.results.ensembles import ENSEMBLE_METRICS
-from scenarios import DropspinError, load, names, truth_for
+from scenarios.catalogue_truths import CATALOGUE_TRUTHS
+from scenarios.errors import DropspinError
+from scenarios.loading import load, names
 
 Rows = list[dict[str, str]]
 
 
 def scene_rows() -> Rows:
-    """The catalogue."""
-    rows = []
-    for name in names():
-        scene = load(name)
-        truth = truth_for(scene)
-        rows.append({"scene": name, "truth": truth.name if truth else "", "tags": ", ".join(scene.tags), "summary": scene.summary})
-    return rows
+    """The scenes of the catalogue."""
+    return [
+        {"scene": scene.name, "truth": CATALOGUE_TRUTHS.get(scene.name, ""), "tags": ", ".join(scene.tags), "summary": scene.summary}
+        for scene in map(load, names())
+    ]
 
 
 def engine_rows() -> Rows:
-    """The engines that can be named."""
+    """The engines that can be named, with their options."""
+    from comparisons.engines.registry import engine, engine_names
+
     rows = []
     for name in engine_names():
         try:
@@ -35,7 +34,10 @@ def engine_rows() -> Rows:
 
 
 def metric_rows() -> Rows:
-    """The metrics."""
+    """The metrics of one motion, then those of an ensemble."""
+    from comparisons.measuring.metrics import METRICS
+    from comparisons.results.ensembles import ENSEMBLE_METRICS
+
     of_one = [
         {"metric": metric.name, "unit": metric.unit, "needs": metric.needs, "definition": metric.definition} for metric in METRICS.values()
     ]

@@ -1,10 +1,8 @@
 """How numbers, bounds and verdicts are formatted, everywhere."""
 
 import math
+from functools import cache
 
-from comparisons.regressions.checking import ACCEPTED
-
-ACCEPTED_KINDS = {text: kind for kind, text in ACCEPTED.items()}
 MARKS = {
     "passed": "✓",
     "failed": "✗",
@@ -59,10 +57,17 @@ def unit(of: str) -> str:
 
 
 def subject(metric: str, kind: str, truth: str = "") -> str:
-    """The subject of a row in words; for one of kind `baseline` its column `truth` says what was accepted."""
+    """The subject of a row in words, such as `order of attitude error`; a row of kind `baseline` names what was accepted in `truth`."""
     words = metric.replace("_", " ")
     prefixed = {"order": f"order of {words}", "asymptotic_error": f"asymptotic {words}", "ensemble": f"mean {words}"}
-    return prefixed.get(ACCEPTED_KINDS.get(truth, kind), words)
+    return prefixed.get(_accepted_kinds().get(truth, kind), words)
+
+
+@cache
+def _accepted_kinds() -> dict[str, str]:
+    from comparisons.regressions.checking import ACCEPTED
+
+    return {text: kind for kind, text in ACCEPTED.items()}
 
 
 def trend(order: float, asymptotic_error: float, cause: str) -> str:

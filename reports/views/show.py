@@ -2,17 +2,16 @@
 
 from comparisons.engines.registry import engine
 from comparisons.judging.verdicts import verify_expectations
-from comparisons.running.recording import verify_time_step
-from comparisons.running.verification import verify_build
 from reports.views.numbers import bound
-from reports.views.run import left_out, modelled
+from reports.views.scene import left_out, modelled
 from scenarios import Scenario, truth_for
+from scenarios.model import Expectation
 
 Rows = list[dict[str, str]]
 
 
 def scene_rows(scene: Scenario) -> Rows:
-    """A scene: what is modelled, its truth, what it expects."""
+    """A scene: what it models, its exact solution, its expectations."""
     truth = truth_for(scene)
     verify_expectations(scene, truth, [])
     start = scene.start
@@ -31,16 +30,27 @@ def scene_rows(scene: Scenario) -> Rows:
     if truth and truth.events:
         facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
     for expectation in scene.expect:
-        below, within, above = expectation.below, expectation.within, expectation.above
-        limits = (-below, below) if below else within or (above, float("nan"))
-        steps = ", ".join(f"{dt:g}" for dt in expectation.dt or ())
-        who = " at ".join(filter(None, [expectation.engine or "any engine", f"{steps} s" if steps else ""]))
-        facts[f"expect {expectation.metric} ({who})"] = f"{bound(*limits)}: {expectation.reason}"
+        facts[f"expect {expectation.metric} ({_applies_to(expectation)})"] = f"{_allowed(expectation)}: {expectation.reason}"
     return [{"what": key, "is": value} for key, value in facts.items() if value]
+
+
+def _applies_to(expectation: Expectation) -> str:
+    """The engine and the time steps that an expectation is for."""
+    steps = ", ".join(f"{dt:g}" for dt in expectation.dt or ())
+    return " at ".join(filter(None, [expectation.engine or "any engine", f"{steps} s" if steps else ""]))
+
+
+def _allowed(expectation: Expectation) -> str:
+    below, within, above = expectation.below, expectation.within, expectation.above
+    limits = (-below, below) if below else within or (above, float("nan"))
+    return bound(*limits)
 
 
 def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     """What an engine builds of a scene, read back, with its settings."""
+    from comparisons.running.recording import verify_time_step
+    from comparisons.running.verification import verify_build
+
     verify_time_step(scene, dt)
     chosen = engine(engine_name)
     refusal = chosen.declines(scene)

@@ -1,4 +1,4 @@
-"""`dropspin tradeoff` in words: rows of points, the Pareto front, and sentences of advice."""
+"""`dropspin tradeoff` in words: the Pareto front, and the cheapest configuration within each tolerance."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cos
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
-    """All points: error, and time per simulated second as median, best and quartiles of the rounds [s]."""
+    """Every point: its error, and the time per simulated second as median, best and quartiles of the rounds [s]."""
     front = found.pareto_front
     return [
         {
@@ -34,14 +34,14 @@ def rows(found: TradeOff) -> list[dict[str, Any]]:
 
 
 def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
-    """The Pareto front as text, from the cheapest to the most accurate point."""
+    """The Pareto front in words, from the cheapest to the most accurate."""
     unit = _unit(found)
     return [
         {
             "engine": point.engine,
             "step": f"{1e3 * point.dt:.4g} ms",
             "error": f"{point.error:.2e}{unit}",
-            "time per simulated second": _time(point.typical_cost),
+            "per simulated second": _time(point.typical_cost),
             "best": _time(float(point.cost.min())),
             f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else _time(point.cost_per_world),
         }
@@ -50,31 +50,32 @@ def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
 
 
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
-    """The cheapest configuration within each tolerance and the next best; then what is dominated or left out."""
-    unit = _unit(found)
-    name = found.metric.replace("_", " ")
-    lines = []
-    for tolerance in within:
-        goal = f"{found.scene.name}, {name} within {tolerance:g}{unit}"
-        advice = found.recommendation(tolerance)
-        if advice is None:
-            nearest = min(found.points, key=lambda point: point.error)
-            lines.append(f"{goal}: no tested configuration reaches it; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}.")
-            continue
-        sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical_cost)} per simulated second"
-        if advice.next_best is None:
-            sentence += "; no other engine or method reaches it."
-        elif advice.level:
-            sentence += f"; level with {_named(advice.next_best)}, {advice.ratio:.2f} times as long."
-        else:
-            sentence += f"; the next best is {_named(advice.next_best)}, {advice.ratio:.1f} times as long."
-        batched = found.best_in_batch(tolerance)
-        if batched is not None:
-            sentence += f" In a batch of {BATCH}: {_named(batched)}, {_time(batched.cost_per_world)} per world."
-        lines.append(sentence)
+    """The cheapest configuration within each tolerance, then the engines that are dominated and those that are left out."""
+    listed = [_recommendation(found, tolerance) for tolerance in within]
     if found.dominated:
-        lines.append(f"Dominated (less accurate or slower than another configuration at every step): {', '.join(found.dominated)}.")
-    return lines + [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
+        listed.append(f"Dominated, less accurate or slower than another engine at every time step: {', '.join(found.dominated)}.")
+    return listed + [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
+
+
+def _recommendation(found: TradeOff, tolerance: float) -> str:
+    """The cheapest configuration within a tolerance, the next best, and the best for a batch."""
+    unit = _unit(found)
+    goal = f"{found.scene.name}, {found.metric.replace('_', ' ')} within {tolerance:g}{unit}"
+    advice = found.recommendation(tolerance)
+    if advice is None:
+        nearest = min(found.points, key=lambda point: point.error)
+        return f"{goal}: no tested configuration reaches it; the most accurate is {_named(nearest)} with {nearest.error:.2e}{unit}."
+    sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical_cost)} per simulated second"
+    if advice.next_best is None:
+        sentence += "; no other engine reaches it."
+    elif advice.level:
+        sentence += f"; {_named(advice.next_best)} takes about as long, {advice.ratio:.2f} times that."
+    else:
+        sentence += f"; the next best, {_named(advice.next_best)}, takes {advice.ratio:.1f} times that."
+    batched = found.best_in_batch(tolerance)
+    if batched is not None:
+        sentence += f" In a batch of {BATCH}, {_named(batched)}: {_time(batched.cost_per_world)} per world."
+    return sentence
 
 
 def _named(point: CostPoint) -> str:

@@ -1,6 +1,10 @@
-"""The command line in tests: in this process, which takes no time to start, or in one of its own."""
+"""The command line in tests: in this process, which costs no start, or in a process of its own.
+
+`dropspin` serves all tests but those that need a process: signals, exit codes as a shell sees them, a closed pipe, an installation.
+"""
 
 import contextlib
+import importlib
 import io
 import os
 import signal
@@ -16,7 +20,7 @@ DROPSPIN = Path(sys.executable).with_name("dropspin")
 
 @dataclass(frozen=True)
 class Done:
-    """What a command left: the same names as `subprocess.CompletedProcess`."""
+    """The outcome of a command; the names are those of `subprocess.CompletedProcess`."""
 
     returncode: int
     stdout: str
@@ -24,7 +28,7 @@ class Done:
 
 
 def dropspin(*arguments: object, cwd: Path | str, **environment: str) -> Done:
-    """Run a command in this process; engines run in processes of their own, as ever."""
+    """Run a command in this process, with `cwd` as the working directory; engines run in processes of their own, as always."""
     from reports.commands.main import main
 
     out, err = io.StringIO(), io.StringIO()
@@ -33,8 +37,9 @@ def dropspin(*arguments: object, cwd: Path | str, **environment: str) -> Done:
         stack.enter_context(contextlib.chdir(cwd))
         stack.enter_context(mock.patch.dict(os.environ, {"COLUMNS": "80", **environment}))
         stack.enter_context(mock.patch.object(sys, "argv", ["dropspin", *map(str, arguments)]))
-        stack.enter_context(mock.patch.object(sys, "path", [*sys.path, os.fspath(cwd)]))
+        stack.enter_context(mock.patch.object(sys, "path", [*sys.path, os.path.realpath(cwd)]))
         stack.enter_context(_unchanged_handlers())
+        stack.enter_context(_without_modules_of(Path(cwd)))
         stack.enter_context(contextlib.redirect_stdout(out))
         stack.enter_context(contextlib.redirect_stderr(err))
         try:
@@ -45,7 +50,7 @@ def dropspin(*arguments: object, cwd: Path | str, **environment: str) -> Done:
 
 
 def spawn(*arguments: object, cwd: Path | str, timeout: float = 300.0, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """Run the installed command in a process of its own: for exit codes, signals, and what an installation needs."""
+    """Run the installed command in a process of its own."""
     return subprocess.run(
         [DROPSPIN, *map(str, arguments)],
         cwd=cwd,
@@ -68,3 +73,16 @@ def _unchanged_handlers() -> Iterator[None]:
         sys.unraisablehook = hook
         for one, handler in handlers.items():
             signal.signal(one, handler)
+
+
+@contextlib.contextmanager
+def _without_modules_of(folder: Path) -> Iterator[None]:
+    """Forget, afterwards, modules that were imported from a folder: another test's `my_engine` is another engine."""
+    importlib.invalidate_caches()
+    here, before = os.path.realpath(folder) + os.sep, set(sys.modules)
+    try:
+        yield
+    finally:
+        for name in set(sys.modules) - before:
+            if str(getattr(sys.modules[name], "__file__", "")).startswith(here):
+                del sys.modules[name]

@@ -1,31 +1,28 @@
-"""Folders that studies write into, and the tables in them."""
+"""Output folders of studies, and the tables in them."""
 
 import csv
 import json
 
 import pytest
-from click.testing import CliRunner
+from support.cli import dropspin
 
-from reports.commands.main import dropspin
 from reports.output import folder_made, write_table
-from scenarios import DropspinError
 
 
 @pytest.mark.parametrize("verb", ["limits", "tradeoff"])
 @pytest.mark.parametrize("folder", ["taken", "taken/inside", "/proc"])
-def test_a_folder_that_cannot_be_written_costs_no_work(verb, folder, tmp_path, monkeypatch):
-    """A file, something inside of one, and a folder in which nothing can be made, by nobody."""
-    monkeypatch.chdir(tmp_path)
+def test_an_output_folder_that_cannot_be_written_fails_before_the_work(verb, folder, tmp_path):
+    """A file, a path inside a file, and a folder in which nobody can create files."""
     (tmp_path / "taken").write_text("mine")
-    done = CliRunner().invoke(dropspin, [verb, "spin-principal", "-e", "mujoco", "-o", folder])
-    assert isinstance(done.exception, DropspinError)
-    assert f"{folder}: cannot be written: " in str(done.exception)
-    assert "running spin-principal" not in done.output
+    done = dropspin(verb, "spin-principal", "-e", "mujoco", "-o", folder, cwd=tmp_path)
+    assert done.returncode == 2
+    assert f"dropspin: {folder}: cannot be written: " in done.stderr
+    assert "running spin-principal" not in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
-def test_a_folder_that_stays_empty_goes_again(tmp_path):
-    """With those that were made on the way to it; one that holds something stays, and so does what was there before."""
+def test_an_output_folder_that_stays_empty_is_removed(tmp_path):
+    """With the parents that were created for it; a folder that holds a file stays, and so does one that existed before."""
     (tmp_path / "before").mkdir()
     with folder_made(str(tmp_path / "before/new/inside")) as folder:
         assert folder.is_dir()
@@ -38,7 +35,7 @@ def test_a_folder_that_stays_empty_goes_again(tmp_path):
     assert (tmp_path / "filled/inside/table.csv").exists()
 
 
-def test_a_table_says_the_same_in_both_forms(tmp_path):
+def test_a_table_is_the_same_as_csv_and_as_json(tmp_path):
     rows = [{"engine": "a,b", "error": 1e-300, "cost": None}, {"engine": "µ", "error": 0.1, "cost": 2.0}]
     write_table(tmp_path, "made", ["engine", "error", "cost"], rows)
     assert json.loads((tmp_path / "made.json").read_text(encoding="utf-8")) == rows

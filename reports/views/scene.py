@@ -1,0 +1,24 @@
+"""A scene in words: what it models and what it leaves out."""
+
+from scenarios.model import Scenario
+
+
+def modelled(scene: Scenario) -> list[str]:
+    """The parts of a scene that are simulated."""
+    parts = [f"a {scene.body.shape} of {scene.body.mass:g} kg" if scene.body.shape != "vertices" else "a set of vertices"]
+    if scene.gravity is not None:
+        parts.append("gravity")
+    if scene.floor is not None:
+        friction = scene.floor.friction
+        grip = {"none": "no friction", "infinite": "infinite friction"}.get(str(friction), f"friction {friction}")
+        parts.append(f"a floor of restitution {scene.floor.restitution:g} and {grip}")
+    if scene.damping is not None:
+        parts.append(f"damping of {scene.damping.linear:g} and {scene.damping.angular:g} per second")
+    if scene.ensemble is not None:
+        parts.append(f"{scene.ensemble.size} starts drawn around the scene's own")
+    return parts
+
+
+def left_out(scene: Scenario) -> list[str]:
+    """The parts that a scene does not model; no engine simulates them."""
+    return [part for part in ("gravity", "floor", "damping") if getattr(scene, part) is None]

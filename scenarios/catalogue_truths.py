@@ -1,0 +1,32 @@
+"""The name of each catalogue scene's exact solution, for the list of scenes.
+
+`truth_for` gives the same names, and a test compares the two; but it solves for the impacts, which takes half a second and imports SciPy.
+"""
+
+_SCENES = {
+    "ball-impact": ("drop-ball-backspin",),
+    "bounce-ladder": (
+        "bounce-95",
+        "bounce-99",
+        "bounce-9999",
+        "drop-ball",
+        "drop-ball-brisk",
+        "drop-ball-dull",
+        "drop-ball-lively",
+        "drop-box-flat",
+        "turn-box-flat",
+    ),
+    "corner-impact": ("drop-box-anyhow", "drop-box-corner", "drop-box-sticking", "drop-box-tumble"),
+    "coulomb-slide": ("slide-box",),
+    "coulomb-turn": ("turn-box-rough",),
+    "damped-free-rotor": ("spin-damped",),
+    "damped-parabola": ("fall-damped",),
+    "edge-impact": ("drop-box-edge",),
+    "free-rotor": ("spin-asymmetric", "spin-coin", "spin-dzhanibekov", "spin-needle"),
+    "principal-spin": ("fall-spin", "spin-principal", "spin-principal-50", "spin-principal-500"),
+    "rocking": ("rest-long", "rock-block"),
+    "slipping": ("slip-stick",),
+    "tipping": ("tip-box",),
+}
+CATALOGUE_TRUTHS = {scene: truth for truth, scenes in _SCENES.items() for scene in scenes}
+"""By name of the scene; a scene without an exact solution is absent."""

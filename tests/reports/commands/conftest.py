@@ -1,0 +1,58 @@
+"""A user's repository with an engine and three runs of it, for check, accept, compare and history."""
+
+from pathlib import Path
+
+import pytest
+import xmlschema
+from support.cli import dropspin
+
+MY_ENGINE = '''
+import os
+from dropspin import Engine, engine
+
+
+class MyEngine(Engine):
+    """An engine whose library changes under it."""
+
+    name = "my-engine"
+
+    def prepare(self, scene, dt):
+        release = os.environ.get("RELEASE", "good")
+        if release == "crashing" and scene.floor is not None:
+            os.abort()
+        if release == "failing" and scene.floor is not None:
+            floor = scene.floor.model_copy(update={"restitution": 1.01 * scene.floor.restitution})
+            scene = scene.model_copy(update={"floor": floor})
+        simulation = engine("pybullet").prepare(scene, dt)
+        simulation.settings = dict(simulation.settings) | {"version": release}
+        return simulation
+'''
+RUN = ("run", "spin-principal", "drop-ball", "-e", "my_engine:MyEngine")
+
+
+@pytest.fixture(scope="session")
+def exit_codes():
+    """By release of the engine, the exit code of its run and of a check of it."""
+    return {"good": 0, "failing": 1, "crashing": 3}
+
+
+@pytest.fixture(scope="session")
+def repository(shared, exit_codes):
+    """An engine, a run of each of its three releases, and the first one's results accepted; tests only read it."""
+
+    def make(folder):
+        (folder / "my_engine.py").write_text(MY_ENGINE)
+        codes = {release: dropspin(*RUN, "-o", f"out/{release}", cwd=folder, RELEASE=release).returncode for release in exit_codes}
+        assert codes == exit_codes
+        accepted = dropspin("accept", "out/good", "--reason", "first measured", cwd=folder)
+        assert accepted.returncode == 0, accepted.stderr
+        assert "Accepted for 2 scenes with my-engine: " in accepted.stdout
+        assert "Written: dropspin-baseline.toml, " in accepted.stdout
+
+    return shared("repository", make)
+
+
+@pytest.fixture(scope="session")
+def junit_schema():
+    """The schema by which Jenkins' xUnit plugin reads JUnit XML; pytest validates its own files by it too."""
+    return xmlschema.XMLSchema(str(Path(__file__).parents[1] / "junit-10.xsd"))

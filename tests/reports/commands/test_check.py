@@ -1,0 +1,237 @@
+"""`dropspin check` and `dropspin accept`."""
+
+import datetime
+import json
+import re
+import shutil
+import xml.etree.ElementTree as ET
+
+import pandas as pd
+import pytest
+from support.cli import dropspin
+
+from comparisons.regressions.baseline import Baseline, accept
+from comparisons.regressions.checking import check
+from comparisons.running.run import run
+from reports.junit import junit_xml
+from reports.views.check import BaselineFile, accepted_sentences, sentences
+from scenarios import load
+
+ENGINE, LABEL = "my_engine:MyEngine", "my-engine"
+RUN = ("run", "spin-principal", "drop-ball", "-e", ENGINE)
+BASELINE = ("--baseline", "dropspin-baseline.toml")
+
+
+@pytest.mark.parametrize("release", ["good", "failing", "crashing"])
+def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, exit_codes, junit_schema, tmp_path):
+    """Exit code, JUnit that CI servers read, a summary, and every failure with its command."""
+    done = dropspin(
+        "check", f"out/{release}", *BASELINE, "--junit", tmp_path / "deep/junit.xml", "--summary", tmp_path / "summary.md", cwd=repository
+    )
+    assert done.returncode == exit_codes[release]
+    junit_schema.validate(tmp_path / "deep/junit.xml")
+    [suite] = ET.parse(tmp_path / "deep/junit.xml").getroot()
+    failed, broken = int(suite.attrib["failures"]), int(suite.attrib["errors"])
+    assert {"good": failed == broken == 0, "failing": failed > 20 and broken == 0, "crashing": failed == broken == 3}[release]
+    assert len({(case.attrib["classname"], case.attrib["name"]) for case in suite.iter("testcase")}) == int(suite.attrib["tests"])
+    summary = (tmp_path / "summary.md").read_text()
+    assert len(summary) < 65_536  # what a comment on GitHub may be
+    assert summary.startswith(f"## dropspin: {'✓' if release == 'good' else '✗'}")
+    output = " ".join(done.stdout.split())
+    if release == "good":
+        assert re.search(r"All \d+ accepted results hold\.$", output)
+    if release == "failing":
+        first = output.split("✗")[1]
+        assert first.startswith(" drop-ball · my-engine · 0.004 s: restitution error is 0.005, accepted -")
+        assert "first measured; worse by 1.67e+05 times its tolerance (and 2 other time steps). " in first
+        assert "Reproduce: dropspin run drop-ball -e my_engine:MyEngine --dt 0.004 --baseline dropspin-baseline.toml -o out/again" in first
+        assert "my-engine: accepted results fail in 1 of 2 scenes; the largest change is in restitution error (drop-ball)." in output
+        assert "Changed since they were accepted: my-engine good → failing." in output
+        assert f"If this change is intended: dropspin accept out/failing {' '.join(BASELINE)} --reason \"…\"" in output
+    if release == "crashing":
+        assert f"drop-ball · {LABEL} · 0.004 s: crashed. its process was ended by SIGABRT" in output
+        assert "If this change is intended" not in output
+
+
+def test_the_command_that_reproduces_a_failure_measures_the_same_value(repository, tmp_path):
+    """It is one command and ends as the check did."""
+    found = json.loads(dropspin("check", "out/failing", *BASELINE, "--json", cwd=repository).stdout)
+    [row] = [row for row in found if row["kind"] == "baseline" and row["metric"] == "restitution_error" and row["dt"] == 0.004]
+    command = f"dropspin run drop-ball -e {ENGINE} --dt 0.004 --baseline dropspin-baseline.toml -o out/again"
+    checked = dropspin("check", "out/failing", *BASELINE, "--junit", tmp_path / "j.xml", cwd=repository)
+    assert checked.returncode == 1
+    assert command in (tmp_path / "j.xml").read_text()
+    for name in ("my_engine.py", "dropspin-baseline.toml"):
+        shutil.copy(repository / name, tmp_path)
+    done = dropspin(*command.split()[1:], "--json", cwd=tmp_path, RELEASE="failing")
+    assert done.returncode == 1
+    [again] = [one for one in json.loads(done.stdout) if one["kind"] == "baseline" and one["metric"] == "restitution_error"]
+    assert (again["value"], again["verdict"]) == (row["value"], "failed")
+
+
+@pytest.mark.parametrize(("release", "code", "verdict"), [("good", 0, "accepted results hold."), ("failing", 1, "accepted results fail.")])
+def test_a_run_is_checked_at_once_with_a_baseline(release, code, verdict, repository, tmp_path):
+    """With the same words and the same exit code as a check; here of one of the accepted time steps."""
+    command = ("run", "drop-ball", "-e", ENGINE, "--dt", "0.004", *BASELINE, "-o", tmp_path / "run")
+    done = dropspin(*command, cwd=repository, RELEASE=release)
+    assert done.returncode == code
+    assert verdict in " ".join(done.stdout.split())
+
+
+def test_a_run_of_which_nothing_was_accepted_is_kept(repository, tmp_path):
+    """Bad input, but the run is not lost: it can be accepted."""
+    command = ("run", "fall-spin", "-e", ENGINE, "--dt", "0.004", *BASELINE, "-o", tmp_path / "new")
+    done = dropspin(*command, "--json", cwd=repository)
+    assert done.returncode == 2
+    assert "dropspin: dropspin-baseline.toml: none of the " in done.stderr
+    assert f"The run is written: {tmp_path / 'new'}." in done.stderr
+    assert {row["scene"] for row in json.loads(done.stdout)} == {"fall-spin"}
+    shutil.copy(repository / "dropspin-baseline.toml", tmp_path / "b.toml")
+    accepted = dropspin("accept", tmp_path / "new", "--baseline", tmp_path / "b.toml", "--reason", "new", cwd=repository)
+    assert accepted.returncode == 0
+    assert dropspin("check", tmp_path / "new", "--baseline", tmp_path / "b.toml", cwd=repository).returncode == 0
+
+
+def test_a_crash_cannot_be_accepted(repository, tmp_path):
+    """What was accepted before stays, to the last byte; where no engine was measured, no file is written."""
+    shutil.copy(repository / "dropspin-baseline.toml", tmp_path / "b.toml")
+    done = dropspin("accept", "out/crashing", "--baseline", tmp_path / "b.toml", "--reason", "x", cwd=repository)
+    assert done.returncode == 0
+    assert "gone" not in done.stdout
+    assert "3 engine runs broke down; what was accepted of them before stays." in done.stdout
+    assert (tmp_path / "b.toml").read_text() == (repository / "dropspin-baseline.toml").read_text()
+    dropspin("run", "drop-ball", "-e", ENGINE, "--dt", "0.01", "-o", tmp_path / "dead", cwd=repository, RELEASE="crashing")
+    done = dropspin("accept", tmp_path / "dead", "--baseline", tmp_path / "none.toml", "--reason", "x", cwd=repository)
+    assert done.returncode == 2
+    assert "there is nothing to accept, as no engine was measured; " in done.stderr
+    assert not (tmp_path / "none.toml").exists()
+
+
+def test_an_engine_that_can_no_longer_be_imported_loses_its_accepted_results(repository, junit_schema, tmp_path):
+    """CI learns of it in every form."""
+    (tmp_path / "my_engine.py").write_text("import no_such_library")
+    done = dropspin(*RUN, "-o", "out", cwd=tmp_path)
+    assert done.returncode == 3
+    shutil.copy(repository / "dropspin-baseline.toml", tmp_path)
+    done = dropspin("check", "out", *BASELINE, "--junit", "junit.xml", "--summary", "summary.md", cwd=tmp_path)
+    assert done.returncode == 3
+    assert "accepted results are gone, missing: " in " ".join(done.stdout.split())
+    junit_schema.validate(tmp_path / "junit.xml")
+    assert (tmp_path / "summary.md").read_text().startswith("## dropspin: ✗")
+
+
+def expecting(metric):
+    harsh = {"metric": metric, "below": 1e-12, "reason": "none is that exact"}
+    return load(load("drop-ball").model_dump(exclude={"expect"}, exclude_none=True) | {"expect": [harsh]})
+
+
+@pytest.mark.parametrize(
+    ("metric", "accepted", "outcome"),
+    [
+        ("penetration", [], ["1 known failure, not counted as failed.", "All 11 accepted results hold."]),
+        (
+            "energy_error_raw",
+            ["1 failing check has no comparable result and cannot be accepted."],
+            ["1 of 1 checks fail. All 11 accepted results hold."],
+        ),
+    ],
+)
+def test_known_failures_are_counted_apart(metric, accepted, outcome):
+    """Neither hidden, nor promised where a failure has no result that can be compared."""
+    found = run(expecting(metric), "mujoco", 4e-3)
+    base, change = accept(found, Baseline(), "known", datetime.date(2026, 3, 1), known_failures=True)
+    assert accepted_sentences(found, change, known_failures=True)[1:] == accepted
+    assert sentences(check(found, base), BaselineFile(base, "b.toml", "out")) == outcome
+
+
+def test_annotations_are_for_github(repository):
+    """Commands that its runner reads, only there, and no more than it shows."""
+    quiet = dropspin("check", "out/failing", *BASELINE, cwd=repository)
+    assert "::error" not in quiet.stdout
+    loud = dropspin("check", "out/failing", *BASELINE, cwd=repository, GITHUB_ACTIONS="true")
+    commands = [line for line in loud.stdout.splitlines() if line.startswith("::")]
+    assert 0 < len(commands) <= 10
+    assert commands[0].startswith("::error title=drop-ball my-engine::drop-ball · ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["check", "absent"], "absent: not the folder of a run"),
+        (["check", "out/good", "--baseline", "absent.toml"], "absent.toml: No such file or directory"),
+        (["check", "out/good", "--baseline", "my_engine.py"], "my_engine.py: not TOML"),
+        (["check", "out/good", "--baseline", "out"], "out: is a directory; a baseline is one TOML file"),
+        (["check", "out/good", "--junit", "my_engine.py/x"], "my_engine.py"),
+        (["accept", "out/good"], "Missing option '--reason'"),
+        (["accept", "out/good", "--reason", " "], "--reason is empty; say why these results are accepted."),
+        (["accept", "out/good", "--reason", "a\nb"], "contains control characters or more than one line; give one line of text."),
+        (["accept", "--reason", "x"], "Missing argument 'RUN...'"),
+        (["accept", "out/good", "--reason", "x", "--baseline", "my_engine.py"], "my_engine.py: not TOML"),
+        (["accept", "out/good", "--reason", "x", "--baseline", "my_engine.py/b.toml"], "my_engine.py/b.toml: cannot be written"),
+        (["compare", "out/good"], "Missing argument 'NEW'"),
+        (["compare", "out/good", "absent"], "absent: not the folder of a run"),
+        (["compare", "out/good", "out/good", "--fail-speed", "20%"], "No such option"),
+        (["history", "out/good"], "a history needs two runs or more, got 1; give more, or a folder of runs."),
+        (["history", "absent"], "absent: neither a run nor a folder of runs; "),
+    ],
+    ids=lambda case: " ".join(case) if isinstance(case, list) else "",
+)
+def test_bad_usage_writes_nothing(arguments, message, repository):
+    """Exit code 2, one reason, no traceback."""
+    before = sorted(repository.rglob("*"))
+    done = dropspin(*arguments, cwd=repository)
+    assert done.returncode == 2
+    assert message in " ".join(done.stderr.replace("│", " ").split())
+    assert "Traceback" not in done.stderr + done.stdout
+    assert sorted(repository.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("run.json", b'{"provenance": {}}', "has a format of another version of dropspin, which this version cannot read"),
+        ("run.json", b"[]", "has a format of another version of dropspin, which this version cannot read"),
+        ("run.json", b"{", "not the folder of a run"),
+        ("run.json", b"\xff\xfe", "not the folder of a run"),
+        ("results.parquet", b"PAR1", "not the folder of a run"),
+        ("results.parquet", None, "not the folder of a run"),
+    ],
+)
+def test_a_folder_that_is_not_a_run_is_refused(file, content, message, repository, tmp_path):
+    """Older, cut off, or of something else: one line that says so."""
+    shutil.copytree(repository / "out/good", tmp_path / "run")
+    (tmp_path / "run" / file).unlink()
+    if content is not None:
+        (tmp_path / "run" / file).write_bytes(content)
+    done = dropspin("check", "run", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def without_names(folder):
+    content = json.loads((folder / "run.json").read_text())
+    del content["provenance"]["names"], content["provenance"]["asked"]["dts"]
+    (folder / "run.json").write_text(json.dumps(content))
+
+
+def of_another_run(folder):
+    frame = pd.read_parquet(folder / "results.parquet")
+    frame.assign(scene="fall-spin").to_parquet(folder / "results.parquet", index=False)
+
+
+@pytest.mark.parametrize(("damage", "message"), [(without_names, "lacks dts, names"), (of_another_run, "its table has scenes that run.json does not have")])
+def test_files_of_different_runs_are_refused(damage, message, repository, tmp_path):
+    """Each file can be read, but they do not belong together: one line that says so."""
+    shutil.copytree(repository / "out/good", tmp_path / "run")
+    damage(tmp_path / "run")
+    done = dropspin("check", "run", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert message in done.stderr
+
+
+def test_junit_replaces_characters_that_xml_lacks(junit_schema, tmp_path):
+    """A scene may have any name that a file may have."""
+    named = expecting("penetration").model_copy(update={"name": "ctl\x01\x0c"})
+    (tmp_path / "junit.xml").write_bytes(junit_xml(run(named, "mujoco", 1e-2)))
+    junit_schema.validate(tmp_path / "junit.xml")

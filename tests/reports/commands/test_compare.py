@@ -1,0 +1,44 @@
+"""`dropspin compare` and `dropspin history`."""
+
+import json
+import re
+from pathlib import Path
+
+from support.cli import dropspin
+
+GATE = Path(__file__).parents[3] / "docs" / "gate.md"
+
+
+def test_compare_says_what_got_worse_and_why(repository, tmp_path):
+    """The change and what it is attributed to; the same in Markdown and in JSON; no change between a run and itself."""
+    done = dropspin("compare", "out/good", "out/failing", "--summary", tmp_path / "summary.md", cwd=repository)
+    assert done.returncode == 1
+    output = " ".join(done.stdout.split())
+    assert "Attributed to the engine: my-engine good → failing, its settings (restitution)." in output
+    assert "Worse: " in output
+    assert "| drop-ball | my-engine | restitution error |" in (tmp_path / "summary.md").read_text()
+    data = json.loads(dropspin("compare", "out/good", "out/failing", "--json", cwd=repository).stdout)
+    assert data["attributed_to"]["my-engine"]["origin"] == "engine"
+    assert {result["scene"] for result in data["results"]} == {"drop-ball"}
+    same = dropspin("compare", "out/good", "out/good", cwd=repository)
+    assert same.returncode == 0
+    assert same.stdout.splitlines()[-1].startswith("None of ")
+
+
+def test_history_finds_the_run_in_which_results_moved(repository, tmp_path):
+    """The run, what the move is attributed to, a table and a plot for each scene."""
+    done = dropspin("history", "out", "-o", tmp_path / "history", cwd=repository)
+    assert done.returncode == 0, done.stderr
+    assert "moved in failing, after good. Attributed to the engine" in " ".join(done.stdout.split())
+    names = {path.name for path in (tmp_path / "history").iterdir()}
+    assert names == {"history.csv", "history.json", "history.md", "drop-ball.svg", "spin-principal.svg"}
+    rows = json.loads((tmp_path / "history/history.json").read_text())
+    assert {row["run"] for row in rows} == {"good", "failing", "crashing"}
+    assert "![drop-ball](drop-ball.svg)" in (tmp_path / "history/history.md").read_text().splitlines()
+
+
+def test_the_python_of_the_documentation_runs():
+    [block] = re.findall(r"^```python\n(.*?)^```", GATE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    names: dict[str, object] = {}
+    exec(block, names)
+    assert set(names["changes"].results["change"]) == {"same"}

@@ -1,0 +1,194 @@
+"""The command line as a whole: exit codes, errors, interrupts and output streams."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support.cli import DROPSPIN, dropspin, spawn
+
+from reports.commands import main as cli
+
+HARSH = """
+duration = 0.5
+[body]
+shape = "sphere"
+radius = 0.1
+mass = 1.0
+[start]
+position = [0.0, 1.0, 0.0]
+[gravity]
+acceleration = [0.0, -9.81, 0.0]
+[floor]
+restitution = 0.6
+friction = "none"
+[[expect]]
+metric = "penetration"
+below = 1e-9
+reason = "no engine is that stiff"
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "output", "error"),
+    [
+        (["list", "metrics"], 0, "orientation_error", ""),
+        (["run", "harsh.toml", "-e", "mujoco", "--dt", "0.01"], 1, "1 of 1 checks fail.", "running harsh\nwriting the report\n"),
+        (["show", "drop-bal"], 2, "", "dropspin: scene 'drop-bal' is not in the catalogue and no file of that name exists. Did you mean"),
+        (["conform", "my_engine:Mine"], 3, "", "dropspin: my_engine:Mine needs the module no_such_engine, which is not installed.\n"),
+    ],
+    ids=[0, 1, 2, 3],
+)
+def test_exit_codes_of_the_installed_command(arguments, code, output, error, tmp_path):
+    """In a process of its own, where an exit code is what a shell sees; output and errors on their own streams."""
+    (tmp_path / "harsh.toml").write_text(HARSH)
+    (tmp_path / "my_engine.py").write_text("import no_such_engine")
+    done = spawn(*arguments, cwd=tmp_path)
+    assert done.returncode == code, done.stderr
+    assert output in done.stdout
+    assert done.stderr.startswith(error)
+    assert bool(done.stderr) == bool(error)
+    assert "Traceback" not in done.stderr + done.stdout
+
+
+def test_internal_error_is_exit_code_70(tmp_path):
+    """With a traceback, which an error report needs."""
+    program = "import dropspin, reports.views.listings as listings\nlistings.scene_rows = None\ndropspin.main()"
+    command = [sys.executable, "-c", program, "list"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (70, "")
+    assert done.stderr.startswith("dropspin: internal error; please report what follows.\nTraceback (most recent call last):\n")
+    assert done.stderr.endswith("TypeError: 'NoneType' object is not callable\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "drop-bal"], "Did you mean 'drop-ball'?"),
+        (["run", "absent.toml"], "absent.toml: No such file or directory"),
+        (["run", "drop-ball", "-e", "mujocco"], "Did you mean 'mujoco'?"),
+        (["run", "drop-ball", "-e", "mujoco[integrator=rk5]"], "Did you mean 'rk4'?"),
+        (["run", "drop-ball", "--dt", "0"], "dt: got 0.0 s"),
+        (["run", "drop-ball", "--dt", "nan"], "dt: got nan s"),
+        (["run", "drop-ball", "--dt", "fast"], "'fast' is not a valid float"),
+        (["run", "drop-ball", "--out", "x"], "No such option"),
+        (["run", "drop-ball", "--dry-run"], "No such option"),
+        (["run", "drop-ball", "-o", "."], "the working directory, or a mount point, cannot be replaced"),
+        (["run", "drop-ball", "-o", "precious"], "precious: is a file; choose a folder"),
+        (["run", "drop-ball", "-o", "precious/x"], "precious/x: cannot be written"),
+        (["run", "drop-ball", "--dt", "1e-310"], "dt: got 1e-310 s"),
+        (["run", "drop-ball", "--dt", "0.01", "--dt", "0.01"], "dt: a time step is given twice (0.01, 0.01); give each once."),
+        (["run", "x" * 300], "is not in the catalogue"),
+        (["show", "drop-ball", "-e", "mujoco", "--dt", "nan"], "dt: got nan s"),
+        (["show", "drop-ball", "-e", "mujoco", "--dt", "0"], "dt: got 0.0 s"),
+        (["frobnicate"], "No such command"),
+        (["show", "drop-bal"], "Did you mean 'drop-ball'?"),
+        (["show", "drop-ball", "-e", "x"], "engine 'x' is unknown"),
+        (["list", "planets"], "'planets' is not one of"),
+    ],
+    ids=lambda case: " ".join(case) if isinstance(case, list) else "",
+)
+def test_bad_usage_is_exit_code_2_and_writes_nothing(arguments, message, tmp_path):
+    """The reason is on the standard error, without a traceback."""
+    (tmp_path / "precious").write_text("x")
+    done = dropspin(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["precious"]
+
+
+@pytest.mark.parametrize("arguments", [(), ("--help",), ("-h",)])
+def test_help_lists_every_command(arguments, tmp_path):
+    """A line for each, and nothing else looks like a command."""
+    done = dropspin(*arguments, cwd=tmp_path)
+    assert done.returncode == (0 if arguments else 2)
+    listed = (done.stdout + done.stderr).partition("Commands:\n")[2]
+    names = [line.split()[0] for line in listed.splitlines() if line.startswith("  ") and not line.startswith("   ")]
+    assert names == list(cli.COMMANDS)
+    assert sorted(names) == sorted(path.stem for path in Path(cli.__file__).parent.glob("*.py") if path.stem in cli.COMMANDS)
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_command_has_a_help_page(name, tmp_path):
+    done = dropspin(name, "--help", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"Usage: dropspin {name} ")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+def test_terminals_without_utf_8(encoding, tmp_path, monkeypatch):
+    """A question mark in place of a character that the terminal lacks; no traceback and no other exit code."""
+    monkeypatch.chdir(tmp_path)
+    printed = b""
+    for arguments in (["run", "spin-principal", "-e", "mujoco", "--dt", "0.01"], ["show", "drop-ball"], ["list", "metrics"]):
+        monkeypatch.setattr(sys, "argv", ["dropspin", *arguments])
+        for name in ("stdout", "stderr"):
+            monkeypatch.setattr(sys, name, io.TextIOWrapper(io.BytesIO(), encoding=encoding))
+        handlers = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        for one, handler in handlers.items():
+            signal.signal(one, handler)
+        sys.stdout.flush()
+        printed += sys.stdout.buffer.getvalue()
+        assert end.value.code == 0
+    assert b"?" in printed
+
+
+def test_a_terminal_without_utf_8_in_a_process_of_its_own(tmp_path):
+    done = spawn("show", "drop-ball", cwd=tmp_path, PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert done.returncode == 0, done.stderr
+    assert "?" in done.stdout
+
+
+def test_output_that_cannot_be_written_to():
+    """A full device: one line and exit code 2, not 1."""
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([DROPSPIN, "list"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "No space left" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [["list"], ["list", "--json"]], ids=["table", "json"])
+def test_a_closed_pipe_ends_the_command_quietly(arguments):
+    """As in `dropspin list | head -1`; not with exit code 1, which means a failed check."""
+    process = subprocess.Popen([DROPSPIN, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    assert process.wait(timeout=60) == 130
+    assert process.stderr.read() == ""
+    process.stderr.close()
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_nothing(how, tmp_path):
+    """Ctrl-C, or SIGTERM from a CI server: exit code 130, no folder, no traceback."""
+    (tmp_path / "long.toml").write_text('duration = 10.0\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
+    command = [DROPSPIN, "run", "long.toml", "-e", "mujoco", "--dt", "0.01", "--dt", "0.00001"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert process.stderr.readline() == "running long\n"
+    process.send_signal(how)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.lstrip() == "dropspin: interrupted; nothing was written.\n"
+    assert os.listdir(tmp_path) == ["long.toml"]
+
+
+@pytest.mark.parametrize("verb", ["run", "sweep"])
+def test_an_interrupt_that_is_swallowed_still_stops_the_command(verb, tmp_path, monkeypatch):
+    """A callback of an engine or of the compiler may swallow the exception; the next step of the work raises it again."""
+    (tmp_path / "spec.toml").write_text('scenes = ["drop-ball"]\nengines = ["mujoco"]\ndts = [0.004]\n')
+    monkeypatch.setattr("reports.commands.interrupts._interrupts", [signal.SIGINT])
+    given = ["spec.toml"] if verb == "sweep" else ["spin-principal", "-e", "mujoco", "--dt", "0.01"]
+    done = dropspin(verb, *given, "-o", "out", cwd=tmp_path)
+    assert done.returncode == 130
+    kept = "0 of 1 jobs are kept; --resume continues the sweep" if verb == "sweep" else "nothing was written"
+    assert done.stderr.splitlines()[-1] == f"dropspin: interrupted; {kept}."
+    assert os.listdir(tmp_path) == ["spec.toml"]

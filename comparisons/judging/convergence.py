@@ -56,7 +56,7 @@ class SeriesPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class ConvergenceStudy:
-    """What several time steps say of one metric: the cause of its errors, and judgements of order and asymptotic error where there are any."""
+    """The convergence of one metric: the cause of its errors, and the judgements of order and asymptotic error, where there are any."""
 
     cause: Cause
     order: Judgement | None

@@ -2,9 +2,9 @@
 
     e(h) = m + C hᵖ      m the asymptotic error, p the observed order
 
-An error that vanishes as h → 0 is a discretisation error; one that does not is a model error. m is Richardson's extrapolation from the three
-finest steps, with the order, among those that methods have, that is nearest to the one observed. It is found again with the observed order
-and with each pair of powers that might look like it. The spread of these values estimates what neglected powers of the step amount to;
+An error that vanishes as h → 0 is a discretisation error; one that does not is a model error. m is Richardson's extrapolation from the
+three finest steps, with the order, among those that methods have, that is nearest to the one observed. It is found again with the observed
+order and with each pair of powers that might look like it. The spread of these values estimates the effect of neglected powers of the step;
 three times that (Roache's factor for an order that is not known beforehand) is the uncertainty.
 
 Source: L. F. Richardson & J. A. Gaunt, Phil. Trans. R. Soc. A 226 (1927); P. J. Roache, J. Fluids Engineering 116 (1994).

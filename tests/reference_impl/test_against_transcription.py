@@ -1,4 +1,4 @@
-"""The compiled kernels against a plain transcription of the note."""
+"""The compiled kernels compared with a plain transcription of the lecture note."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def reference_points(state, points):
 
 @pytest.mark.parametrize("sticking", [False, True], ids=["eq15", "eq17"])
 @pytest.mark.parametrize("seed", range(12))
-def test_fifty_steps_through_contacts(seed, sticking):
+def test_fifty_steps_through_contacts_match_the_transcription(seed, sticking):
     """Position, orientation, velocity and spin agree to 1e-12 of each one's scale (measured: up to 6e-14)."""
     body, state = tumbling_box(seed)
     rest_speed = 0.3 if seed % 3 == 0 else 0.0
@@ -59,7 +59,7 @@ def test_fifty_steps_through_contacts(seed, sticking):
         assert np.abs(found[:, part] - expected[:, part]).max() <= 1e-12 * scale
 
 
-def test_several_vertices_at_once():
+def test_flat_impact_acts_at_the_mean_of_four_corners():
     """A box that falls flat hits with four corners; the impulse acts at their mean (section 3.2)."""
     half = np.array([0.1, 0.2, 0.3])
     points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half

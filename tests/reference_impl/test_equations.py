@@ -1,4 +1,4 @@
-"""Each numbered equation of the note, by itself, against another source or its own defining property."""
+"""Each numbered equation of the lecture note by itself, compared with another source or with its defining property."""
 
 import numpy as np
 import pytest
@@ -35,20 +35,20 @@ def vec3(v) -> Vec3:
 
 
 @given(arrays(float, 4, elements=numbers).filter(lambda q: np.linalg.norm(q) > 1e-3))
-def test_eq3_normalised_is_of_unit_length(q):
+def test_eq3_normalised_quaternion_has_unit_length(q):
     """Eq 3, to 2 ulp."""
     assert abs(np.linalg.norm(normalise(quat(q))) - 1.0) <= 2 * EPS
 
 
 @given(quaternions)
-def test_eq4_rotation_matrix(q):
-    """Eq 4 against SciPy's rotations, to 4 ulp of 1 (measured: 2.2e-16)."""
+def test_eq4_rotation_matrix_matches_scipy(q):
+    """To 8 ulp of 1 (measured: 2.2e-16)."""
     np.testing.assert_allclose(np.array(rotation_matrix(quat(q))), Rotation.from_quat(q).as_matrix(), rtol=0, atol=8 * EPS)
 
 
 @given(quaternions, quaternions)
 def test_eq5_product_rotates_by_the_second_then_by_the_first(p, q):
-    """Eq 5 against the composition of SciPy's rotations."""
+    """As the composition of SciPy's rotations."""
     found = Rotation.from_quat(product(quat(p), quat(q))).as_matrix()
     np.testing.assert_allclose(found, (Rotation.from_quat(p) * Rotation.from_quat(q)).as_matrix(), rtol=0, atol=8 * EPS)
 
@@ -72,8 +72,8 @@ def test_eq8_gives_the_kinetic_energy_of_its_masses(points, masses):
     assert found == pytest.approx(energy, rel=1e-12, abs=1e-12)
 
 
-def test_solid_inertias_by_monte_carlo_free_means():
-    """Box and ball against the integrals of x² + y²: m/3 (a² + b²) and 2/5 m R²."""
+def test_inertia_of_solid_box_and_ball():
+    """The integrals of x² + y²: m/3 (a² + b²) and 2/5 m R²."""
     box = reference_impl.solid_box_inertia(3.0, np.array([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(np.diag(box), [13.0, 10.0, 5.0], rtol=4 * EPS)
     np.testing.assert_allclose(reference_impl.solid_sphere_inertia(2.0, 0.5), 0.2 * np.eye(3), rtol=4 * EPS)
@@ -81,13 +81,13 @@ def test_solid_inertias_by_monte_carlo_free_means():
 
 @given(vectors, vectors)
 def test_eq14_cross_matrix(r, j):
-    """r* j = r × j, to the last bit but for the sign of zero."""
+    """r* j = r × j, to the last bit except for the sign of zero."""
     np.testing.assert_array_equal(np.array(cross_matrix(vec3(r)) @ vec3(j)), np.cross(r, j))
     np.testing.assert_array_equal(np.array(cross(vec3(r), vec3(j))), np.cross(r, j))
 
 
 @given(arrays(float, (3, 3), elements=numbers), vectors)
-def test_solve_is_the_inverse_of_the_product(m, b):
+def test_solve_inverts_the_product(m, b):
     """Cramer's rule on well-conditioned matrices, as K is."""
     m = m @ m.T + np.eye(3)
     np.testing.assert_allclose(m @ np.array(solve(mat3(m), vec3(b))), b, rtol=0, atol=1e-13 * np.linalg.cond(m) * 10)
@@ -104,7 +104,7 @@ def box_in_the_air(q):
 
 
 @given(quaternions, vectors, vectors)
-def test_eq15_k_is_what_a_unit_impulse_does_to_its_point(q, r, j):
+def test_eq15_k_gives_the_velocity_change_of_the_contact_point(q, r, j):
     """K j is the change of v + ω × r after eq 12 with impulse j."""
     body, _, inverse = box_in_the_air(q)
     K = impulse_response(vec3(r), mat3(inverse), body.mass)
@@ -128,7 +128,7 @@ def test_eq11_and_eq16_hold_after_the_impulse(q, r, v, w, sticking):
     np.testing.assert_allclose(turned, np.cross(r, body.mass * (np.array(v_after) - v)), rtol=0, atol=1e-11 * scale)
 
 
-def test_rest_threshold_switches_restitution_off():
+def test_restitution_is_0_below_the_rest_speed():
     """Section 3.2: below rest_speed the rebound is 0, above it is µ."""
     body, R, _ = box_in_the_air(np.array([0.0, 0.0, 0.0, 1.0]))
     r = Vec3(0.0, -0.2, 0.0)

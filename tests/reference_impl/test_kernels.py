@@ -1,4 +1,4 @@
-"""One source, two ways to run it; and a cache on disk that never serves old physics."""
+"""Kernels have the same bits interpreted, compiled, in lanes and in threads; and the cache on disk never serves stale kernels."""
 
 import json
 import os
@@ -7,95 +7,136 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
+from support.methods import COVERING, FURTHER
 
 import reference_impl
+from reference_impl import Body, Floor, Methods, World
+from reference_impl.kernels import recording_kernel
+from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+from reference_impl.state import ORIENTATION
 
 PACKAGE = Path(reference_impl.__file__).parent
-
-# Every leaf once, and ten pairs.
-CHOICES = [
-    {},
-    *({"rotation": name} for name in ("gyroscopic", "implicit-gyroscopic", "midpoint", "rk4", "symmetric-top", "exact")),
-    *({"law": name} for name in ("normal", "poisson", "clamped", "coulomb")),
-    {"law": "normal", "contact": "sequential"},
-    {"correction": "projection"},
-    {"rotation": "rk4", "law": "normal"},
-    {"rotation": "exact", "law": "poisson"},
-    {"rotation": "midpoint", "law": "coulomb"},
-    {"rotation": "symmetric-top", "law": "clamped"},
-    {"rotation": "gyroscopic", "correction": "projection"},
-    {"rotation": "rk4", "law": "coulomb", "contact": "sequential"},
-    {"rotation": "exact", "law": "normal", "contact": "sequential", "correction": "projection"},
-    {"rotation": "implicit-gyroscopic", "law": "poisson", "correction": "projection"},
-    {"law": "clamped", "correction": "projection"},
-    {"rotation": "midpoint", "law": "normal", "contact": "sequential"},
-]
-TUMBLE = """
-import json, sys
-import numpy as np
-import reference_impl as r
-
-rng = np.random.default_rng(1)
 KINDS, BODIES = 5, 19  # 19 bodies of 5 kinds: more than fill the lanes, and not a multiple of their number
-half = rng.uniform(.1, .3, (KINDS, 3))
-mass = rng.uniform(.5, 2, KINDS)
-inertia = np.array([r.solid_box_inertia(m, h) for m, h in zip(mass, half)])
-points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half[:, None]
-starts = np.zeros((KINDS, 13))
-starts[:, 1] = rng.uniform(.4, .5, KINDS)
-starts[:, 3:] = rng.normal(size=(KINDS, 10))
-starts[:, 3:7] /= np.linalg.norm(starts[:, 3:7], axis=1)[:, None]
-gravity = np.array([0, -9.8, 0]) + rng.normal(size=(KINDS, 3))
-dt, restitution, linear, angular = rng.uniform([8e-4, .3, .1, .2], [2e-3, .9, .3, .4], (KINDS, 4)).T
-rest_speed = np.array([0, .01, 0, .02, .3])
+ALL = np.arange(BODIES) % KINDS
+STEPS = 300
 
-def given(which, law):
-    friction = np.array([.1, np.inf, 0, .4, .8]) if law == "coulomb" else np.array([np.inf, 0, np.inf, np.inf, 0])
-    floor = r.Floor(restitution[which], friction[which], rest_speed[which])
-    world = r.World(gravity[which], floor, (linear[which], angular[which]))
-    return starts[which], r.Body(mass[which], inertia[which], points[which], .01), world, dt[which]
 
-for choice in json.loads(sys.argv[1]):
-    methods, law = r.Methods(**choice), choice.get("law")
-    if sys.argv[2] == "alone":
-        rows = np.array([r.simulate(*given(kind, law), 300, methods=methods) for kind in range(KINDS)])
-    else:
-        rows = r.simulate(*given(np.arange(BODIES) % KINDS, law), 300, methods=methods, threads=int(sys.argv[3]))
-        assert all(np.array_equal(rows[body], rows[body % KINDS]) for body in range(BODIES)), choice
-    print(rows[:KINDS].tobytes().hex())
+def tumbling(which, law):
+    """The arguments of `simulate` for some of the kinds: bodies that touch the floor, worlds and time steps that all differ."""
+    rng = np.random.default_rng(1)
+    half = rng.uniform(0.1, 0.3, (KINDS, 3))
+    mass = rng.uniform(0.5, 2, KINDS)
+    inertia = np.array([reference_impl.solid_box_inertia(m, h) for m, h in zip(mass, half, strict=True)])
+    points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half[:, None]
+    starts = np.zeros((KINDS, 13))
+    starts[:, 1] = rng.uniform(0.4, 0.5, KINDS)
+    starts[:, 3:] = rng.normal(size=(KINDS, 10))
+    starts[:, ORIENTATION] /= np.linalg.norm(starts[:, ORIENTATION], axis=1)[:, None]
+    gravity = np.array([0, -9.8, 0]) + rng.normal(size=(KINDS, 3))
+    dt, restitution, linear, angular = rng.uniform([8e-4, 0.3, 0.1, 0.2], [2e-3, 0.9, 0.3, 0.4], (KINDS, 4)).T
+    rest_speed = np.array([0, 0.01, 0, 0.02, 0.3])
+    friction = np.array([0.1, np.inf, 0, 0.4, 0.8]) if law == "coulomb" else np.array([np.inf, 0, np.inf, np.inf, 0])
+    floor = Floor(restitution[which], friction[which], rest_speed[which])
+    world = World(gravity[which], floor, (linear[which], angular[which]))
+    return starts[which], Body(mass[which], inertia[which], points[which], 0.01), world, dt[which]
+
+
+def alone(choice):
+    law, methods = choice.get("law"), Methods(**choice)
+    return np.array([reference_impl.simulate(*tumbling(kind, law), STEPS, methods=methods) for kind in range(KINDS)])
+
+
+def test_covering_choices_contain_every_leaf():
+    chosen = [Methods(**choice) for choice in COVERING]
+    assert {methods.rotation for methods in chosen} == set(ROTATIONS)
+    assert {methods.law for methods in chosen} == set(LAWS)
+    assert {methods.contact for methods in chosen} == set(CONTACTS)
+    assert {methods.correction for methods in chosen} == set(CORRECTIONS)
+
+
+@pytest.fixture
+def interpreted(monkeypatch):
+    """A function that calls another one with the kernels as plain Python, as under NUMBA_DISABLE_JIT=1."""
+
+    def call(function, *arguments):
+        with monkeypatch.context() as patched:
+            patched.setattr(numba.config, "DISABLE_JIT", 1)
+            patched.setattr(sys.modules["reference_impl.simulate"], "recording_kernel", recording_kernel.__wrapped__)
+            return function(*arguments)
+
+    return call
+
+
+@pytest.mark.parametrize("choices", [COVERING, pytest.param(FURTHER, marks=pytest.mark.slow)], ids=["covering", "further"])
+@pytest.mark.filterwarnings("ignore:the contact was not solved")
+def test_interpreted_compiled_and_ensemble_results_agree_to_the_last_bit(choices, interpreted):
+    """Through contacts, for bodies, worlds and time steps that all differ."""
+    results = set()
+    for choice in choices:
+        expected = interpreted(alone, choice)
+        np.testing.assert_array_equal(alone(choice), expected, err_msg=f"{choice}, one body")
+        for threads in (1, 2):
+            arguments = tumbling(ALL, choice.get("law"))
+            rows = reference_impl.simulate(*arguments, STEPS, methods=Methods(**choice), threads=threads)
+            np.testing.assert_array_equal(rows, expected[ALL], err_msg=f"{choice}, ensemble in {threads} threads")
+        results.add(expected.tobytes())
+    assert len(results) == len(choices)  # no two choices are the same method
+
+
+def in_a_process(program, **environment):
+    """What a program prints in a process with its own settings of numba."""
+    program = f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n{program}"
+    done = subprocess.run([sys.executable, "-c", program], env=os.environ | environment, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_kernels_are_interpreted_if_the_user_disables_jit(interpreted):
+    """The documented way to a debugger: NUMBA_DISABLE_JIT=1 gives the same bits."""
+    program = (
+        "import test_kernels as t\nprint(t.alone({}).tobytes().hex())\n"
+        "parts = t.reference_impl.kernels.Parts(True, False, True, True, True)\n"
+        "print(type(t.recording_kernel(t.Methods(), parts, 1)).__name__)"
+    )
+    result, kind = in_a_process(program, NUMBA_DISABLE_JIT="1", PYTHONPATH=str(Path(__file__).parents[1])).split()
+    assert kind == "function"
+    assert result == alone({}).tobytes().hex()
+
+
+def test_ensemble_has_the_same_bits_on_a_processor_without_avx():
+    """There are fewer lanes, and every body has the same bits."""
+    program = (
+        "import test_kernels as t\nfrom reference_impl import lanes\n"
+        "print(lanes.WIDTH, t.reference_impl.simulate(*t.tumbling(t.ALL, None), t.STEPS, threads=1).tobytes().hex())"
+    )
+    plain = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYTHONPATH": str(Path(__file__).parents[1])}
+    width, result = in_a_process(program, **plain).split()
+    assert width == "4"
+    assert result == reference_impl.simulate(*tumbling(ALL, None), STEPS, threads=1).tobytes().hex()
+
+
+SERVER = """
+import json, os, sys
+import numba
+import numpy
+numba.njit(lambda x: x + 1.0)(1.0)  # loads the compiler, which takes longer than the kernel of a fall
+for line in sys.stdin:
+    folder, program, environment = json.loads(line)
+    if os.fork() == 0:
+        try:
+            os.chdir(folder)
+            sys.path.insert(0, folder)
+            os.environ.update(environment)
+            numba.config.reload_config()
+            exec(program, {})
+            sys.stdout.flush()
+        finally:
+            os._exit(0)
+    os.wait()
+    print("end", flush=True)
 """
-
-
-@pytest.mark.parametrize("choices", [CHOICES[first::6] for first in range(6)])
-def test_alone_interpreted_compiled_and_in_an_ensemble_agree_to_the_last_bit(choices):
-    """Every method through contacts; of bodies, worlds and step sizes that all differ."""
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-W", "ignore", "-c", TUMBLE, json.dumps(choices), *how],
-            env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.split()
-        for disabled, *how in (("1", "alone"), ("0", "alone"), ("0", "ensemble", "1"), ("0", "ensemble", "2"))
-    ]
-    for choice, interpreted, *others in zip(choices, *outputs, strict=True):
-        assert others == [interpreted] * 3, choice
-    assert len(set(outputs[0])) == len(choices)  # and no two choices are the same
-
-
-def test_an_ensemble_has_the_same_bits_on_a_plain_processor():
-    """Without AVX there are fewer lanes; the physics is none the wiser."""
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", TUMBLE, "[{}]", "ensemble", "1"], env=os.environ | target, capture_output=True, text=True, check=True
-        ).stdout
-        for target in ({}, {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
-    ]
-    assert outputs[0] == outputs[1]
-
-
 FALL = """
 import numba, sys
 before = numba.config.CACHE_DIR
@@ -109,30 +150,46 @@ print(rows[-1, 8], sum(kernel.stats.cache_hits.values()), numba.config.CACHE_DIR
 """
 
 
-def fall(folder, program=FALL, **environment):
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=folder, env=os.environ | environment, capture_output=True, text=True, check=True
-    )
-    return done.stdout.split()
+@pytest.fixture(scope="module")
+def fall():
+    """Simulate a fall with the package of a folder, in a process that has numba but not yet the package.
+
+    Gives the velocity after a step of 1 s, the kernels taken from the cache, and whether numba's own setting is unchanged.
+    """
+    with subprocess.Popen([sys.executable, "-c", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+
+        def run(folder, program=FALL, **environment):
+            server.stdin.write(json.dumps([str(folder), program, environment]) + "\n")
+            server.stdin.flush()
+            found = list(iter(lambda: server.stdout.readline().strip(), "end"))
+            return found[0].split() if found else []
+
+        yield run
+        server.stdin.close()
 
 
-def test_an_edited_source_is_never_served_old(tmp_path):
-    """A second process takes the kernel from disk; after an edit in a file that the kernel only imports, it is compiled anew."""
+@pytest.fixture
+def package(tmp_path):
+    """A folder with a copy of the package and no cache."""
     shutil.copytree(PACKAGE, tmp_path / "reference_impl", ignore=shutil.ignore_patterns("__pycache__"))
-    assert fall(tmp_path) == ["-1.0", "0", "True"]
-    assert fall(tmp_path) == ["-1.0", "1", "True"]
-    step = tmp_path / "reference_impl" / "step.py"
+    return tmp_path
+
+
+def test_edited_source_is_compiled_anew(package, fall):
+    """A second process takes the kernel from the cache; an edit in a file that the kernel only imports makes it stale."""
+    assert fall(package) == ["-1.0", "0", "True"]
+    assert fall(package) == ["-1.0", "1", "True"]
+    step = package / "reference_impl" / "step.py"
     step.write_text(step.read_text().replace("v = v + dt * gravity", "v = v + (2.0 * dt) * gravity"))
-    assert fall(tmp_path) == ["-2.0", "0", "True"]
-    assert fall(tmp_path) == ["-2.0", "1", "True"]
-    law = tmp_path / "reference_impl" / "laws" / "note.py"
+    assert fall(package) == ["-2.0", "0", "True"]
+    assert fall(package) == ["-2.0", "1", "True"]
+    law = package / "reference_impl" / "laws" / "note.py"
     law.write_text(law.read_text() + "# in a folder of the package\n")
-    assert fall(tmp_path) == ["-2.0", "0", "True"]
+    assert fall(package) == ["-2.0", "0", "True"]
 
 
-def test_an_edit_after_the_import_is_not_filed_under_the_new_text(tmp_path):
-    """Old code, imported before an edit, must not serve the processes that import the edited source."""
-    shutil.copytree(PACKAGE, tmp_path / "reference_impl", ignore=shutil.ignore_patterns("__pycache__"))
+def test_source_edited_after_the_import_is_compiled_anew(package, fall):
+    """Kernels of code that was imported before an edit are not served to processes that import the edited source."""
     program = FALL.replace("body = r.Body", "edit()\nbody = r.Body").replace(
         "import numba, sys",
         "import numba, sys, pathlib\n"
@@ -140,12 +197,12 @@ def test_an_edit_after_the_import_is_not_filed_under_the_new_text(tmp_path):
         "    step = pathlib.Path(r.__file__).parent / 'step.py'\n"
         "    step.write_text(step.read_text().replace('v = v + dt * gravity', 'v = v + (2.0 * dt) * gravity'))\n",
     )
-    assert fall(tmp_path, program)[0] == "-1.0"
-    assert fall(tmp_path)[:2] == ["-2.0", "0"]
+    assert fall(package, program)[0] == "-1.0"
+    assert fall(package)[:2] == ["-2.0", "0"]
 
 
-def test_the_users_cache_setting_survives_first_use_in_many_threads():
-    """Kernels declared at once by several threads leave numba's setting as it was."""
+def test_user_s_cache_setting_survives_first_use_in_many_threads():
+    """Kernels declared at once by several threads leave numba's setting unchanged."""
     program = (
         "import sys, numba\nsys.setswitchinterval(1e-6)\nfrom concurrent.futures import ThreadPoolExecutor\n"
         "from reference_impl.kernels import Parts, recording_kernel\nfrom reference_impl import Methods\nbefore = numba.config.CACHE_DIR\n"
@@ -158,18 +215,15 @@ def test_the_users_cache_setting_survives_first_use_in_many_threads():
     assert done.stdout.split() == ["True"]
 
 
-def test_settings_of_numba_are_part_of_the_key(tmp_path):
-    """Kernels compiled under other settings are not taken; the user's own cache folder is used and left set."""
-    shutil.copytree(PACKAGE, tmp_path / "reference_impl", ignore=shutil.ignore_patterns("__pycache__"))
-    own = {"NUMBA_CACHE_DIR": str(tmp_path / "own")}
-    assert fall(tmp_path, **own) == ["-1.0", "0", "True"]
-    assert list((tmp_path / "own").glob("dropspin-*"))
-    assert fall(tmp_path, NUMBA_OPT="1", **own) == ["-1.0", "0", "True"]
-    assert fall(tmp_path, **own) == ["-1.0", "1", "True"]
+def test_kernels_of_other_numba_settings_are_compiled_anew(package, fall):
+    """The cache is in the user's own folder; kernels compiled under other settings are not used."""
+    own = {"NUMBA_CACHE_DIR": str(package / "own")}
+    assert fall(package, **own) == ["-1.0", "0", "True"]
+    assert list((package / "own").glob("dropspin-*"))
+    assert fall(package, NUMBA_OPT="1", **own) == ["-1.0", "0", "True"]
+    assert fall(package, **own) == ["-1.0", "1", "True"]
 
 
-def test_a_cache_that_cannot_be_written_is_done_without(tmp_path):
-    """A folder that cannot be made costs the cache, not the run."""
-    shutil.copytree(PACKAGE, tmp_path / "reference_impl", ignore=shutil.ignore_patterns("__pycache__"))
-    (tmp_path / "a-file").write_text("")
-    assert fall(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "a-file")) == ["-1.0", "0", "True"]
+def test_unwritable_cache_is_no_error(package, fall):
+    (package / "a-file").write_text("")
+    assert fall(package, NUMBA_CACHE_DIR=str(package / "a-file")) == ["-1.0", "0", "True"]

@@ -1,6 +1,7 @@
-"""The contact laws: how much energy they can add, what they keep, what several vertices make of them."""
+"""Impact laws and contacts: how much energy they can add, what they conserve, and impacts of several vertices."""
 
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -49,33 +50,35 @@ def supremum(mu, rho, sticking):
         (1.0, False, STICKS, 1.3333), (1.0, True, STICKS, 2.2857),
     ],
 )  # fmt: skip
-def test_note_s_energy_gain_has_the_known_supremum(mu, solid, friction, published):
-    """A search over shapes, attitudes and motions through the note's own law finds the supremum to 4 digits, never more (measured to 8)."""
+def test_energy_gain_of_the_note_s_law_has_the_known_supremum(mu, solid, friction, published):
+    """A search over shapes, attitudes and motions finds the supremum to 5e-5, and no more (measured 5e-13).
+
+    A rotation about the vertical changes nothing, so two components of the attitude suffice.
+    """
     assert supremum(mu, 7 if solid else 3, friction == STICKS) == pytest.approx(published, abs=2e-4)
 
     def gain(p):
         half = np.exp([p[0], p[1], 0.0])
         inertia = np.diag([half[1] ** 2 + half[2] ** 2, half[2] ** 2 + half[0] ** 2, half[0] ** 2 + half[1] ** 2])
-        R = Rotation.from_rotvec(p[2:5]).as_matrix()
+        R = Rotation.from_rotvec([p[2], 0.0, p[3]]).as_matrix()
         I_inverse = R @ np.linalg.inv(inertia / 3 if solid else inertia) @ R.T
         K = impulse_response(Vec3(*map(float, R @ half)), mat3(I_inverse), 1.0)
-        u = Vec3(float(p[5]), -1.0, float(p[6]))  # the least energy with this contact velocity is u·K⁻¹u/2
+        u = Vec3(float(p[4]), -1.0, float(p[5]))  # the least energy with this contact velocity is u·K⁻¹u/2
         j = note.impulse(K, u, mu, friction)
         after = u + K @ j
         return -dot(after, solve(K, after)) / dot(u, solve(K, u))
 
-    bounds = [(-4, 2), (-4, 2), (-3.2, 3.2), (-3.2, 3.2), (-3.2, 3.2), (-6, 6), (-6, 6)]
-    found = differential_evolution(gain, bounds, seed=2, maxiter=150, popsize=12, tol=1e-8, polish=False)
-    found = minimize(gain, found.x, method="Nelder-Mead", options={"maxiter": 8000, "xatol": 1e-9, "fatol": 1e-12})
+    bounds = [(-4, 2), (-4, 2), (-3.2, 3.2), (-3.2, 3.2), (-6, 6), (-6, 6)]
+    found = differential_evolution(gain, bounds, seed=2, maxiter=60, popsize=6, tol=1e-8, polish=False)
+    found = minimize(gain, found.x, method="Nelder-Mead", options={"maxiter": 8000, "xatol": 1e-8, "fatol": 1e-11, "adaptive": True})
     assert -found.fun == pytest.approx(supremum(mu, 7 if solid else 3, friction == STICKS), rel=5e-5)
     assert -found.fun <= supremum(mu, 7 if solid else 3, friction == STICKS) * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("law", ["normal", "poisson", "clamped"])
 @pytest.mark.parametrize("friction", [0.0, STICKS])
-def test_laws_that_never_add_energy(law, friction):
+def test_law_never_adds_energy(law, friction):
     """100,000 random impacts, inertia ratios to 1e3: at most 1e-12 more energy than before (measured 3e-15)."""
-    impulse = LAWS[law].impulse
     rng = np.random.default_rng(5)
     n = 100_000
     half = 10 ** rng.uniform(-1.5, 0, (n, 3))
@@ -86,6 +89,13 @@ def test_laws_that_never_add_energy(law, friction):
     u = rng.normal(size=(n, 3))
     u[:, 1] = -np.abs(u[:, 1])
     mu = rng.uniform(0, 1, n)
+    assert largest_gain(law)(inverse, r, u, mu, friction) <= 1e-12
+
+
+@cache
+def largest_gain(law):
+    """The compiled largest gain of energy over impacts, relative to the energy before."""
+    impulse = LAWS[law].impulse
 
     @njit
     def worst(inverse, r, u, mu, friction):
@@ -103,23 +113,28 @@ def test_laws_that_never_add_energy(law, friction):
             most = max(most, gained / (0.5 * dot(before, solve(K, before))))
         return most
 
-    assert worst(inverse, r, u, mu, friction) <= 1e-12
+    return worst
 
 
 @pytest.mark.parametrize("friction", [0.3, 1.0, 1.5, 5.0])
-def test_coulomb_adds_no_energy_but_where_eq_17_does(friction):
-    """6,000 random impacts, jamming ones among them: where it slips it loses energy; at restitution 0 it never gains any."""
+def test_coulomb_adds_no_energy_at_restitution_0(friction):
+    """6,000 random impacts, some of which jam. At other restitutions sticking adds energy where eq 17 does."""
+    for K, u in random_approaches(6000):
+        j = coulomb.impulse(K, u, 0.0, friction)
+        gained = 0.5 * dot(j, K @ j) + dot(u, j)
+        assert gained <= 1e-12 * dot(u, solve(K, u))
+
+
+@cache
+def random_approaches(count):
+    """Responses and contact velocities of random impacts, without the points that separate."""
     rng = np.random.default_rng(8)
-    for _ in range(6000):
-        K, u = response(int(rng.integers(1 << 30))), Vec3(*map(float, rng.normal(size=3) - [0.0, 1.0, 0.0]))
-        if u.y < 0.0:
-            j = coulomb.impulse(K, u, 0.0, friction)
-            gained = 0.5 * dot(j, K @ j) + dot(u, j)
-            assert gained <= 1e-12 * dot(u, solve(K, u))
+    drawn = [(response(int(rng.integers(1 << 30))), Vec3(*map(float, rng.normal(size=3) - [0.0, 1.0, 0.0]))) for _ in range(count)]
+    return [(K, u) for K, u in drawn if u.y < 0.0]
 
 
-def test_coulomb_drives_a_contact_that_does_not_slide_yet():
-    """A tilted rod that falls straight: friction of .3 acts against the slip that its landing drives, on the cone or enough to stop it."""
+def test_coulomb_opposes_the_slip_that_the_normal_impulse_drives():
+    """A tilted rod that falls straight does not slide at first; friction of .3 acts on the cone, against that slip."""
     c, s = float(np.cos(np.radians(40))), float(np.sin(np.radians(40)))
     K = impulse_response(Vec3(c, -s, 0.0), mat3(np.eye(3) * 3.0), 1.0)
     j = coulomb.impulse(K, Vec3(0.0, -1.0, 0.0), 0.0, 0.3)
@@ -132,7 +147,7 @@ def test_coulomb_drives_a_contact_that_does_not_slide_yet():
 
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("mu", [0.0, 0.4, 0.9])
-def test_what_each_law_prescribes(seed, mu):
+def test_each_law_prescribes_its_velocity_after_the_impact(seed, mu):
     """Normal: u_n+ = -µ u_n, straight up. Poisson: µ times compression. Clamped: eq 17 where that adds no energy."""
     K, u = response(seed), Vec3(*map(float, [*np.random.default_rng(seed).normal(size=3)]))
     u = Vec3(u.x, -abs(u.y), u.z)
@@ -142,7 +157,7 @@ def test_what_each_law_prescribes(seed, mu):
     assert (u + K @ j).y == pytest.approx(-mu * u.y, rel=1e-12)
     for law in (poisson, clamped, coulomb, note):
         if law is not note:
-            assert law.impulse(K, u, mu, 0.0) == j  # without friction they are one
+            assert law.impulse(K, u, mu, 0.0) == j  # without friction they agree
     compression = -np.array(solve(K, u))
     after = np.array(u + K @ poisson.impulse(K, u, mu, STICKS))
     share = mu * max(compression[1], 0.0) / solve(K, up).y
@@ -160,8 +175,8 @@ def response(seed=0):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_coulomb_slips_in_its_cone_or_sticks(seed):
-    """Sticks, or slips on the cone and against the sliding, which goes on; separates at µ times the approach either way."""
+def test_coulomb_slips_on_the_cone_or_sticks(seed):
+    """Slips on the cone, against a sliding that continues, or sticks; separates at µ times the approach speed in both cases."""
     K, u = response(seed), Vec3(*map(float, [*np.random.default_rng(seed).normal(size=3)]))
     u = Vec3(u.x, -abs(u.y), u.z)
     for friction in (0.05, 0.3, 1.0, 50.0):
@@ -178,13 +193,13 @@ def test_coulomb_slips_in_its_cone_or_sticks(seed):
     assert coulomb.impulse(K, u, 0.5, 0.0) == normal.impulse(K, u, 0.5, 0.0)
 
 
-def test_published_impacts():
+def test_published_energy_gains():
     """A box of corner masses gains a third of its energy under eq 11, a fifth under eq 17 (to 2e-3: three digits of attitude)."""
     half = np.array([0.1, 0.4, 0.8])
     points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
     inertia = reference_impl.vertex_inertia(points, np.full(8, 0.125))
     q = np.array([-0.399, 0.0, 0.503, 0.766])
-    # As published: the attitude as printed, not quite of unit length; the mean of the colliding vertices is one corner.
+    # The attitude as printed, not quite of unit length; the mean of the colliding vertices is one corner.
     for mu, friction, v, w, before, after in (
         (0.0, 0.0, (-1.825, 0, 0.817), (0.186, -1.595, -3.487), 3.97243, 5.27565),
         (0.95, STICKS, (0, -2, 0), (0.186, -1.594, -3.485), 3.97106, 4.75962),
@@ -221,7 +236,7 @@ def random_contacts(n):
 
 
 def test_mean_contact_leaves_vertices_approaching():
-    """Known fault: of impacts with several vertices, a good part leaves one approaching."""
+    """Known fault: more than a fifth of the impacts with several vertices leave one approaching."""
     left, several = 0, 0
     for body, state in random_contacts(200):
         below = np.sum(state[1] + Rotation.from_quat(state[ORIENTATION]).apply(body.points)[:, 1] < 0)
@@ -234,8 +249,8 @@ def test_mean_contact_leaves_vertices_approaching():
 
 
 @pytest.mark.parametrize("friction", [0.2, 1.0])
-def test_sequential_friction_of_one_contact(friction):
-    """A ball that slides: Δv_t = -f (1 + e) |u_n| t, to 1e-10 in each direction, until that would turn it round."""
+def test_sequential_friction_of_a_sliding_ball(friction):
+    """Δv_t = -f (1 + e) |u_n| t, to 1e-9 in each direction."""
     ball = Body(2.0, reference_impl.solid_sphere_inertia(2.0, 0.1), np.zeros((1, 3)), 0.1)
     state = np.array([0, 0.1 - 1e-6, 0, 0, 0, 0, 1, 6.0, -1.0, 8.0, 0, 0, 0])
     for e, threshold in ((0.5, 0.0), (0.0, 2.0)):  # below the threshold there is no restitution
@@ -248,14 +263,14 @@ def test_sequential_friction_of_one_contact(friction):
 @pytest.mark.parametrize(("law", "friction"), [("normal", 0.0), ("coulomb", 0.4), ("coulomb", 1.0)])
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pytest.mark.filterwarnings("ignore:.*not solved")
-def test_sequential_leaves_none(law, friction, e):
-    """No submerged vertex approaches faster than 1e-9 m/s in a step that settled, and no energy is added at restitution 0."""
+def test_sequential_leaves_no_vertex_approaching(law, friction, e):
+    """No submerged vertex approaches faster than 1e-9 m/s after a step that converged; no energy is added at restitution 0."""
     methods = Methods(law=law, contact="sequential")
     for body, state in random_contacts(200):
         simulator = reference_impl.Simulator(body, World(floor=Floor(e, friction)), 1e-9, methods)
         after = simulator.run(state, 1)[1]
         if simulator.unsolved_steps:
-            assert e > 0.0  # at restitution 0 all settle
+            assert e > 0.0  # at restitution 0 all converge
             continue
         assert approach_left_over(state, after, body) <= 1e-9
         if e > 0.0:
@@ -266,26 +281,26 @@ def test_sequential_leaves_none(law, friction, e):
         assert energies[1] <= energies[0] * (1 + 1e-9)
 
 
-def test_sequential_says_when_it_did_not_settle():
-    """Infinite friction at several vertices need not have a solution: each of these steps settles, or says that it did not."""
+def test_sequential_warns_if_it_did_not_converge():
+    """Infinite friction at several vertices need not have a solution; each step converges or warns."""
     from reference_impl import UnsolvedContact
 
-    methods, unsettled = Methods(law="coulomb", contact="sequential"), 0
+    methods, unsolved = Methods(law="coulomb", contact="sequential"), 0
     for body, state in random_contacts(200):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             after = reference_impl.step(state, body, World(floor=Floor(0.0, STICKS)), 1e-9, methods=methods)
         if caught:
-            unsettled += 1
+            unsolved += 1
             assert caught[0].category is UnsolvedContact
             assert "not solved in 1 of 1 steps" in str(caught[0].message)
         else:
             assert approach_left_over(state, after, body) <= 1e-9
-    assert 0 < unsettled < 10
+    assert 0 < unsolved < 10
 
 
 def test_sequential_friction_is_opposite_to_the_slip():
-    """A flat box that turns on four corners: the moment of friction is f M g ρ to 1e-9, though a corner gives way unequally to x and z."""
+    """A flat box that turns on four corners: the moment of friction is f M g ρ to 1e-9, although a corner responds unequally in x and z."""
     points = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.1, 0.1) for z in (-0.2, 0.2)])
     body = Body(1.0, reference_impl.solid_box_inertia(1.0, np.array([0.3, 0.1, 0.2])), points)
     state = np.array([0, 0.1 - 1e-6, 0, 0, 0, 0, 1, 0, 0, 0, 0, 10.0, 0], dtype=float)
@@ -294,8 +309,8 @@ def test_sequential_friction_is_opposite_to_the_slip():
     np.testing.assert_allclose(after[SPIN], [0.0, 10.0 - 1e-3 * slowing, 0.0], atol=1e-9)
 
 
-def test_sequential_falls_flat_as_one():
-    """Four corners at once, restitution 0.5: straight up, no turn."""
+def test_sequential_flat_impact_is_straight_up():
+    """Four corners at once, restitution 0.5: no spin."""
     body = cube(0.1)
     state = np.array([0, 0.099, 0, 0, 0, 0, 1, 0, -2.0, 0, 0, 0, 0], dtype=float)
     after = reference_impl.step(state, body, World(floor=Floor(0.5, 0.0)), 1e-9, methods=Methods(law="normal", contact="sequential"))
@@ -303,7 +318,7 @@ def test_sequential_falls_flat_as_one():
     np.testing.assert_allclose(after[SPIN], 0.0, atol=1e-8)
 
 
-def test_projection_holds_a_cube_at_rest():
+def test_projection_keeps_a_cube_from_sinking():
     """Restitution 0, dt 1/60, 1000 s: the centre stays within 1e-6 m of rest; without correction it sinks."""
     body, world = cube(0.5), World(G, Floor(0.0, STICKS))
     state = np.array([0, 0.5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
@@ -314,9 +329,9 @@ def test_projection_holds_a_cube_at_rest():
 
 
 def test_dropped_cube_sinks_without_projection():
-    """Known fault: a tilted cube dropped at restitution 0 goes on sinking, 0.03 m and more after 300 s at 1/60 s.
+    """Known fault: a tilted cube dropped at restitution 0 sinks by more than 0.03 m in 300 s at 1/60 s.
 
-    Projection keeps it from sinking, not from rocking: at this step it does so for ever, by 5e-3 m.
+    Projection prevents the sinking, not the rocking: at this time step the cube rocks for ever, by 5e-3 m.
     """
     body, world = cube(0.5), World(G, Floor(0.0, STICKS))
     q = Rotation.from_rotvec([0.1, 0.05, 0.2]).as_quat()
@@ -394,8 +409,8 @@ def test_damping_factors_per_step_have_no_limit():
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)
 
 
-def test_what_is_refused():
-    """At the boundary, with the name of the argument, what was given and what is allowed."""
+def test_invalid_arguments_are_rejected():
+    """The message names the argument, the value and what is allowed."""
     body, ok = cube(), np.array([0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
 
     def run(state=ok, b=body, world=World(), dt=1e-3, **options):  # noqa: B008  # an immutable default

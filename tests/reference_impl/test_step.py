@@ -1,4 +1,4 @@
-"""Algorithm 1 as a whole: what it conserves exactly, what it does wrong exactly, what it leaves out."""
+"""Algorithm 1 as a whole: exact solutions of its difference equations, conserved quantities, known faults, and the Python interface."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_synchronised_energy_is_conserved_and_the_raw_one_drifts():
 
 
 def test_eq6_turns_by_twice_the_arctangent_of_half():
-    """The known lag: one step turns 2 atan(|ω| h/2), never |ω| h. Closed form after 100 steps, to 1e-12 rad."""
+    """Known fault: one step turns 2 atan(|ω| h/2) instead of |ω| h. Closed form after 100 steps, to 1e-12 rad."""
     h, speed = 0.05, 6.0
     rows = reference_impl.simulate(state(w=(0, speed, 0)), BODY, World(), h, 100)
     angle = 2 * np.arctan2(rows[:, 4], rows[:, 6])
@@ -58,12 +58,12 @@ def test_without_gyroscopic_term_energy_and_length_of_momentum_look_perfect():
     assert np.ptp(length) <= 1e-12 * length[0]
     direction = np.arccos(np.clip(L @ L[0] / (length * length[0]), -1, 1))
     cone = np.arctan2(np.linalg.norm(np.cross(L[0], rows[0, SPIN])), L[0] @ rows[0, SPIN])
-    assert direction.max() == pytest.approx(2 * cone, rel=1e-5)  # L runs round a cone about ω; 0.753 rad
+    assert direction.max() == pytest.approx(2 * cone, rel=1e-5)  # L describes a cone about ω; 0.753 rad
     assert direction.max() > 0.7
 
 
-def test_eq9_gravity_on_every_vertex_turns_nothing():
-    """Weights at the vertices act as the note's M g: the same motion, no torque."""
+def test_eq9_weights_of_the_vertices_have_no_torque():
+    """They give the same motion as gravity."""
     share = np.full(8, BODY.mass / 8)
     weights = np.outer(share, G)
     tilted = state(q=np.array([0.2, 0.1, -0.3, 0.9]) / np.linalg.norm([0.2, 0.1, -0.3, 0.9]), w=(1, 2, 3))
@@ -73,7 +73,7 @@ def test_eq9_gravity_on_every_vertex_turns_nothing():
 
 
 def test_eq6_torque_of_a_couple():
-    """Two opposite forces at corners: ω changes by h I⁻¹ Σ r × f, v not at all."""
+    """Two opposite forces at corners: ω changes by h I⁻¹ Σ r × f, v does not change."""
     forces = np.zeros((8, 3))
     forces[0], forces[7] = (0, 0, 1.0), (0, 0, -1.0)
     after = reference_impl.step(state(), BODY, World(), 1e-3, forces=forces)
@@ -83,14 +83,14 @@ def test_eq6_torque_of_a_couple():
 
 
 def test_damping_is_exponential_in_time():
-    """Factors exp(-rate h) each step give exp(-rate t), whatever the step."""
+    """Factors exp(-rate h) in each step give exp(-rate t) for any h."""
     for h in (0.1, 0.01):
         rows = reference_impl.simulate(state(v=(1, 0, 0), w=(0, 2, 0)), BODY, World(damping=(0.7, 1.1)), h, round(1 / h))
         assert rows[-1, 7] == pytest.approx(np.exp(-0.7), rel=1e-13)
         assert rows[-1, 11] == pytest.approx(2 * np.exp(-1.1), rel=1e-13)
 
 
-def test_a_part_that_is_none_does_what_a_part_of_no_effect_does():
+def test_absent_part_has_the_bits_of_a_part_without_effect():
     """No gravity, no damping, no floor: the same bits as with zero gravity, no decay and a floor out of reach."""
     start = state(x=(0, 50, 0), v=(1, -2, 3), w=(1, 2, 3))
     without = reference_impl.simulate(start, BODY, World(), 1e-3, 200)
@@ -98,8 +98,8 @@ def test_a_part_that_is_none_does_what_a_part_of_no_effect_does():
     np.testing.assert_array_equal(without, with_all)
 
 
-def test_ball_bounces_at_its_support_point():
-    """A ball is one vertex at -R N; it turns only if it is gripped while it slides."""
+def test_ball_bounces_at_its_lowest_point():
+    """A ball is one vertex at -R N; an impact changes its spin only if it slides on a floor with friction."""
     ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
     start = state(x=(0, 0.1 - 1e-4, 0), v=(2, -3, 0), w=(0, 0, 5))
     smooth = reference_impl.step(start, ball, World(floor=Floor(0.8, 0.0)), 1e-4)
@@ -112,28 +112,26 @@ def test_ball_bounces_at_its_support_point():
 
 
 def test_flat_body_at_rest_sinks_by_one_step_of_gravity():
-    """Known fault: at restitution 0 a flat box rests g h² deep, to 1 % (no position correction)."""
+    """Known fault: at restitution 0 a flat box rests at a depth of g h² (no position correction)."""
     h = 1 / 60
     flat = state(x=(0, 0.2, 0))
     rows = reference_impl.simulate(flat, BODY, World(G, Floor(0.0, np.inf)), h, 600)
     assert 0.2 - rows[-1, 1] == pytest.approx(9.8 * h**2, rel=1e-12)
 
 
-def test_every_kth_row_is_the_kth_row():
-    """Recording less changes nothing that is recorded."""
+def test_recording_fewer_rows_does_not_change_them():
     start, world = state(x=(0, 0.4, 0), v=(1, 0, 0), w=(3, 2, 1)), World(G, Floor(0.5, np.inf))
     all_rows = reference_impl.simulate(start, BODY, world, 1e-3, 1000)
     np.testing.assert_array_equal(reference_impl.simulate(start, BODY, world, 1e-3, 1000, every=7), all_rows[::7])
 
 
-def test_state_of_the_wrong_shape_is_refused():
-    """The boundary says what it wants."""
+def test_state_of_the_wrong_shape_is_rejected():
     with pytest.raises(ValueError, match=r"shape \(13,\) or \(B, 13\), got \(7,\)"):
         reference_impl.step(np.zeros(7), BODY, World(), 1e-3)
 
 
-def test_eq7_and_eq9_in_a_body_that_is_turned():
-    """Forces on the vertices of a tilted box: Δω = h R I⁻¹ Rᵀ Σ R p × f, by NumPy."""
+def test_eq7_and_eq9_for_a_tilted_box():
+    """Forces on the vertices: Δω = h R I⁻¹ Rᵀ Σ R p × f, by NumPy."""
     rng = np.random.default_rng(3)
     q = np.array([0.4, -0.2, 0.5, 0.7])
     q /= np.linalg.norm(q)
@@ -151,8 +149,8 @@ def test_eq7_and_eq9_in_a_body_that_is_turned():
     [({}, False), ({"v": (0, 0, 1)}, True), ({"v": (1, 0, 0)}, True), ({"w": (0, 1e-3, 0)}, True), ({"q": (0.6, 0, 0, 0.8)}, False)],
 )
 @pytest.mark.parametrize("sideways", [(0, 0, 0), (0.1, 0, 0), (0, 0, 0.1)])
-def test_a_ball_is_turned_wherever_something_turns_it(motion, turns, sideways):
-    """On a floor that grips: spin, sliding, or gravity along the floor, in x and in z. Otherwise its attitude stays to the last bit."""
+def test_ball_turns_only_if_it_spins_or_slides(motion, turns, sideways):
+    """With infinite friction: by spin, sliding, or gravity along the floor, in x and in z. Otherwise its attitude keeps every bit."""
     ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
     start = state(x=(0, 0.2, 0), **motion)
     rows = reference_impl.simulate(start, ball, World(G + np.array(sideways), Floor(0.5, np.inf)), 1e-3, 400)
@@ -160,8 +158,8 @@ def test_a_ball_is_turned_wherever_something_turns_it(motion, turns, sideways):
     assert turned == (turns or any(sideways))
 
 
-def test_orientations_are_brought_to_unit_length():
-    """As scene files do it: twice the quaternion is the same attitude, however large or small; one of unit length stays as it is."""
+def test_orientations_are_normalised():
+    """Multiples of a quaternion are the same attitude, for large and small factors; one of unit length keeps every bit."""
     q = np.array([0.1, 0.2, -0.3, 0.9]) / np.linalg.norm([0.1, 0.2, -0.3, 0.9])
     rows = [
         reference_impl.simulate(state(x=(0, 0.4, 0), q=scale * q), BODY, World(G, Floor(0.5, np.inf)), 1e-3, 100)
@@ -172,8 +170,7 @@ def test_orientations_are_brought_to_unit_length():
     np.testing.assert_array_equal(rows[0][0, ORIENTATION], q)
 
 
-def test_what_a_simulator_was_given_may_change_afterwards():
-    """It holds copies; and it can be sent to another process."""
+def test_simulator_holds_copies_and_can_be_pickled():
     import pickle
 
     points = POINTS.copy()
@@ -185,8 +182,8 @@ def test_what_a_simulator_was_given_may_change_afterwards():
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(simulator)).run(start, 400), before)
 
 
-def test_inside_nothing_raises():
-    """Division by 0 and overflow give inf and NaN in compiled code, whatever the state."""
+def test_overflow_in_a_kernel_does_not_raise():
+    """Compiled code continues with inf and NaN."""
     for rotation in ("note", "gyroscopic", "implicit-gyroscopic", "midpoint", "rk4", "symmetric-top", "exact"):
         rows = reference_impl.simulate(state(w=(1e200, 1e200, 0)), BODY, World(), 1.0, 5, methods=reference_impl.Methods(rotation=rotation))
         assert rows.shape == (6, 13)
@@ -214,8 +211,8 @@ def test_inside_nothing_raises():
         (lambda: go(start=state().astype(complex)), "state: got"),
     ],
 )
-def test_odd_arguments(attempt, message):
-    """One clear ValueError, or the right answer; never a crash."""
+def test_invalid_arguments_are_rejected(attempt, message):
+    """With a ValueError that names the argument; a whole number of another type is accepted."""
     if message is None:
         assert attempt().shape == (256, 13)
     else:
@@ -227,8 +224,8 @@ def go(steps=1, every=1, body=BODY, world=None, dt=1e-3, start=None):
     return reference_impl.simulate(state() if start is None else start, body, world or World(), dt, steps, every)
 
 
-def test_collinear_points_have_no_inertia():
-    """Whatever sign rounding gives the moment about their line."""
+def test_inertia_of_collinear_points_is_rejected():
+    """For either sign that rounding gives the moment about their line."""
     rng = np.random.default_rng(0)
     for _ in range(50):
         points = np.outer(rng.normal(size=4), rng.normal(size=3))

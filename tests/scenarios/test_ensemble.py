@@ -1,4 +1,6 @@
-"""The starts of an ensemble: drawn as they should be, the same ones every time, none in the floor."""
+"""The starts of an ensemble: their distribution, their reproducibility, and their height above the floor."""
+
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,16 +16,22 @@ def scene_with(**ensemble):
     return load(content | {"ensemble": {"size": 4000, "seed": 3} | ensemble})
 
 
-def turned(scene):
+@cache
+def orientations(size, largest):
+    """The attitudes of the members."""
+    return Rotation.from_quat([member.start.orientation for member in members(scene_with(size=size, turn=largest))])
+
+
+def turned(size, largest):
     """The rotation vectors from the scene's own attitude to each member's, in the world frame."""
-    own = Rotation.from_quat(scene.start.orientation)
-    return (Rotation.from_quat([member.start.orientation for member in members(scene)]) * own.inv()).as_rotvec()
+    own = Rotation.from_quat(scene_with().start.orientation)
+    return (orientations(size, largest) * own.inv()).as_rotvec()
 
 
 @pytest.mark.parametrize("largest", [np.pi, 1.0, 1e-3])
-def test_rotations_are_drawn_evenly(largest):
-    """Angles have the density 1 - cos θ up to the largest, axes are even on the sphere: Kolmogorov and Smirnov find nothing at 1 %."""
-    vectors = turned(scene_with(turn=largest))
+def test_rotations_are_uniform(largest):
+    """Angles have the density 1 - cos θ up to the largest and axes are uniform on the sphere, by Kolmogorov-Smirnov tests at 1 %."""
+    vectors = turned(4000, largest)
     angles = np.linalg.norm(vectors, axis=1)
 
     def below(angle):
@@ -31,21 +39,21 @@ def test_rotations_are_drawn_evenly(largest):
 
     assert angles.max() <= largest * (1 + 1e-12)
     assert stats.kstest(angles, below).pvalue > 0.01
-    for component in (vectors / angles[:, None]).T:  # Archimedes: each is even in [-1, 1]
+    for component in (vectors / angles[:, None]).T:  # Archimedes: each is uniform in [-1, 1]
         assert stats.kstest(component, stats.uniform(-1, 2).cdf).pvalue > 0.01
 
 
-def test_any_attitude_is_as_likely_as_any_other():
-    """With the default the attitude the scene was written with is forgotten: a body axis points anywhere."""
-    scene = scene_with()
+def test_default_turn_gives_uniform_attitudes():
+    """With the default the scene's own attitude has no influence: each body axis is uniform on the sphere."""
+    assert scene_with().ensemble.turn == np.pi
     for axis in np.eye(3):
-        ends = Rotation.from_quat([member.start.orientation for member in members(scene)]).apply(axis)
+        ends = orientations(4000, np.pi).apply(axis)
         for component in ends.T:
             assert stats.kstest(component, stats.uniform(-1, 2).cdf).pvalue > 0.01
 
 
-def test_rates_and_heights():
-    """Rates even in their ranges about the scene's own; every member as far above the floor as the scene; the same ones again."""
+def test_rates_are_uniform_and_clearances_equal():
+    """Rates are uniform about the scene's; every member has the scene's clearance; a second call gives the same starts."""
     scene = scene_with(size=1000, velocity=[0.5, 0.0, 0.0], angular_velocity=[0.0, 3.0, 0.0])
     drawn = members(scene)
     states = np.array([member.initial_state for member in drawn])
@@ -59,20 +67,19 @@ def test_rates_and_heights():
 
 
 @pytest.mark.parametrize("largest", [1e-9, 1e-7, 1e-3, 0.099, 0.101])
-def test_small_turns_are_drawn_evenly_too(largest):
-    """Where 1 - cos θ is θ²/2 the angle is the largest times the cube root of an even draw: so its cubes are even."""
-    shares = (np.linalg.norm(turned(scene_with(size=2000, turn=largest)), axis=1) / largest) ** 3
+def test_small_rotations_are_uniform(largest):
+    """Where 1 - cos θ is θ²/2 the cube of the angle is uniform."""
+    shares = (np.linalg.norm(turned(2000, largest), axis=1) / largest) ** 3
     assert stats.kstest(shares, "uniform").pvalue > 0.01
 
 
-def test_no_turn():
-    """A largest angle of 0 leaves the attitude as it was."""
+def test_turn_of_zero_keeps_the_attitude():
     scene = scene_with(size=10, turn=0.0)
     assert {member.start.orientation for member in members(scene)} == {scene.start.orientation}
 
 
-def test_what_is_refused():
-    """A scene without an ensemble has no members; an angle beyond half a turn means nothing."""
+def test_invalid_ensembles_are_rejected():
+    """A scene without an ensemble, an angle beyond half a turn, a negative width."""
     with pytest.raises(ValueError, match="no \\[ensemble\\]"):
         members(load("drop-ball"))
     with pytest.raises(SceneError, match=r"ensemble.turn: got 4.0; must be less than or equal to 3.14"):

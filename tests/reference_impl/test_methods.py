@@ -1,0 +1,76 @@
+"""What each method's module declares about itself, and what follows for a choice of methods."""
+
+import math
+
+import numpy as np
+import pytest
+
+import reference_impl.state
+import scenarios.state
+from comparisons.engines import base
+from reference_impl import Body, Floor, Methods, World, simulate
+from reference_impl.methods import COLLIDE, CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+
+LEAVES = [*ROTATIONS.values(), *LAWS.values(), *CONTACTS.values(), *(leaf for leaf in CORRECTIONS.values() if leaf)]
+
+
+@pytest.mark.parametrize("leaf", LEAVES, ids=lambda leaf: leaf.__name__)
+def test_leaf_declares_its_order_lanes_cost_and_source(leaf):
+    assert leaf.ORDER in (1.0, 2.0, 4.0, math.inf, None)
+    assert isinstance(leaf.RUNS_IN_LANES, bool)
+    lines = leaf.__doc__.splitlines()
+    for fact in ("Order: ", "Cost: ", "Source: "):
+        assert any(line.startswith(fact) for line in lines), fact
+    assert any(line.startswith("Lanes: none") for line in lines) == (not leaf.RUNS_IN_LANES)
+
+
+@pytest.mark.parametrize(
+    ("methods", "gravity", "floor", "order"),
+    [
+        (Methods(), False, False, None),
+        (Methods(rotation="rk4"), False, False, 4.0),
+        (Methods(rotation="rk4"), True, False, 1.0),
+        (Methods(rotation="exact"), False, False, math.inf),
+        (Methods(rotation="exact"), True, True, None),
+        (Methods(rotation="midpoint", correction="projection"), False, False, 2.0),
+    ],
+)
+def test_order_is_the_lowest_of_the_parts_that_a_motion_needs(methods, gravity, floor, order):
+    assert methods.order(gravity=gravity, floor=floor) == order
+
+
+def test_ensemble_runs_in_lanes_unless_one_of_its_methods_cannot():
+    assert Methods(rotation="rk4", law="coulomb", correction="projection").runs_in_lanes
+    assert not Methods(rotation="exact").runs_in_lanes
+    assert not Methods(law="normal", contact="sequential").runs_in_lanes
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_laws_without_a_friction_cone_reject_a_finite_coefficient(law):
+    ball = Body(1.0, np.eye(3), np.zeros((1, 3)), 0.1)
+    start, world = [0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0], World(floor=Floor(0.5, 0.3))
+    if LAWS[law].ANY_FRICTION:
+        assert simulate(start, ball, world, 1e-3, 0, methods=Methods(law=law)).shape == (1, 13)
+    else:
+        with pytest.raises(ValueError, match=f"friction: got 0.3; law '{law}' takes 0 and infinity only; use law='coulomb'"):
+            simulate(start, ball, world, 1e-3, 0, methods=Methods(law=law))
+
+
+def test_every_contact_works_with_the_laws_of_its_table_only():
+    assert set(COLLIDE) == set(CONTACTS)
+    with pytest.raises(ValueError, match="contact 'sequential' works with the laws normal, coulomb, not with 'note'"):
+        Methods(contact="sequential")
+
+
+def test_discretisations_shared_with_other_engines_have_the_same_names():
+    """Engines of the same discretisation must agree, so they must name it alike; this package cannot import the names."""
+    assert ROTATIONS["gyroscopic"].DISCRETISATION == base.EXPLICIT_GYROSCOPIC
+    assert ROTATIONS["implicit-gyroscopic"].DISCRETISATION == base.IMPLICIT_GYROSCOPIC
+    assert Methods(rotation="rk4").discretisation(tumbles=False) == base.SEMI_IMPLICIT_EULER
+    assert Methods(rotation="rk4").discretisation(tumbles=True) == "rk4"
+    assert len({leaf.DISCRETISATION for leaf in ROTATIONS.values()}) == len(ROTATIONS)
+
+
+def test_state_layouts_of_the_two_packages_agree():
+    for name in ("POSITION", "ORIENTATION", "VELOCITY", "SPIN"):
+        assert getattr(reference_impl.state, name) == getattr(scenarios.state, name)

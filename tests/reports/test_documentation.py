@@ -1,18 +1,17 @@
-"""The documentation, followed word by word: what it says to type is typed, what it says will be seen is seen; links lead somewhere."""
+"""The documentation, followed step by step: its commands are run, their output is compared with the page, and links are checked."""
 
-import os
 import re
 import shlex
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
 import click
 import pytest
+from support import cli
 
-from reports.commands.main import dropspin
-from scenarios import load
+import dropspin as ds
+from reports.commands.main import COMMANDS, dropspin
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "reference_impl" / "README.md"]
@@ -20,12 +19,12 @@ BLOCK = re.compile(r"^```(?P<kind>python|sh|text|diff)(?: title=\"(?P<file>[\w.]
 
 
 def squeezed(text):
-    """Text with single spaces, whatever the width of a terminal made of it."""
+    """Text with single spaces, without the line breaks of a narrow terminal."""
     return " ".join(text.split())
 
 
 def changed(text, difference):
-    """Text after a difference: the lines that go are there once, and those that come are put in their place."""
+    """Text after a difference; the removed lines must occur once."""
     lines = difference.splitlines(keepends=True)
     old, new = ("".join(line[1:] for line in lines if line.startswith(sign)) for sign in "-+")
     assert text.count(old) == 1, old
@@ -33,8 +32,11 @@ def changed(text, difference):
 
 
 def follow(page, folder):
-    """Do what a page says, block after block."""
-    said, file = "", None
+    """Do what a page says, block after block, and return the exit code of each block of commands.
+
+    The first command is the installed one, in its own process; the others run in this process.
+    """
+    output, file, codes = "", None, []
     for block in BLOCK.finditer((ROOT / "docs" / page).read_text(encoding="utf-8")):
         kind, content = block["kind"], block["content"]
         if kind == "python":
@@ -43,41 +45,45 @@ def follow(page, folder):
         elif kind == "diff":
             file.write_text(changed(file.read_text(encoding="utf-8"), content), encoding="utf-8")
         elif kind == "sh":
-            path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-            done = subprocess.run(
-                ["bash", "-c", content],
-                cwd=folder,
-                env=os.environ | {"PATH": path, "COLUMNS": "200"},
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            assert "Traceback" not in done.stderr
-            said = done.stdout
-            yield done.returncode
+            output = ""
+            for program, *arguments in map(shlex.split, content.splitlines()):
+                assert program == "dropspin"
+                sys.modules.pop("my_engine", None)  # the file may have changed since the last command
+                done = (cli.dropspin if codes else cli.spawn)(*arguments, cwd=folder, COLUMNS="200")
+                assert "Traceback" not in done.stderr
+                output += done.stdout
+            codes.append(done.returncode)
         else:
             for line in content.splitlines():
-                assert squeezed(line) in squeezed(said), said
+                assert squeezed(line) in squeezed(output), output
+    return codes
 
 
-def test_the_tutorial(tmp_path):
-    """Two mistakes fail, mended they do not; the run passes; the harmless change fails the run and the check; without it all holds."""
-    codes = list(follow("tutorial.md", tmp_path))
+@pytest.fixture
+def _no_bytecode(monkeypatch):
+    """Two versions of a module within one second would share their bytecode."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+
+
+@pytest.mark.usefixtures("_no_bytecode")
+def test_tutorial_shows_the_output_and_exit_codes_of_its_commands(tmp_path):
+    """The first check of the adapter fails, the second passes; run and accept pass; the change fails; without it all results hold."""
+    codes = follow("tutorial.md", tmp_path)
     assert codes == [1, 0, 0, 0, 1, 0]
     assert (tmp_path / "out/ball/report.html").exists()
 
 
-def test_calibrating(tmp_path):
-    assert list(follow("calibrate.md", tmp_path)) == [0, 0]
+def test_calibration_page_shows_the_output_of_its_commands(tmp_path):
+    assert follow("calibrate.md", tmp_path) == [0]
 
 
 @pytest.mark.slow
-def test_choosing_a_step(tmp_path):
-    assert list(follow("choose-a-step.md", tmp_path)) == [0, 0]
+def test_page_on_choosing_a_step_shows_the_output_of_its_commands(tmp_path):
+    assert follow("choose-a-step.md", tmp_path) == [0, 0]
 
 
-def test_python_in_the_readme_and_of_the_replay(tmp_path, monkeypatch):
-    """As they stand, one after the other."""
+def test_python_of_the_readme_and_of_the_replay_page_runs(tmp_path, monkeypatch):
+    """One after the other, in one namespace."""
     monkeypatch.chdir(tmp_path)
     names = {}
     for page in (ROOT / "README.md", ROOT / "docs" / "replay.md"):
@@ -87,31 +93,42 @@ def test_python_in_the_readme_and_of_the_replay(tmp_path, monkeypatch):
     assert (tmp_path / "corner.gif").exists()
 
 
-def test_the_readmes_scene():
+def test_scene_of_the_readme_is_valid():
     [scene] = re.findall(r"^```toml\n(.*?)^```$", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
-    assert load(tomllib.loads(scene) | {"name": "mine"}).expect[0].metric == "bounce_height_error"
+    assert ds.load(tomllib.loads(scene) | {"name": "mine"}).expect[0].metric == "bounce_height_error"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_commands_are_known(page):
-    """Whatever a page says to type has verbs and options that there are."""
+def test_commands_of_the_pages_exist_with_their_options(page):
     text = page.read_text(encoding="utf-8")
-    typed = [line for block in BLOCK.finditer(text) if block["kind"] == "sh" for line in block["content"].splitlines()]
-    typed += re.findall("^    (.+)$", text, re.MULTILINE)
-    for line in [found[1] for line in typed if (found := re.match("dropspin (.+)", line))]:
-        verb, *arguments = shlex.split(line, comments=True)
-        command = dropspin.commands[verb]
+    lines = [line for block in BLOCK.finditer(text) if block["kind"] == "sh" for line in block["content"].splitlines()]
+    lines += re.findall("^    (.+)$", text, re.MULTILINE)
+    for line in [found[1] for line in lines if (found := re.match("dropspin (.+)", line))]:
+        name, *arguments = shlex.split(line, comments=True)
+        assert name in COMMANDS, line
+        command = dropspin.get_command(click.Context(dropspin), name)
         command.make_parser(click.Context(command)).parse_args(arguments)
 
 
+def test_reference_documents_every_public_name():
+    text = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^\.\. \S+:: dropspin\.(\w+)$", text, re.MULTILINE)) == ds.__all__
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_somewhere(page):
-    """Files that are named are there, and headings in them too."""
+def test_python_of_the_pages_uses_the_public_interface(page):
+    """No block imports the packages behind it."""
+    blocks = re.findall(r"^```python.*?\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    assert not any(re.search(r"^(import|from) .*\b(comparisons|scenarios)\b", block, re.MULTILINE) for block in blocks)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_existing_files_and_headings(page):
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-    for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", text):  # nothing outside can be reached where tests run
+    for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", text):  # tests do not use the network
         file, _, heading = target.partition("#")
         named = page.parent / file if file else page
-        assert named.exists() or named.name == "catalogue.md", target  # which is made with the documentation
+        assert named.exists() or named.name == "catalogue.md", target  # written by make docs
         if heading:
             headings = re.findall(r"^#+ (.+)$", named.read_text(encoding="utf-8"), re.MULTILINE)
             assert heading in {re.sub(r"[^\w -]", "", one.lower()).replace(" ", "-") for one in headings}, target

@@ -56,13 +56,14 @@ def conform(
     with EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
             try:
-                found.append(processes.call(entry, _run_check, check))
+                found.append(processes.call(entry, run_check, check))
             except Failed as failure:
                 found.append(CheckResult(check, cast(CheckOutcome, failure.verdict), failure.reason))
     return found
 
 
-def _run_check(entry: EngineEntry, check: str) -> CheckResult:
+def run_check(entry: EngineEntry, check: str) -> CheckResult:
+    """Run one check in this process."""
     assert entry.engine is not None
     try:
         return CHECKS[check](entry.engine, check)

@@ -4,6 +4,7 @@ Faults that give the same motion of a probe cannot be distinguished by it. Two f
 """
 
 from collections.abc import Iterable
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -25,16 +26,24 @@ FAULT_MODELS = (*CONVENTIONS, *FLIGHT, *IMPACT)
 def explain_motion(probe: Probe, found: Array) -> FaultModel | None:
     """The fault, or the two, that give an engine's states of a probe, shape (2, 13); None if there are none."""
     # The exact solution of a box on its corner takes too long for thousands of pairs.
+    counts = (1, 2) if probe.scene.floor is None or isinstance(probe.scene.body, Sphere) else (1,)
+    for count in counts:
+        faults, motions = _motions_with_faults(probe, count)
+        if not faults:
+            continue
+        off = np.round(probe.off(found, motions), 3)
+        if off.min() <= 1.0:
+            return faults[int(np.argmin(off))]
+    return None
+
+
+@cache
+def _motions_with_faults(probe: Probe, count: int) -> tuple[list[FaultModel], Array]:
+    """All faults, or pairs of them, whose motion of a probe is known, and these motions, shape (faults, 2, 13)."""
     singly = [fault for fault in FAULT_MODELS if fault.about != "start"]  # the start has a check of its own
     known: Exact = {}
-    for candidates in (singly, _pairs() if probe.scene.floor is None or isinstance(probe.scene.body, Sphere) else ()):
-        motions = [(fault, motion) for fault in candidates if (motion := fault.motion(probe, known)) is not None]
-        if not motions:
-            continue
-        off = np.round(probe.off(found, np.array([motion for _, motion in motions])), 3)
-        if off.min() <= 1.0:
-            return motions[int(np.argmin(off))][0]
-    return None
+    found = [(fault, motion) for fault in (singly if count == 1 else _pairs()) if (motion := fault.motion(probe, known)) is not None]
+    return [fault for fault, _ in found], np.array([motion for _, motion in found])
 
 
 def explain_start(scene: Scenario, state: Array, allowed: float) -> FaultModel | None:

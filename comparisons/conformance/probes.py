@@ -1,4 +1,4 @@
-"""Scenes built to tell one mistake from another: no two axes, frames, sizes or rates are alike in them."""
+"""Probes: scenes built to distinguish the faults of adapters. No two axes, frames, sizes or rates are equal in them."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from scenarios import Scenario, load
 from scenarios.rotations import angle_between_orientations
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 Array = NDArray[np.float64]
 
 DT = 2.5e-4
-"""So short [s] that what an engine's integrator does wrong is small beside what a mistake does."""
+"""The time step [s]; so short that the discretisation error of any engine is small beside the error of a fault."""
 TILT = [0.1825741858350554, 0.3651483716701107, 0.5477225575051661, 0.7302967433402214]  # (1, 2, 3, 4)/√30
 CUBE = {"shape": "box", "half_extents": [0.2, 0.2, 0.2], "mass": 2.7}
 BALL = {"shape": "sphere", "radius": 0.1, "mass": 2.7}
@@ -22,12 +23,12 @@ FALL = {"acceleration": [0.0, -7.0, 0.0]}
 
 @dataclass(frozen=True)
 class Probe:
-    """A scene, and how near an engine must come to its truth.
+    """A scene, and the errors that an engine may have.
 
     Attributes:
-        name: What is looked at.
+        name: The name of its check.
         scene: The scene.
-        allowed: How far off position [m], attitude [rad], velocity [m/s], angular velocity [rad/s] may be; inf: it is not looked at.
+        allowed: The largest errors of position [m], attitude [rad], velocity [m/s], angular velocity [rad/s]; inf where not compared.
     """
 
     name: str
@@ -36,27 +37,25 @@ class Probe:
 
     @property
     def times(self) -> Array:
-        """When it is looked at [s]: half way and at the end."""
+        """The times of comparison [s]: half of the duration and the end."""
         return DT * self.rows
 
     @property
     def rows(self) -> Array:
-        """The steps after which it is looked at."""
+        """The steps after which states are compared."""
         steps = self.scene.steps(DT)
         return np.array([steps // 2, steps])
 
-    def off(self, found: Array, meant: Array) -> Array:
-        """How far states, shape (2, 13), are from others, shape (..., 2, 13), over what is allowed; infinite where they are no numbers."""
-        worst = np.max(differences(found, meant) / np.array(self.allowed), axis=-1)
+    def off(self, found: Array, expected: Array) -> Array:
+        """The largest difference of states, shape (2, 13), from others, shape (..., 2, 13), over the allowed one; inf if not finite."""
+        worst = np.max(differences(found, expected) / np.array(self.allowed), axis=-1)
         return np.where(np.isfinite(worst), worst, np.inf)
 
 
-def differences(found: Array, meant: Array) -> Array:
-    """The largest difference of position [m], attitude [rad], velocity [m/s], angular velocity [rad/s] between states, shape (..., 4)."""
-    position, velocity, spin = (
-        np.linalg.norm(found[..., part] - meant[..., part], axis=-1) for part in (slice(0, 3), slice(7, 10), slice(10, 13))
-    )
-    turned = angle_between_orientations(found[..., 3:7], meant[..., 3:7])
+def differences(found: Array, expected: Array) -> Array:
+    """The largest differences of position [m], attitude [rad], velocity [m/s], angular velocity [rad/s], shape (..., 4)."""
+    position, velocity, spin = (np.linalg.norm(found[..., part] - expected[..., part], axis=-1) for part in (POSITION, VELOCITY, SPIN))
+    turned = angle_between_orientations(found[..., ORIENTATION], expected[..., ORIENTATION])
     return np.stack([position, turned, velocity, spin], axis=-1).max(axis=-2)
 
 

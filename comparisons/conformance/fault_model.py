@@ -1,0 +1,127 @@
+"""A fault that an adapter may have: the scene that it simulates instead, the states that it reports instead, and the message."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.conformance.probes import Probe
+from scenarios import DropspinError, Scenario, truth_for
+from scenarios.state import ORIENTATION
+
+Array = NDArray[np.float64]
+Simulated = Callable[[Scenario], Scenario]
+"""From the scene given to an adapter to the one that it simulates."""
+Reported = Callable[[Array], Array]
+"""From states to those that an adapter reports, shape (n, 13)."""
+Change = Callable[[Array, Array], Array]
+"""From a part of states and their orientations to the changed part."""
+Exact = dict[Scenario, Array | None]
+"""The exact states of scenes at a probe's times, shape (2, 13); None for a scene without an exact solution at all of them."""
+
+
+def unchanged_scene(scene: Scenario) -> Scenario:
+    """The scene itself."""
+    return scene
+
+
+def unchanged_states(states: Array) -> Array:
+    """The states themselves."""
+    return states
+
+
+@dataclass(frozen=True)
+class FaultModel:
+    """One fault.
+
+    Attributes:
+        message: The fault, and what is expected.
+        simulated: The scene that is simulated instead.
+        reported: The states that are reported instead, shape (n, 13).
+        is_peculiarity: Whether it is a peculiarity of the engine, not a fault of its adapter.
+        about: What it is a fault of; two faults of the same thing are not combined.
+    """
+
+    message: str
+    simulated: Simulated = unchanged_scene
+    reported: Reported = unchanged_states
+    is_peculiarity: bool = False
+    about: str = ""
+
+    def motion(self, probe: Probe, known: Exact) -> Array | None:
+        """The states of a probe with this fault, shape (2, 13); None without an exact solution.
+
+        Many faults simulate the same scene: `known` holds the exact states found before, and receives those found now.
+        """
+        try:
+            scene = self.simulated(probe.scene)
+            if scene not in known:
+                known[scene] = _exact_states(scene, probe.times)
+        except (DropspinError, ValueError):  # the body is impossible, or starts below the floor
+            return None
+        states = known[scene]
+        return None if states is None else self.reported(states)
+
+    def start(self, scene: Scenario) -> Array:
+        """The state at the start with this fault, shape (13,)."""
+        return self.reported(self.simulated(scene).initial_state[None])[0]
+
+    def and_also(self, other: "FaultModel") -> "FaultModel":
+        """Both faults together."""
+        return FaultModel(
+            f"{self.message}; and {other.message}",
+            lambda scene: other.simulated(self.simulated(scene)),
+            lambda states: self.reported(other.reported(states)),  # the reverse order
+            is_peculiarity=self.is_peculiarity and other.is_peculiarity,
+        )
+
+
+def _exact_states(scene: Scenario, times: Array) -> Array | None:
+    truth = truth_for(scene)
+    return None if truth is None or not truth.covers(times).all() else truth(times).states
+
+
+def faults_of(about: str, *faults: tuple[str, Simulated]) -> list[FaultModel]:
+    """Faults of one thing in the scene that is simulated, each a message and a change of the scene."""
+    return [FaultModel(message, simulated, about=about) for message, simulated in faults]
+
+
+def changed_table(part: str, **values: Any) -> Simulated:
+    """The scene with some values of a table changed, if it has that table; a callable is applied to the old value."""
+
+    def changed(scene: Scenario) -> Scenario:
+        table = getattr(scene, part)
+        if table is None:
+            return scene
+        given = table.model_dump() | {key: value(getattr(table, key)) if callable(value) else value for key, value in values.items()}
+        return scene.model_copy(update={part: type(table).model_validate(given)})
+
+    return changed
+
+
+def changed_start(change: Reported) -> Simulated:
+    """The scene with its start changed like a state."""
+    return lambda scene: scene.starting_at(change(scene.initial_state[None])[0])
+
+
+def changed_part(part: slice, change: Change) -> Reported:
+    """States with a part changed, by a function of the part and of the orientations."""
+
+    def changed(states: Array) -> Array:
+        states = states.copy()
+        states[:, part] = change(states[:, part], states[:, ORIENTATION])
+        return states
+
+    return changed
+
+
+def axis_names(order: tuple[int, ...]) -> str:
+    """Axes in an order, as text."""
+    return ", ".join("xyz"[axis] for axis in order)
+
+
+def moments_of_inertia(scene: Scenario) -> tuple[float, ...]:
+    """Moments of inertia about the body's own axes, without products of inertia."""
+    return tuple(np.diag(scene.body.inertia_tensor).tolist())

@@ -1,0 +1,22 @@
+"""The outcome of a conformance check, and the exceptions by which a check ends early."""
+
+from typing import Literal, NamedTuple
+
+CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]
+"""`noted` is a peculiarity of the engine: the adapter is right."""
+
+
+class CheckResult(NamedTuple):
+    """The outcome of one check, and a message."""
+
+    check: str
+    outcome: CheckOutcome
+    message: str
+
+
+class CheckFailed(Exception):
+    """The adapter is wrong; the text says what is wrong, and what is expected."""
+
+
+class Declined(Exception):
+    """The engine declines all scenes that a check needs."""

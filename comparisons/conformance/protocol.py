@@ -1,0 +1,177 @@
+"""Checks of the engine protocol: what the class claims, which scenes it declines, what it builds, and that its methods agree.
+
+These checks call `prepare`, `advance`, `state` and `record` themselves, because that is what they test.
+"""
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.conformance.explanations import explain_start
+from comparisons.conformance.outcomes import CheckFailed, CheckResult
+from comparisons.conformance.probes import DT, PROBES
+from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene
+from comparisons.engines.base import Diverged, Engine
+from comparisons.running.verification import ULPS, BuildMismatch, verified_record, verify_build, verify_start
+from scenarios import Scenario, load, names
+
+Array = NDArray[np.float64]
+
+SEVERAL = 3
+ROUNDING = 1e-9
+"""Relative to the largest number: by how much `record` and `advance` may differ, which is noted."""
+ASYMMETRIC = next(probe.scene for probe in PROBES if probe.name == "tumbling")
+"""A scene whose start has no two equal numbers."""
+
+
+def check_claims(engine: Engine, check: str) -> CheckResult:
+    """The class has a valid order and precision."""
+    order = engine.order
+    if not (order is None or (isinstance(order, int | float) and order > 0)):
+        raise CheckFailed(f"order is {order!r}; it must be None (no claim), a number above 0, or inf (exact)")
+    if engine.precision not in (np.float32, np.float64):
+        raise CheckFailed(f"precision is {engine.precision!r}; it must be numpy.float64 or numpy.float32")
+    return CheckResult(check, "passed", f"order {order if order is not None else 'not claimed'}, {np.dtype(engine.precision).name}")
+
+
+def check_refusals(engine: Engine, check: str) -> CheckResult:
+    """Scenes are declined with a reason, and not all of them."""
+    scenes = [load(name) for name in names()]
+    for scene in [*scenes, *(probe.scene for probe in PROBES)]:
+        answer = engine.declines(scene)
+        again = engine.declines(scene)
+        if answer != again:
+            raise CheckFailed(f"declines({scene.name}) returns {answer!r}, then {again!r}; it must return the same each time")
+        if not (answer is None or (isinstance(answer, str) and answer.strip())):
+            raise CheckFailed(f"declines({scene.name}) returns {answer!r}; it must return None, or the reason as a sentence")
+    declined = sum(engine.declines(scene) is not None for scene in scenes)
+    if declined == len(scenes):
+        raise CheckFailed(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.declines(scenes[0])}")
+    return CheckResult(check, "passed", f"{len(scenes) - declined} scenes of the catalogue are accepted, {declined} declined with a reason")
+
+
+def check_builds(engine: Engine, check: str) -> CheckResult:
+    """The built simulation equals the scene, for the probes and for every scene of the catalogue."""
+    read_back = 0
+    for scene in [ASYMMETRIC, *(probe.scene for probe in PROBES), *(load(name) for name in names())]:
+        if engine.declines(scene) is not None:
+            continue
+        try:
+            read_back += _verify_built(engine, scene)
+        except (CheckFailed, BuildMismatch) as wrong:
+            raise CheckFailed(f"{scene.name}: {wrong}") from None
+        except Diverged:
+            raise
+        except Exception as error:
+            raise CheckFailed(
+                f"{scene.name}: {type(error).__name__}: {error}; decline scenes that the engine cannot run, with a reason"
+            ) from error
+    if not read_back:
+        return CheckResult(check, "passed", "the start equals the scene's; as_built() returns no mass, inertia and gravity to compare")
+    return CheckResult(check, "passed", f"start, mass, inertia and gravity equal the scene's to {ULPS} ulp")
+
+
+def _verify_built(engine: Engine, scene: Scenario) -> bool:
+    """Verify what an engine built of a scene; whether it reads back mass, inertia and gravity."""
+    with engine.prepare(scene, DT) as simulation:
+        state = simulation.state()
+        if not (isinstance(state, np.ndarray) and state.shape == (13,) and np.isrealobj(state)):
+            raise CheckFailed(f"state() returns {_kind(state)}; it must return an array of 13 real numbers, shape (13,)")
+        if not np.isfinite(state).all():
+            raise CheckFailed(f"the state at the start is not finite: {state.tolist()}")
+        try:
+            verify_start(engine, scene, state)
+        except BuildMismatch as error:
+            raise CheckFailed(_start_explained(engine, scene, state) or str(error)) from None
+        verify_build(engine, scene, simulation)
+        verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        return simulation.as_built() is not None
+
+
+def _start_explained(engine: Engine, scene: Scenario, state: Array) -> str:
+    """The fault that gives this start, as a message; empty if none is known."""
+    single = float(ULPS * np.finfo(np.float32).eps)
+    near = np.abs(state - scene.initial_state).max() <= single * np.abs(scene.initial_state).max()
+    if engine.precision is np.float64 and near and np.array_equal(state, np.float32(state)):
+        return "the state has single precision only; declare precision = numpy.float32, or pass the start on in double precision"
+    fault = explain_start(scene, state, single)
+    return "" if fault is None else fault.message
+
+
+def check_record(engine: Engine, check: str) -> CheckResult:
+    """`record` and `advance` take the same steps."""
+    scene = accepted_scene(engine)
+    with engine.prepare(scene, DT) as simulation:
+        rows = verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
+        end = simulation.state().copy()
+    with engine.prepare(scene, DT) as simulation:
+        sparse = verified_record(simulation.record(A_FEW_STEPS, every=SEVERAL), 1 + A_FEW_STEPS // SEVERAL)
+    with engine.prepare(scene, DT) as simulation:
+        one_by_one = [simulation.state().copy()]
+        for _ in range(A_FEW_STEPS):
+            simulation.advance(1)
+            one_by_one.append(simulation.state().copy())
+        again = verified_record(simulation.record(SEVERAL), 1 + SEVERAL)
+    stepped = np.array(one_by_one)
+    with engine.prepare(scene, DT) as simulation:
+        simulation.advance(SEVERAL)
+        _verify_equal(simulation.state(), stepped[SEVERAL], f"advance({SEVERAL}) differs from {SEVERAL} calls of advance(1)")
+    if engine.precision is np.float64 and np.array_equal(stepped[1:], np.float32(stepped[1:])):
+        raise CheckFailed(
+            "states after the start have single precision only; declare precision = numpy.float32, or return them in double precision"
+        )
+    _verify_equal(rows[0], stepped[0], "record's first row differs from the state before any step, which it must be")
+    _verify_equal(rows, stepped, f"record({A_FEW_STEPS}) differs from {A_FEW_STEPS} times advance(1) and state()")
+    if _difference(sparse, rows[::SEVERAL]) > ROUNDING and _difference(sparse, rows[: len(sparse)]) <= ROUNDING:
+        raise CheckFailed(f"record ignores `every`: with every={SEVERAL} its rows are one step apart")
+    _verify_equal(sparse, rows[::SEVERAL], f"record with every={SEVERAL} differs from each third row with every=1")
+    _verify_equal(rows[-1], end, "after record, state() differs from the last row")
+    _verify_equal(again[0], stepped[-1], "a second record does not begin at the current state")
+    if not np.array_equal(rows, stepped):
+        return CheckResult(check, "noted", f"record and advance differ by rounding, {_difference(rows, stepped):.1g}")
+    return CheckResult(check, "passed", "record and advance take the same steps, bit for bit")
+
+
+def _verify_equal(found: Array, expected: Array, message: str) -> None:
+    difference = _difference(found, expected)
+    if not difference <= ROUNDING:
+        raise CheckFailed(f"{message} (relative difference {difference:.2g})")
+
+
+def _difference(found: Array, expected: Array) -> float:
+    """The largest difference relative to the largest number; infinite if one is not finite."""
+    difference = float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
+    return difference if np.isfinite(difference) else float("inf")
+
+
+def check_states(engine: Engine, check: str) -> CheckResult:
+    """A state that was returned does not change."""
+    scene = accepted_scene(engine, "tumbling", "turning", "falling straight", "coasting")
+    with engine.prepare(scene, DT) as simulation:
+        state = simulation.state()
+        before = state.copy()
+        simulation.advance(A_FEW_STEPS)
+        if not np.array_equal(state, before):
+            raise CheckFailed("state() returns the engine's own memory, which changes with the next step; return a copy")
+        if np.array_equal(simulation.state(), before):
+            raise CheckFailed(f"the state is the same after {A_FEW_STEPS} steps: the body does not move, or state() returns the start")
+    return CheckResult(check, "passed", "returned states do not change")
+
+
+def check_settings(engine: Engine, check: str) -> CheckResult:
+    """Results can be stored with the settings."""
+    with engine.prepare(accepted_scene(engine), DT) as simulation:
+        settings = simulation.settings
+    try:
+        json.dumps(dict(settings), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise CheckFailed(f"settings cannot be written as JSON: {error}") from None
+    if "version" not in settings:
+        return CheckResult(check, "noted", "settings has no 'version'; add the engine's version, with which results are stored")
+    return CheckResult(check, "passed", f"version {settings['version']}, {len(settings) - 1} settings")
+
+
+def _kind(found: Any) -> str:
+    return f"an array of {found.dtype}, shape {found.shape}" if isinstance(found, np.ndarray) else f"a {type(found).__name__}"

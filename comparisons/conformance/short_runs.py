@@ -1,0 +1,57 @@
+"""Short runs of an engine for the checks: the choice of a scene that it accepts, and the states of a few steps."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.conformance.outcomes import Declined
+from comparisons.conformance.probes import DT, PROBES
+from comparisons.engines.base import Engine
+from comparisons.running.recording import record
+from scenarios import Scenario, truth_for
+
+Array = NDArray[np.float64]
+
+A_FEW_STEPS = 24
+RICHEST = ("corner", "bouncing ball", "tumbling", "turning", "falling straight", "coasting")
+"""Names of probes, those that involve most of an engine first."""
+
+
+def accepted_scene(engine: Engine, *preferred: str) -> Scenario:
+    """The first of some probes' scenes that an engine accepts; by default of `RICHEST`, beginning shortly before an impact.
+
+    Raises:
+        Declined: The engine accepts none of them.
+    """
+    probes = {probe.name: probe for probe in PROBES}
+    refusal = None
+    for name in preferred or RICHEST:
+        scene = probes[name].scene
+        refusal = engine.declines(scene)
+        if refusal is None:
+            return scene if preferred else _shortly_before_contact(scene)
+    raise Declined(f"the engine declines {', '.join(preferred or RICHEST)}: {refusal}")
+
+
+def _shortly_before_contact(scene: Scenario) -> Scenario:
+    """The scene, started so late that a few steps reach the floor, if it has one."""
+    truth = truth_for(scene)
+    if truth is None or not truth.events:
+        return scene
+    return scene.starting_at(truth(truth.events[0].time - 5.5 * DT).states[0])
+
+
+def recorded(engine: Engine, scene: Scenario, dt: float = DT) -> Array:
+    """The states of a few recorded steps, shape (1 + A_FEW_STEPS, 13)."""
+    few = scene.model_copy(update={"duration": (A_FEW_STEPS + 0.5) * dt})
+    return record(engine, few, dt, verify=False).motion.states
+
+
+def advanced(engine: Engine, scene: Scenario, between: Callable[[], None] = lambda: None) -> Array:
+    """The state after a few steps in two calls, with something else between them, shape (13,)."""
+    with engine.prepare(scene, DT) as simulation:
+        simulation.advance(A_FEW_STEPS // 2)
+        between()
+        simulation.advance(A_FEW_STEPS - A_FEW_STEPS // 2)
+        return simulation.state().copy()

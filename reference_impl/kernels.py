@@ -128,19 +128,24 @@ def blocks(array: Array, width: int) -> Array:
     return np.ascontiguousarray(array) if width == 1 else lanes.side_by_side(array)
 
 
-def compile_cached(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a kernel: IEEE rules (1/0 is inf), no reassociation, without the GIL, cached on disk where that is writable."""
-    with _cache_folder() as writable:
+def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callable[..., Any]:
+    """Compile a kernel: IEEE rules (1/0 is inf), no reassociation, Python's lock let go, kept on disk where that can be written.
+
+    Args:
+        function: The kernel.
+        other_sources: The files outside this package that it consists of.
+    """
+    with _cache_folder(other_sources) as writable:
         return njit(nogil=True, error_model="numpy", cache=writable)(function)
 
 
 @contextmanager
-def _cache_folder() -> Iterator[bool]:
-    """Set numba's cache directory to this package's folder while a kernel is declared, then restore the user's setting."""
+def _cache_folder(other_sources: tuple[Path, ...]) -> Iterator[bool]:
+    """Point numba at this package's own folder while a kernel is declared; the user's setting is left as it was."""
     with _declaring:
         kept = config.CACHE_DIR
         base = Path(kept) if kept else sources.PACKAGE / "__pycache__"
-        folder = base / f"dropspin-{_fingerprint()}"
+        folder = base / f"dropspin-{_fingerprint(other_sources)}"
         try:
             _make_room(folder)
             config.CACHE_DIR = str(folder)
@@ -164,9 +169,11 @@ def _make_room(folder: Path) -> None:
         shutil.rmtree(stale, ignore_errors=True)
 
 
-def _fingerprint() -> str:
-    """A hash of every source file of the package, of the compilers' versions, and of the settings that change what they compile."""
+def _fingerprint(other_sources: tuple[Path, ...]) -> str:
+    """A hash of all source files, of the compilers' versions, and of the settings that change what they compile."""
     digest = hashlib.sha256(f"{sources.HASH} {numba.__version__} {llvmlite.__version__}".encode())
+    for source in other_sources:
+        digest.update(source.read_bytes())
     for name in COMPILER_SETTINGS:
         digest.update(f"{name}={getattr(config, name, None)}".encode())
     return digest.hexdigest()[:16]

@@ -1,28 +1,49 @@
-"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory; principal axes of an inertia tensor."""
+"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory; the principal axes of its inertia.
+
+Functions of a scene and a motion call those that end in `_of`. These hold the formulas, on components: of one state, or of arrays of
+states. They are plain arithmetic, so that they can be compiled for many bodies; the result has the same bits.
+"""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.model import Scenario
-from scenarios.rotations import dot, rotate, unrotate
 from scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+Components = tuple[Any, ...]
+"""The components of a vector or quaternion: numbers or arrays. A tensor is a tuple of the components of its rows."""
 
 
 def angular_momentum(scene: Scenario, motion: Trajectory) -> Array:
-    """L = R I Rᵀ ω about the centre of mass, world frame [kg m²/s], shape (n, 3); I ω, independent of R, for three equal moments."""
-    inertia = scene.body.inertia_tensor
-    if np.array_equal(inertia, inertia[0, 0] * np.eye(3)):
-        return inertia[0, 0] * motion.angular_velocity
-    spin = unrotate(motion.orientation, motion.angular_velocity)
-    return rotate(motion.orientation, spin @ inertia)
+    """L = R I Rᵀ ω about the centre of mass, world frame [kg m²/s], shape (n, 3)."""
+    momentum = angular_momentum_of(_tensor(scene), _components(motion.orientation), _components(motion.angular_velocity))
+    return np.stack(momentum, axis=-1)
+
+
+def angular_momentum_of(inertia: Components, orientation: Components, spin: Components) -> Components:
+    """L = R I Rᵀ ω; I ω, independent of the attitude, where I is a multiple of the unit tensor."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia
+    if xx == yy == zz and xy == xz == yx == yz == zx == zy == 0.0:
+        return xx * spin[0], xx * spin[1], xx * spin[2]
+    x, y, z, w = orientation
+    a, b, c = rotated((-x, -y, -z, w), spin)
+    return rotated(orientation, (a * xx + b * yx + c * zx, a * xy + b * yy + c * zy, a * xz + b * yz + c * zz))
 
 
 def kinetic_energy(scene: Scenario, motion: Trajectory) -> Array:
     """M v²/2 + ω·L/2 [J], shape (n,)."""
-    linear = 0.5 * scene.body.mass * dot(motion.velocity, motion.velocity)
-    return linear + 0.5 * dot(motion.angular_velocity, angular_momentum(scene, motion))
+    orientation, velocity, spin = map(_components, (motion.orientation, motion.velocity, motion.angular_velocity))
+    found: Array = kinetic_energy_of(scene.body.mass, _tensor(scene), orientation, velocity, spin)
+    return found
+
+
+def kinetic_energy_of(mass: float, inertia: Components, orientation: Components, velocity: Components, spin: Components) -> Any:
+    """M v²/2 + ω·L/2."""
+    momentum = angular_momentum_of(inertia, orientation, spin)
+    return 0.5 * mass * scalar_product(velocity, velocity) + 0.5 * scalar_product(spin, momentum)
 
 
 def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Array:
@@ -31,10 +52,26 @@ def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Ar
     The synchronised energy takes a staggered engine's velocity at the time of its position, to first order: E* = E + lag M g·v.
     Semi-implicit Euler conserves E* exactly in free fall, and E only to first order in dt.
     """
-    mass, g = scene.body.mass, scene.acceleration
-    origin = np.array([0.0, scene.body.resting_height, 0.0]) if scene.floor else np.array(scene.start.position)
-    total = kinetic_energy(scene, motion) - mass * (motion.position - origin) @ g
-    return total + motion.velocity_lag * mass * motion.velocity @ g if synchronised else total
+    position, velocity, origin, gravity = map(_components, (motion.position, motion.velocity, energy_origin(scene), scene.acceleration))
+    lag = motion.velocity_lag if synchronised else 0.0
+    found: Array = energy_of(kinetic_energy(scene, motion), scene.body.mass, position, velocity, origin, gravity, lag)
+    return found
+
+
+def energy_of(
+    kinetic: Any, mass: float, position: Components, velocity: Components, origin: Components, gravity: Components, lag: float
+) -> Any:
+    """E* = E_kin - M g·(x - origin) + lag M g·v."""
+    x, y, z = position
+    vx, vy, vz = velocity
+    raised = (mass * (x - origin[0]), mass * (y - origin[1]), mass * (z - origin[2]))
+    lagging = (lag * mass * vx, lag * mass * vy, lag * mass * vz)
+    return kinetic - scalar_product(raised, gravity) + scalar_product(lagging, gravity)
+
+
+def energy_origin(scene: Scenario) -> Array:
+    """Where the potential energy is 0 [m], shape (3,): at rest on the floor, or at the start."""
+    return np.array([0.0, scene.body.resting_height, 0.0]) if scene.floor else np.array(scene.start.position)
 
 
 def apex(scene: Scenario, motion: Trajectory) -> Array:
@@ -45,8 +82,43 @@ def apex(scene: Scenario, motion: Trajectory) -> Array:
 
 def lowest_height(scene: Scenario, motion: Trajectory) -> Array:
     """Height of the body's lowest point above the floor [m], shape (n,)."""
-    corners = rotate(motion.orientation[:, None, :], scene.body.vertices[None, :, :])
-    return motion.position[:, 1] + corners[:, :, 1].min(axis=1) - scene.body.rounding
+    orientation, lowest = _components(motion.orientation), np.full(len(motion), np.inf)
+    for vertex in scene.body.vertices.tolist():
+        np.minimum(lowest, offset_of(orientation, vertex), out=lowest)
+    return motion.position[:, 1] + lowest - scene.body.rounding
+
+
+def offset_of(orientation: Components, vertex: Components) -> Any:
+    """Height of a vertex above the centre of mass: the vertical component of `rotated`, without the two others."""
+    x, y, z, w = orientation
+    a, b, c = vertex
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return b + w * ty + (z * tx - x * tz)
+
+
+def rotated(orientation: Components, vector: Components) -> Components:
+    """A vector in the world frame, of a body-frame one: `rotations.rotate` by components."""
+    x, y, z, w = orientation
+    a, b, c = vector
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return a + w * tx + (y * tz - z * ty), b + w * ty + (z * tx - x * tz), c + w * tz + (x * ty - y * tx)
+
+
+def scalar_product(a: Components, b: Components) -> Any:
+    """A · b, summed in the order of `rotations.dot`."""
+    return a[0] * b[0] + a[2] * b[2] + a[1] * b[1]
+
+
+FORMULAS = (angular_momentum_of, kinetic_energy_of, energy_of, offset_of, rotated, scalar_product)
+"""The functions that can be compiled."""
+
+
+def _components(array: Array) -> Components:
+    return tuple(array[..., component] for component in range(array.shape[-1]))
+
+
+def _tensor(scene: Scenario) -> Components:
+    return tuple(map(tuple, scene.body.inertia_tensor.tolist()))
 
 
 def is_diagonal(tensor: Array) -> bool:

@@ -13,10 +13,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.measuring.motions import Motions
 from scenarios import Scenario, Trajectory, Truth
 from scenarios.mechanics import angular_momentum, energy, kinetic_energy
 from scenarios.model import TOUCHING
-from scenarios.rotations import length, rotate
+from scenarios.rotations import rotate
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -87,9 +88,19 @@ class Comparison:
         return self.motion[: len(self.exact)]
 
     @cached_property
+    def motions(self) -> Motions:
+        """The motion, for what is measured without a reference."""
+        return Motions.of(self.scene, self.motion)
+
+    @cached_property
     def energy(self) -> Array:
         """Of the motion, velocity synchronised with position [J], shape (n,)."""
-        return energy(self.scene, self.motion)
+        return self.motions.energy
+
+    @property
+    def lowest_height(self) -> Array:
+        """Of the body's lowest point above the floor [m], shape (n,)."""
+        return self.motions.lowest_height
 
     @cached_property
     def exact_energy(self) -> Array:
@@ -158,21 +169,22 @@ class Comparison:
         apart = np.abs(self.compared.position[rows, 1] - self.exact.position[rows, 1]).max(initial=0.0)
         return high > TOUCHING * self.scene.body.size and bool(apart > 0.5 * high)
 
+    @property
+    def first_flight_end(self) -> int:
+        """The last row of the first flight that is compared."""
+        return int(self.flights[0][-1])
+
     @cached_property
     def energy_scale(self) -> float:
-        """The energy the scene plays with [J]: M g H down to the floor or the start's kinetic energy, whichever is larger.
-
-        H is the body's size for one that starts on the floor. Without a floor it is the reference's largest kinetic energy.
+        """The scene's energy [J]: `Motions.energy_scale`; without a floor, the reference's largest kinetic energy.
 
         Raises:
             Unresolved: There is no energy at all.
         """
-        weight = self.scene.body.mass * float(np.linalg.norm(self.scene.acceleration))
         if self.scene.floor is None and self.reference is not None:
             scale = float(kinetic_energy(self.scene, self.reference).max())
         else:
-            height = self.scene.clearance if self.scene.starts_above_floor else self.scene.body.size
-            scale = max(weight * height, float(kinetic_energy(self.scene, self.motion[:1])[0]))
+            scale = float(self.motions.energy_scale)
         if scale == 0.0:
             raise Unresolved("nothing moves and nothing pulls: there is no energy to measure by")
         return scale
@@ -180,25 +192,13 @@ class Comparison:
     @cached_property
     def first_contact(self) -> tuple[int, int] | None:
         """The rows just before and just after the floor first changes the velocity, or None."""
-        if self.scene.floor is None or not self.touching.any():
-            return None
-        first = int(np.argmax(self.touching))
-        free = np.flatnonzero(~self.touching[first:])
-        return first, first + int(free[0]) if len(free) else len(self.motion) - 1
+        before, after = self.motions.first_contact
+        return None if before < 0 else (int(before), int(after))
 
-    @cached_property
+    @property
     def touching(self) -> NDArray[np.bool_]:
-        """In which steps the floor changes the velocity, shape (n - 1,).
-
-        Without contact, a step changes the velocity by gravity and damping alone. What is left over counts as contact above
-        1e-3 of gravity's share, 1e-6 of the speed (an engine in single precision) and twice the damping's share (each engine
-        damps by a law of its own).
-        """
-        v, g = self.motion.velocity, self.scene.acceleration
-        left_over = length(np.diff(v, axis=0) - self.dt * g)
-        damped = 0.0 if self.scene.damping is None else 2.0 * self.dt * self.scene.damping.linear
-        allowed = 1e-3 * self.dt * np.linalg.norm(g) + (1e-6 + damped) * length(v[:-1])
-        return left_over > allowed
+        """In which steps the floor changes the velocity, shape (n - 1,)."""
+        return self.motions.states.touching
 
     def contact_point(self, row: int) -> Array:
         """From the centre of mass to the point that is lowest at a row [m], shape (3,); the middle of several that are."""

@@ -5,15 +5,16 @@ Flights are kept apart so that errors are averaged over start phases before the 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.measuring import errors_over_time as errors
 from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
+from comparisons.measuring.motions import Motions, at_rows
 from scenarios import Scenario, Trajectory, Truth, truth_for
-from scenarios.mechanics import angular_momentum, apex, kinetic_energy, lowest_height
+from scenarios.mechanics import angular_momentum, apex, lowest_height
 from scenarios.rotations import angle_between_orientations, length
 from scenarios.state import RATES, SPIN
 
@@ -22,6 +23,7 @@ NEAR_FLOOR = 0.05  # of the body's size: engines may take what is so near for co
 TURNED = 1e-3  # rad; a body that turns less does not turn
 LANDING = 3  # steps, within which every engine is done with an impact
 Measure = Callable[[Comparison], float | Array]
+AnyMeasure = TypeVar("AnyMeasure", bound=Measure)
 
 
 @dataclass(frozen=True)
@@ -117,10 +119,10 @@ def _metric(
     signed: bool = False,
     agreement: bool = False,
     first_flight: bool = False,
-) -> Callable[[Measure], Measure]:
+) -> Callable[[AnyMeasure], AnyMeasure]:
     """Register a function as a metric; its name is the metric's, its docstring the definition."""
 
-    def register(measure: Measure) -> Measure:
+    def register(measure: AnyMeasure) -> AnyMeasure:
         name, definition = measure.__name__, " ".join((measure.__doc__ or "").split())
         METRICS[name] = Metric(name, unit, kind, signed, definition, needs, applies, measure, agreement, first_flight)
         return measure
@@ -206,18 +208,15 @@ def energy_error_raw(case: Comparison) -> Array:
 
 
 @_metric("1", "invariant", "no damping, a start in flight", _keeps_energy_in_flight, signed=True, first_flight=True)
-def energy_drift(case: Comparison) -> float:
+def energy_drift(case: Comparison | Motions) -> Array:
     """Change of energy from the start to the end of the first flight, over the scene's energy."""
-    rows = case.flights[0]
-    over_time = case.energy[rows]
-    return float(over_time[-1] - over_time[0]) / case.energy_scale
+    return (at_rows(case.energy, case.first_flight_end) - case.energy[..., 0]) / case.energy_scale
 
 
 @_metric("1", "invariant", "no damping", _keeps_energy)
-def energy_gain(case: Comparison) -> float:
+def energy_gain(case: Comparison | Motions) -> Array:
     """Largest rise of energy above any earlier value, over the scene's energy."""
-    over_time = case.energy
-    return float(np.max(over_time - np.minimum.accumulate(over_time))) / case.energy_scale
+    return (case.energy - np.minimum.accumulate(case.energy, axis=-1)).max(axis=-1) / case.energy_scale
 
 
 @_metric("1", "truth", "a truth with an impact, gravity downwards", _has_apex, signed=True, agreement=True, first_flight=True)
@@ -333,9 +332,9 @@ def orientation_error(case: Comparison) -> float:
 
 
 @_metric("m", "invariant", "a floor", _has_floor)
-def penetration(case: Comparison) -> float:
+def penetration(case: Comparison | Motions) -> Array:
     """Largest depth of the body's lowest point below the floor."""
-    return float(np.max(np.maximum(-lowest_height(case.scene, case.motion), 0.0)))
+    return np.maximum(-case.lowest_height, 0.0).max(axis=-1)
 
 
 def leading_metric(scene: Scenario) -> str:
@@ -351,11 +350,8 @@ def leading_metric(scene: Scenario) -> str:
 
 
 def last_time_in_motion(scene: Scenario, motion: Trajectory) -> float:
-    """The last time [s] at which M v²/2 + ω·L/2 is above M (2 g dt)²/2, and above a millionth of M g times the body's size."""
-    g, dt = float(np.linalg.norm(scene.acceleration)), float(motion.t[1] - motion.t[0])
-    still = scene.body.mass * max(2.0 * (g * dt) ** 2, 1e-6 * g * scene.body.size)
-    moving = np.flatnonzero(kinetic_energy(scene, motion) > still)
-    return float(motion.t[moving[-1]]) if len(moving) else 0.0
+    """The time [s] of `Motions.last_row_in_motion`."""
+    return float(motion.t[Motions.of(scene, motion).last_row_in_motion])
 
 
 def _largest_of_each_flight(values: Array, case: Comparison) -> Array:

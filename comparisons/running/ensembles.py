@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from comparisons.engines.base import Engine
 from comparisons.judging.verdicts import Judgement
 from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import last_time_in_motion
 from comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
 from comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, EnsembleOutcome
 from comparisons.running.recording import record_batch
 from scenarios import Scenario, members
-from scenarios.mechanics import angular_momentum, energy
+from scenarios.mechanics import angular_momentum
 
 Array = NDArray[np.float64]
 
@@ -40,13 +39,12 @@ def run_ensemble(engine: Engine, scene: Scenario, dt: float) -> EnsembleOutcome:
         batch = starts[first : first + BATCH_SIZE]
         for member, motion in zip(batch, record_batch(engine, batch, dt), strict=True):
             case = Comparison(member, motion)
-            contact = case.first_contact
             scale = _energy_scale(case)
-            energies.append(energy(member, motion[rows]) / scale)
+            energies.append(case.energy[rows] / scale)
             lengths = np.linalg.norm(angular_momentum(member, motion[rows]), axis=1)
             momenta.append(lengths / (scene.body.size * np.sqrt(2.0 * scale * scene.body.mass)))
-            rebounds.append(0.0 if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1])
-            rest_times.append(last_time_in_motion(member, motion))
+            rebounds.append(case.motions.rebound)
+            rest_times.append(motion.t[case.motions.last_row_in_motion])
     t = (dt * np.arange(steps + 1, dtype=float))[rows]
     return EnsembleOutcome(t, np.array(energies), np.array(rebounds), np.array(rest_times), np.array(momenta))
 

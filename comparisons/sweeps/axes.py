@@ -1,4 +1,4 @@
-"""What a sweep goes through: each axis gives the values of any of its places, and holds no more than was written down."""
+"""The axes of a sweep: each computes its values from their indices, so that an axis of any length takes no memory."""
 
 import math
 from collections.abc import Sequence
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from scenarios.drawing import uniform
 
-Places = NDArray[np.int64]
+Indices = NDArray[np.int64]
 Spacing = Literal["linear", "log"]
 
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """One axis: the dotted name of what it sets, and how many values it has."""
+    """One axis: the dotted name of the field that it sets, and a number of values."""
 
     name: str
 
@@ -24,23 +24,23 @@ class SweepAxis:
         raise NotImplementedError
 
     @property
-    def is_of_numbers(self) -> bool:
-        """Whether all its values are numbers."""
+    def is_numeric(self) -> bool:
+        """Whether all values are numbers."""
         return True
 
-    def at(self, places: Places) -> NDArray[Any]:
-        """Its values at some places: float64, or objects where not all are numbers."""
+    def at(self, indices: Indices) -> NDArray[Any]:
+        """The values at some indices: float64, or objects where not all are numbers."""
         raise NotImplementedError
 
     @property
-    def extremes(self) -> Sequence[Any]:
-        """The values that its range can be judged by: each that was listed, else the ends."""
+    def representative_values(self) -> Sequence[Any]:
+        """The values that a spec is verified with: every value of a list, or the two ends of a range."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class Listed(SweepAxis):
-    """Values as written."""
+    """The values of a list."""
 
     values: tuple[Any, ...]
 
@@ -48,25 +48,25 @@ class Listed(SweepAxis):
         return len(self.values)
 
     @property
-    def is_of_numbers(self) -> bool:
+    def is_numeric(self) -> bool:
         return all(type(value) in (int, float) for value in self.values)
 
-    def at(self, places: Places) -> NDArray[Any]:
-        if self.is_of_numbers:
-            return np.array(self.values, dtype=float)[places]
+    def at(self, indices: Indices) -> NDArray[Any]:
+        if self.is_numeric:
+            return np.array(self.values, dtype=float)[indices]
         values = np.empty(len(self.values), dtype=object)
-        for place, value in enumerate(self.values):
-            values[place] = value
-        return values[places]
+        for index, value in enumerate(self.values):
+            values[index] = value
+        return values[indices]
 
     @property
-    def extremes(self) -> Sequence[Any]:
+    def representative_values(self) -> Sequence[Any]:
         return self.values
 
 
 @dataclass(frozen=True)
-class _Between(SweepAxis):
-    """So many values from one number to another."""
+class _Range(SweepAxis):
+    """A number of values between two numbers."""
 
     first: float
     last: float
@@ -77,33 +77,33 @@ class _Between(SweepAxis):
         return self.count
 
     @property
-    def extremes(self) -> Sequence[Any]:
+    def representative_values(self) -> Sequence[Any]:
         return self.first, self.last
 
 
 @dataclass(frozen=True)
-class Spaced(_Between):
-    """Values evenly apart from one end to the other, both among them."""
+class Spaced(_Range):
+    """Evenly spaced values; both ends are included."""
 
-    def at(self, places: Places) -> NDArray[Any]:
-        found = between(self.first, self.last, self.spacing, places / (self.count - 1))
-        found[places == self.count - 1] = self.last  # to the last digit
-        return found
+    def at(self, indices: Indices) -> NDArray[Any]:
+        values = interpolate(self.first, self.last, self.spacing, indices / (self.count - 1))
+        values[indices == self.count - 1] = self.last  # without rounding
+        return values
 
 
 @dataclass(frozen=True)
-class Drawn(_Between):
-    """Values drawn at random: each depends on the seed, the axis's name and its own number alone."""
+class Drawn(_Range):
+    """Random values: each depends only on the seed, the name of the axis and its index."""
 
     seed: int
 
-    def at(self, places: Places) -> NDArray[Any]:
-        return between(self.first, self.last, self.spacing, uniform(self.seed, self.name, places))
+    def at(self, indices: Indices) -> NDArray[Any]:
+        return interpolate(self.first, self.last, self.spacing, uniform(self.seed, self.name, indices))
 
 
-def between(first: float, last: float, spacing: Spacing, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The values at shares of the way from the first to the last, or of the way between their logarithms."""
+def interpolate(first: float, last: float, spacing: Spacing, fractions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The values at fractions of the distance from the first to the last, or of the distance between their logarithms."""
     if spacing == "linear":
-        return first + (last - first) * shares
-    # By `math`, whose last bit does not depend on the length of an array as NumPy's may.
-    return np.array([first * math.pow(last / first, share) for share in shares.tolist()])
+        return first + (last - first) * fractions
+    # `math.pow`, because the last bit of NumPy's power may depend on the length of the array.
+    return np.array([first * math.pow(last / first, fraction) for fraction in fractions.tolist()])

@@ -14,35 +14,35 @@ Path = tuple[str | int, ...]
 
 
 class NoSuchField(DropspinError):
-    """A field that a scene has not."""
+    """A field that a scene does not have."""
 
 
 def path_of(name: str) -> Path:
     """The keys and indices of a dotted name."""
     if not re.fullmatch(r"[a-z_]+((\.[a-z_]+)|(\[(0|[1-9][0-9]{0,5})\]))*", name):
-        raise NoSuchField(f"{name!r} is no field; write it as floor.restitution or start.position[1].")
+        raise NoSuchField(f"{name!r} is not a valid field name; write it as floor.restitution or start.position[1].")
     return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[a-z_]+|[0-9]+", name))
 
 
 def content_of(scene: Scenario) -> dict[str, Any]:
-    """What the scene's file says of its physics, as a mapping; absent tables are left out."""
+    """The part of a scene's file that describes its physics, as a mapping without absent tables."""
     return scene.model_dump(include={"duration", *TABLES}, exclude_none=True)
 
 
-def assert_has(scene: Scenario, name: str) -> None:
+def verify_field(scene: Scenario, name: str) -> None:
     """Raise `NoSuchField` unless the scene has a field that may be set."""
     path = path_of(name)
     if path[0] not in ("duration", *TABLES) or (path[0] != "duration" and len(path) == 1):
-        raise NoSuchField(f"no such field.{did_you_mean(str(path[0]), TABLES)} It is duration, or a field of {', '.join(TABLES)}.")
+        raise NoSuchField(f"no such field.{did_you_mean(str(path[0]), TABLES)} Allowed: duration, or a field of {', '.join(TABLES)}.")
     found: Any = content_of(scene)
     for depth, key in enumerate(path):
         if isinstance(key, int):
             if not isinstance(found, tuple) or key >= len(found):
-                raise NoSuchField(f"{_written(path[:depth])} is {found!r}, which has no entry {key}.")
+                raise NoSuchField(f"{_dotted(path[:depth])} is {found!r}, which has no entry {key}.")
         elif not isinstance(found, Mapping) or (key not in found and depth == 0):
-            raise NoSuchField(f"scene {scene.name!r} has no [{path[0]}]; what is absent is not modelled.")
+            raise NoSuchField(f"scene {scene.name!r} has no [{path[0]}]; an absent table is not modelled.")
         elif key not in found:
-            return  # an optional key; the scene's own schema says whether there is one
+            return  # an optional key, which the schema of the scene accepts or refuses
         found = found[key]
 
 
@@ -50,16 +50,16 @@ def with_fields(scene: Scenario, values: Iterable[tuple[str, Any]]) -> Scenario:
     """The scene with some fields set.
 
     Raises:
-        SceneError: There is no such scene.
+        SceneError: The result is not a valid scene.
     """
     content = content_of(scene)
     for name, value in values:
-        put(content, path_of(name), value)
+        set_field(content, path_of(name), value)
     return load({"name": scene.name, **content})
 
 
-def put(content: dict[str, Any], path: Path, value: Any) -> None:
-    """Set a field of a mapping; the tuples on its way become lists."""
+def set_field(content: dict[str, Any], path: Path, value: Any) -> None:
+    """Set a field of a nested mapping; tuples along its path become lists."""
     found: Any = content
     for key, following in pairwise(path):
         if isinstance(following, int):
@@ -68,5 +68,5 @@ def put(content: dict[str, Any], path: Path, value: Any) -> None:
     found[path[-1]] = value
 
 
-def _written(path: Path) -> str:
+def _dotted(path: Path) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")

@@ -1,6 +1,6 @@
-"""What comes of some jobs, in arrays, and how a recorded motion becomes a row."""
+"""The outcomes of some jobs, as arrays: verdicts, final states and metrics."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,113 +8,105 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import METRICS
+from comparisons.measuring.metrics import METRICS, energy_drift, energy_gain, penetration
+from comparisons.measuring.motions import Motions
 from comparisons.running.recording import Breakdown
-from reference_impl.summary import FIGURES, Moved, summarise
 from scenarios import Scenario, Trajectory, truth_for
 
 Array = NDArray[np.float64]
 
-STATE = (
+STATE_COLUMNS = (
     *(f"position_{axis}" for axis in "xyz"),
     *(f"orientation_{axis}" for axis in "xyzw"),
     *(f"velocity_{axis}" for axis in "xyz"),
     *(f"angular_velocity_{axis}" for axis in "xyz"),
 )
-"""The columns of the state at the end."""
+"""The columns of the final state."""
+STANDARD_METRICS = ("energy_drift", "energy_gain", "penetration", "rebound", "rest_time")
+"""Measured in every sweep; none needs a reference solution."""
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What came of n jobs; NaN where nothing did.
+    """The outcomes of n jobs; NaN where there is no value.
 
     Attributes:
-        verdict: As in the results of a run, shape (n,).
-        reason: Why, in words, shape (n,).
-        state: The last one, shape (n, 13).
-        figures: Of `reference_impl.summary`, shape (n, 5).
-        metrics: Of the truth, by name, shape (n, len(metrics)).
-        steps: How many, shape (n,).
-        time_per_step: Recorded, [s], shape (n,).
+        verdict: As in the results of a run, shape (n,); empty for a job that has not been run.
+        reason: The reason of the verdict, or the known limitations that the engine met, shape (n,).
+        state: The final state, shape (n, 13).
+        standard_metrics: The `STANDARD_METRICS`, shape (n, 5).
+        metrics: The metrics that the spec asks for, shape (n, len(metrics)).
+        steps: Number of steps, shape (n,).
+        time_per_step: Wall time per step, recording included [s], shape (n,).
     """
 
     verdict: NDArray[Any]
     reason: NDArray[Any]
     state: Array
-    figures: Array
+    standard_metrics: Array
     metrics: Array
     steps: NDArray[np.int64]
     time_per_step: Array
 
     @classmethod
-    def blank(cls, size: int, metrics: int) -> "Outcomes":
-        """Nothing yet."""
+    def empty(cls, size: int, metrics: int) -> "Outcomes":
+        """The outcomes of jobs that have not been run."""
         verdict, reason = (np.full(size, "", dtype=object) for _ in range(2))
-        state, figures, of_truth = (np.full((size, width), np.nan) for width in (len(STATE), len(FIGURES), metrics))
-        return cls(verdict, reason, state, figures, of_truth, np.zeros(size, dtype=np.int64), np.full(size, np.nan))
+        state, standard, others = (np.full((size, width), np.nan) for width in (len(STATE_COLUMNS), len(STANDARD_METRICS), metrics))
+        return cls(verdict, reason, state, standard, others, np.zeros(size, dtype=np.int64), np.full(size, np.nan))
 
-    def __getitem__(self, places: slice) -> "Outcomes":
-        """Of some of them."""
-        return Outcomes(*(column[places] for column in vars(self).values()))
+    def __getitem__(self, indices: slice) -> "Outcomes":
+        """The outcomes of some of the jobs."""
+        return Outcomes(*(column[indices] for column in vars(self).values()))
 
-    def set_breakdown(self, place: int, breakdown: Breakdown) -> None:
+    def set_breakdown(self, index: int, breakdown: Breakdown) -> None:
         """Record why a job has no motion."""
-        self.verdict[place], self.reason[place] = breakdown.verdict, " ".join(breakdown.reason.split())
+        self.verdict[index], self.reason[index] = breakdown.verdict, " ".join(breakdown.reason.split())
 
-    def take(self, places: NDArray[np.intp], motions: Array, moved: Moved, floor: bool, damped: bool) -> None:
-        """What became of the jobs at some places, by their motions, shape (len(places), n, 13)."""
-        figures, bad = summarise(motions, moved, floor, damped)
-        self.steps[places] = moved.rows - 1
-        self.figures[places] = figures
-        self.state[places] = motions[np.arange(len(places)), moved.rows - 1]
-        self.verdict[places] = "measured"
-        for place in np.flatnonzero(bad >= 0):
-            self.set_breakdown(places[place], Breakdown("diverged", f"the state is not finite at t = {bad[place] * moved.dt[place]:g} s"))
-            self.state[places[place]] = np.nan
+    def set_measured(self, indices: NDArray[np.intp], states: Array, motions: Motions) -> None:
+        """Record the final states and the standard metrics of some jobs, by the states of their motions, shape (len(indices), n, 13)."""
+        self.verdict[indices] = "measured"
+        self.steps[indices] = motions.last_row
+        self.state[indices] = states[np.arange(len(indices)), motions.last_row]
+        self.standard_metrics[indices] = standard_metrics(motions)
 
 
-def joined(parts: Sequence[Outcomes]) -> Outcomes:
-    """Those of several lots of jobs, in order."""
+def standard_metrics(motions: Motions) -> Array:
+    """The `STANDARD_METRICS` of B motions, shape (B, 5); NaN where one does not apply.
+
+    Energy drift and gain do not apply with damping, nor where there is no energy at all, and drift only to a start in flight; penetration
+    needs a floor.
+    """
+    setup, values = motions.setup, np.full((len(motions.last_row), len(STANDARD_METRICS)), np.nan)
+    with np.errstate(all="ignore"):  # of numbers near the largest, and of an energy scale of 0
+        if setup.damping is None:
+            in_flight = setup.starts_above_floor if setup.floor else True
+            values[:, 0] = np.where(in_flight, energy_drift(motions), np.nan)
+            values[:, 1] = energy_gain(motions)
+            values[motions.energy_scale == 0.0, :2] = np.nan
+        if setup.floor:
+            values[:, 2] = penetration(motions)
+        values[:, 3] = motions.rebound
+        values[:, 4] = motions.dt * motions.last_row_in_motion
+    return values
+
+
+def concatenated(parts: Sequence[Outcomes]) -> Outcomes:
+    """Several outcomes, in order."""
     return Outcomes(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts), strict=True)))
 
 
-def moved_alone(scene: Scenario, dt: float, lag: float, rows: int) -> Moved:
-    """A scene's body, as the one that moved."""
-    body = scene.body
-    return Moved(
-        mass=np.array([body.mass]),
-        inertia=body.inertia_tensor[np.newaxis],
-        points=body.vertices[np.newaxis],
-        radius=np.array([body.rounding]),
-        size=np.array([body.size]),
-        origin=origins(scene.initial_state[np.newaxis], np.array([body.resting_height]), scene.floor is not None),
-        clearance=np.array([scene.clearance]),
-        gravity=scene.acceleration[np.newaxis],
-        damping=np.array([0.0 if scene.damping is None else scene.damping.linear]),
-        dt=np.array([dt]),
-        lag=np.array([lag]),
-        rows=np.array([rows]),
-    )
-
-
-def origins(starts: Array, resting_heights: Array, floor: bool) -> Array:
-    """Where potential energy is 0 [m], shape (B, 3): at rest on the floor, or at the start."""
-    if not floor:
-        return np.ascontiguousarray(starts[:, 0:3])
-    return np.stack([np.zeros(len(starts)), resting_heights, np.zeros(len(starts))], axis=1)
-
-
-def truth_metrics(scene: Scenario, motion: Trajectory, names: Sequence[str]) -> list[float]:
-    """Metrics of one motion beside the truth; NaN where the scene has not got one, or the step is too coarse for it."""
+def requested_metrics(scene: Scenario, motion: Trajectory, names: Sequence[str]) -> list[float]:
+    """Metrics of one motion; NaN where one does not apply to the scene, or the time step is too coarse for it."""
     truth = truth_for(scene)
     case = Comparison.with_truth(scene, motion, truth)
     return [_value(METRICS[name].measure, case) if METRICS[name].applies(scene, truth) else np.nan for name in names]
 
 
-def _value(measure: Any, case: Comparison) -> float:
-    """The part of largest size, with its sign."""
+def _value(measure: Callable[[Comparison], float | Array], case: Comparison) -> float:
+    """The value of largest magnitude, with its sign."""
     try:
-        parts = np.atleast_1d(measure(case)).ravel()
+        values = np.atleast_1d(measure(case)).ravel()
     except Unresolved:
         return np.nan
-    return float(parts[np.argmax(np.abs(parts))])
+    return float(values[np.argmax(np.abs(values))])

@@ -1,4 +1,4 @@
-"""Sweeps from beginning to end, and their tables read back."""
+"""Run a sweep, and read its table."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -8,9 +8,9 @@ import pyarrow as pa
 
 from comparisons.running.processes import ResourceLimits
 from comparisons.sweeps.cluster import connected, run_on_cluster
+from comparisons.sweeps.folder import SweepFolder
 from comparisons.sweeps.jobs import Sweep
-from comparisons.sweeps.local import run_here
-from comparisons.sweeps.parts import Folder
+from comparisons.sweeps.local import run_locally
 from comparisons.sweeps.work import Work
 from scenarios import DropspinError
 
@@ -22,81 +22,85 @@ def run_sweep(
     resume: bool = False,
     scheduler: str | None = None,
     resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
-    on_progress: Callable[[int], None] = lambda done: None,
+    on_progress: Callable[[int], None] = lambda jobs: None,
 ) -> None:
-    """Run what a folder has not yet of a sweep.
+    """Run the jobs of a sweep that a folder does not have yet.
 
     Args:
-        sweep: The sweep.
-        where: The folder, or a URL that fsspec knows.
-        resume: Go on where an earlier run of the same sweep ended, however it ended.
-        scheduler: The address of a Dask scheduler; None: on this machine.
+        sweep: The sweep, from `load_sweep`.
+        where: The folder, or a URL that fsspec supports.
+        resume: Whether the folder may hold parts of the same sweep, which are kept.
+        scheduler: The address of a Dask scheduler; None: run on this machine.
         resources: What an engine may use for one job.
-        on_progress: Called with the number of jobs done since the last call, those that were there first; may raise to end it all.
+        on_progress: Called with the number of jobs completed since the last call, first with those that the folder has; may raise to
+            stop the sweep.
 
     Raises:
-        DropspinError: The folder holds something else, or cannot be written.
+        DropspinError: The folder holds something else, or is not writable.
     """
     work = Work.of(sweep, resources)
-    folder = Folder(where, work.identity)
-    earlier = folder.about()
+    folder = SweepFolder(where, work.identity)
+    earlier = folder.description()
+    kept = 0
     if earlier is not None:
-        _assert_the_same(where, earlier, work)
+        _verify_same_sweep(where, earlier, work)
         kept = count(where)
         if not resume:
             raise DropspinError(
-                f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; --resume goes on, or choose another folder with -o."
+                f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; resume it with --resume, or choose another folder with -o."
             )
-    else:
-        kept = 0
     on_progress(kept)
     parts = work.missing(folder)
     if scheduler is None:
-        folder.begin(work.about)
-        run_here(work, parts, folder, on_progress)
+        folder.begin(work.description)
+        run_locally(work, parts, folder, on_progress)
         return
     with connected(scheduler) as client:
-        folder.begin(work.about)
+        folder.begin(work.description)
         run_on_cluster(client, work, parts, folder, on_progress)
 
 
 def count(where: str) -> int:
-    """How many jobs a folder has; 0 if no sweep has begun there."""
-    return sum(jobs for jobs, _ in _parts(where)) if Folder(where).about() is not None else 0
+    """The number of jobs that a folder has; 0 if it holds no sweep."""
+    return sum(jobs for jobs, _ in _parts(where)) if SweepFolder(where).description() is not None else 0
 
 
 def read_sweep(where: str) -> pd.DataFrame:
-    """The table of a sweep, in the order of its jobs; of one that has not come to its end, what there is.
+    """The table of a sweep, in the order of its jobs; of an unfinished sweep, the jobs that have been run.
 
     Raises:
-        DropspinError: The folder holds no sweep.
+        DropspinError: The folder does not hold a sweep.
     """
     return pa.concat_tables(read_parts(where)).to_pandas()
 
 
 def read_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
-    """The same part by part, for tables that are larger than memory."""
-    folder = Folder(where)
+    """The table of a sweep part by part, for tables that are larger than memory.
+
+    Raises:
+        DropspinError: The folder does not hold a sweep.
+    """
+    folder = SweepFolder(where)
     for _, path in _parts(where):
         yield folder.read(path, columns)
 
 
 def _parts(where: str) -> Iterator[tuple[int, str]]:
-    """How many jobs are in each part that is there, and its path."""
-    about = Folder(where).about()
+    """The number of jobs of each part in a folder, and its path."""
+    about = SweepFolder(where).description()
     if about is None:
-        raise DropspinError(f"{where}: no sweep is there; give the folder that dropspin sweep -o wrote.")
-    folder, size = Folder(where, about["identity"]), about["part_size"]
+        raise DropspinError(f"{where}: does not hold a sweep; give the folder that dropspin sweep -o wrote.")
+    folder, size = SweepFolder(where, about["identity"]), about["part_size"]
     for group in folder.groups():
-        for first, path in folder.listed(group).items():
+        for first, path in folder.parts(group).items():
             yield min(size, about["jobs"] - first), path
 
 
-def _assert_the_same(where: str, earlier: dict[str, Any], work: Work) -> None:
-    """Raise `DropspinError` unless a folder's sweep is this one, of these versions."""
+def _verify_same_sweep(where: str, earlier: dict[str, Any], work: Work) -> None:
+    """Raise `DropspinError` unless a folder holds this sweep, run with the installed versions."""
     if earlier["identity"] == work.identity:
         return
     then, now = earlier["provenance"]["versions"], work.versions
     changed = [f"{name} {then.get(name)}, now {now[name]}" for name in now if then.get(name) != now[name]]
-    why = f"made with {', '.join(changed)}" if changed else "asked for differently"
-    raise DropspinError(f"{where}: holds a sweep that was {why}; choose another folder with -o.")
+    difference = f"a sweep that was run with {', '.join(changed)}" if changed else "another sweep: the specs differ"
+    raise DropspinError(f"{where}: holds {difference}; choose another folder with -o.")

@@ -1,4 +1,4 @@
-"""What a sweep's jobs are: by their numbers alone, with keys that tell apart what moves differently, and specs that say what is wrong."""
+"""Jobs follow from their numbers alone, keys identify jobs, and a spec that is not valid is refused in one line."""
 
 import itertools
 import re
@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comparisons.sweeps import load_sweep
-from comparisons.sweeps.axes import Drawn, Spaced, between
+from comparisons.sweeps.axes import Drawn, Spaced, interpolate
+from comparisons.sweeps.spec import load_sweep
 from scenarios import DropspinError, load
 from scenarios.drawing import uniform
 from scenarios.ensemble import spread_start, spread_starts
 from scenarios.loading import CATALOGUE
+from scenarios.state import ORIENTATION, RATES
 
 SPEC = {
     "scenes": ["drop-box-anyhow", "drop-ball"],
@@ -27,7 +28,7 @@ SWEEP = load_sweep(SPEC)
 
 
 def rows(sweep, first, last):
-    """The jobs as tuples: scene, engine, step, start, values."""
+    """The jobs as tuples: scene, engine, time step, start, values."""
     return [
         (jobs.scene.name, jobs.engine.label, dt, seed, *values)
         for jobs in sweep.jobs(first, last)
@@ -39,24 +40,24 @@ def hashes(sweep, first, last):
     return [key for jobs in sweep.jobs(first, last) for key in jobs.hashes()]
 
 
-def test_the_jobs_are_the_product():
-    """In the order of nested loops, the draws innermost; a log axis meets its ends and the geometric mean."""
+def test_jobs_are_the_product_in_the_order_of_nested_loops():
+    """The draws are innermost; a log axis includes its ends and the geometric mean."""
     heights = 0.6 + 1.4 * uniform(3, "start.position[1]", np.arange(5))
     nested = itertools.product(SPEC["scenes"], SPEC["engines"], SPEC["dts"], [None], [0.1, 0.5], [1.0, 2.0, 4.0], heights)
     assert rows(SWEEP, 0, SWEEP.size) == list(nested)
 
 
 @given(st.data())
-def test_any_stretch_of_jobs_is_that_stretch(data):
-    """Nothing depends on where one starts to look: not the values, not the keys."""
+def test_jobs_do_not_depend_on_the_range_that_is_requested(data):
+    """Neither their values nor their keys."""
     first = data.draw(st.integers(0, SWEEP.size - 1))
     last = data.draw(st.integers(first + 1, SWEEP.size))
     assert rows(SWEEP, first, last) == rows(SWEEP, 0, SWEEP.size)[first:last]
     assert hashes(SWEEP, first, last) == hashes(SWEEP, 0, SWEEP.size)[first:last]
 
 
-def test_the_last_of_very_many_jobs_is_at_hand():
-    """A million million jobs: the last thousand are there at once, and a draw far out is even in its range."""
+def test_last_jobs_of_a_huge_sweep_are_computed_at_once():
+    """The last thousand of 10¹² jobs; draws with large indices are uniform in their range."""
     vast = load_sweep(SPEC | {"random": SPEC["random"] | {"count": 10**11}})
     assert vast.size > 10**12
     [jobs] = vast.jobs(vast.size - 1000, vast.size)
@@ -67,29 +68,29 @@ def test_the_last_of_very_many_jobs_is_at_hand():
 
 
 @given(st.integers(0, 2**62), st.lists(st.integers(0, 10**12), min_size=1, max_size=50))
-def test_draws_depend_on_their_number_alone(seed, numbers):
-    """Prefix stability: any draws, in any order and company, are those drawn one by one."""
+def test_draws_depend_only_on_their_index(seed, numbers):
+    """Any draws, in any order and with any others, are those drawn one by one."""
     together = uniform(seed, "x", np.array(numbers))
     assert list(together) == [uniform(seed, "x", np.array([number]))[0] for number in numbers]
     assert ((together >= 0.0) & (together < 1.0)).all()
 
 
-def test_draws_of_different_purposes_have_nothing_to_do_with_each_other():
-    """Correlations of 20,000 pairs are within 4/√n; so are those of neighbours."""
+def test_draws_of_different_axes_and_seeds_are_uncorrelated():
+    """Correlations of 20,000 pairs are within 4/√n, those of neighbours included."""
     n = np.arange(20_000)
     a, b, c = uniform(1, "a", n), uniform(1, "b", n), uniform(2, "a", n)
     for pair in ((a, b), (a, c), (a[1:], a[:-1])):
         assert abs(np.corrcoef(*pair)[0, 1]) < 4 / np.sqrt(len(n))
 
 
-def test_more_draws_begin_with_the_fewer():
+def test_a_sweep_with_more_draws_begins_with_those_of_fewer():
     more = load_sweep(SPEC | {"random": SPEC["random"] | {"count": 5000}})
     assert rows(more, 0, 5) == rows(SWEEP, 0, 5)
     assert hashes(more, 0, 5) == hashes(SWEEP, 0, 5)
 
 
-def test_keys_tell_jobs_apart_and_nothing_else():
-    """All different; the same for the same job in another sweep, whatever its number and however its numbers are written."""
+def test_keys_are_unique_and_the_same_in_any_sweep():
+    """A job has the same key in another sweep, with another number, and with a value written as 2 or 2.0."""
     assert len(set(hashes(SWEEP, 0, SWEEP.size))) == SWEEP.size
     fewer = load_sweep(SPEC | {"scenes": ["drop-ball"], "engines": ["document[law=poisson]"], "dts": [1e-3]})
     assert hashes(fewer, 0, fewer.size) == hashes(SWEEP, SWEEP.size - fewer.size, SWEEP.size)
@@ -98,7 +99,7 @@ def test_keys_tell_jobs_apart_and_nothing_else():
     assert hashes(one, 0, 1) == hashes(same, 0, 1) != hashes(other, 0, 1)
 
 
-def test_keys_do_not_depend_on_where_the_engine_s_options_are_written():
+def test_key_is_the_same_for_an_option_in_the_name_or_on_an_axis():
     plain = {"scenes": ["drop-ball"], "dts": [1e-3]}
     named = load_sweep(plain | {"engines": ["mujoco[spring_steps=20]"]})
     swept = load_sweep(plain | {"engines": ["mujoco"], "grid": {"engine.spring_steps": [20]}})
@@ -106,13 +107,13 @@ def test_keys_do_not_depend_on_where_the_engine_s_options_are_written():
     assert swept.jobs(0, 1)[0].labels() == ["mujoco[spring_steps=20]"]
 
 
-def test_a_key_stays_what_it_is():
-    """Tables are joined by it years later; if this has to change, the changelog says so."""
+def test_key_does_not_change_between_versions():
+    """Users join tables by it; a change of this value must be in the changelog."""
     assert hashes(SWEEP, 0, 1) == ["ba50fcdcaab169c74a74"]
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(2, 50), st.sampled_from(["linear", "log"]))
-def test_spaced_values_meet_their_ends(first, length, count, spacing):
+def test_spaced_values_include_both_ends(first, length, count, spacing):
     first = abs(first) + 1e-3 if spacing == "log" else first
     axis = Spaced("x", first, first + length, count, spacing)
     values = axis.at(np.arange(count))
@@ -120,15 +121,15 @@ def test_spaced_values_meet_their_ends(first, length, count, spacing):
     assert (np.diff(values) > 0.0).all()
 
 
-def test_log_draws_are_even_in_the_logarithm():
+def test_log_draws_are_uniform_in_the_logarithm():
     draws = Drawn("x", 1e-3, 1e3, 4000, "log", 1).at(np.arange(4000))
     assert np.log10(draws).mean() == pytest.approx(0.0, abs=0.1)
     assert np.quantile(np.log10(draws), [0.25, 0.75]) == pytest.approx([-1.5, 1.5], abs=0.15)
-    assert between(2.0, 32.0, "log", np.array([0.25]))[0] == pytest.approx(4.0, rel=1e-15)
+    assert interpolate(2.0, 32.0, "log", np.array([0.25]))[0] == pytest.approx(4.0, rel=1e-15)
 
 
-def test_starts_of_the_spread_are_drawn_one_by_one():
-    """Start 7 is start 7 in any company; each within its spread, as high above the floor as the scene's own, and a state as it stands."""
+def test_start_depends_only_on_its_number():
+    """Each start is within the spread, as high above the floor as the scene's own, and a valid state."""
     scene = load("drop-box-anyhow")
     body, spread, own = scene.body, scene.ensemble, scene.initial_state
     together = spread_starts(np.tile(own, (400, 1)), spread, np.arange(400), body.vertices, body.rounding, True)
@@ -138,10 +139,10 @@ def test_starts_of_the_spread_are_drawn_one_by_one():
         member = scene.starting_at(start)
         np.testing.assert_array_equal(member.initial_state, start)
         assert member.clearance == pytest.approx(scene.clearance, abs=1e-12)
-    assert (np.abs(together[:, 7:13] - own[7:13]) <= [*spread.velocity, *spread.angular_velocity]).all()
+    assert (np.abs(together[:, RATES] - own[RATES]) <= [*spread.velocity, *spread.angular_velocity]).all()
 
 
-def test_starts_turn_evenly_over_all_attitudes():
+def test_starts_are_uniform_over_all_attitudes():
     """The mean of a rotation matrix over all attitudes is 0, its entries' squares 1/3 (4000 starts: ± .03)."""
     from scenarios.rotations import rotate
 
@@ -149,7 +150,7 @@ def test_starts_turn_evenly_over_all_attitudes():
     own = np.tile(scene.initial_state, (4000, 1))
     drawn = spread_starts(own, scene.ensemble, np.arange(4000), scene.body.vertices, scene.body.rounding, True)
     for axis in np.eye(3):
-        turned = rotate(drawn[:, 3:7], axis)
+        turned = rotate(drawn[:, ORIENTATION], axis)
         assert np.abs(turned.mean(axis=0)).max() < 0.03
         np.testing.assert_allclose((turned**2).mean(axis=0), 1 / 3, atol=0.03)
 
@@ -164,7 +165,7 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"scenes": ["drop-ball", "drop-ball"]}, "scenes: got .*; names one twice"),
         ({"scenes": []}, "scenes: got .*at least 1 item"),
         ({"engines": ["documnt"]}, "Did you mean 'document'"),
-        ({"engines": ["document", "document[law=note]"]}, "engines: one is named twice, written in two ways"),
+        ({"engines": ["document", "document[law=note]"]}, "engines: the same engine is named twice, written in two ways"),
         ({"dts": []}, "the time step is missing"),
         ({"dts": [0.0]}, r"dts\[0\]: got 0.0; must be greater than 0"),
         ({"dts": [1.0]}, "dt: got 1.0 s; scene 'drop-ball' lasts 1.5 s"),
@@ -178,7 +179,7 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"floor.restitution": [0.5, 1.5]}}, "grid: floor.restitution: .* got 1.5; must be less than or equal to 1"),
         ({"grid": {"floor.restitution": {"from": 0, "to": 2, "count": 3}}}, "grid: floor.restitution: .* got 2.0; must be less"),
         ({"grid": {"floor.restitution": {"from": 0, "to": 1}}}, "floor.restitution: count: missing"),
-        ({"grid": {"floor.restitution": {"from": 1, "to": 0, "count": 3}}}, "it must go up"),
+        ({"grid": {"floor.restitution": {"from": 1, "to": 0, "count": 3}}}, "from 1 to 0 does not increase; 'to' must be greater than 'from'"),
         ({"grid": {"floor.restitution": {"from": 0, "to": 1, "count": 3, "spacing": "log"}}}, "must start above 0"),
         ({"grid": {"floor.restitution": {"from": 0, "to": 1, "count": 1}}}, "count: got 1; must be greater than or equal to 2"),
         ({"grid": {"floor.restitution": 0.5}}, r"got 0.5; must be a list of values, or {from, to, count}"),
@@ -188,14 +189,14 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"floor.friction": ["none", 0.0]}}, "names a value twice"),
         ({"grid": {"start.position": [[0, 2, 0], [0.0, 2.0, 0.0]]}}, "names a value twice"),
         ({"grid": {"floor.restitution": [0.1], "floor": {"restitution": [0.5]}}}, "floor.restitution: is given twice"),
-        ({"grid": {"engine.law": [[1, 2]]}}, "an option is a word or a number"),
-        ({"grid": {"engine.law": ["note"]}, "engines": ["document[law=coulomb]"]}, "has this option set already"),
-        ({"grid": {"body.mass": [10**400]}}, "a whole number of 401 digits"),
+        ({"grid": {"engine.law": [[1, 2]]}}, "the value of an option is a word or a number"),
+        ({"grid": {"engine.law": ["note"]}, "engines": ["document[law=coulomb]"]}, r"document\[law=coulomb\] sets this option as well; leave it out there or here"),
+        ({"grid": {"body.mass": [10**400]}}, "a whole number of 401 digits, which exceeds the range"),
         ({"grid": {"body.mass": [{"a": 1}]}}, "a value is a number, a word, or a list of them"),
-        ({"grid": {"body.mass": {"from": 1e-300, "to": 1e300, "count": 3, "spacing": "log"}}}, "farther than what numbers can hold"),
-        ({"grid": {"start.position[01]": [2.0]}}, "is no field"),
+        ({"grid": {"body.mass": {"from": 1e-300, "to": 1e300, "count": 3, "spacing": "log"}}}, "exceeds the range of floating-point numbers"),
+        ({"grid": {"start.position[01]": [2.0]}}, "is not a valid field name"),
         ({"grid": {"dt": [float("inf")]}, "dts": []}, "got inf; a time step is a number above 0"),
-        ({"grid": {"ensemble.turn": [0.5]}, "scenes": ["drop-box-anyhow"]}, "counts with seeds only"),
+        ({"grid": {"ensemble.turn": [0.5]}, "scenes": ["drop-box-anyhow"]}, "has an effect only with seeds"),
         ({"scenes": ["x\0.toml"]}, "no file has such a name"),
         ({"grid": {"floor.restitutoin": [0.5]}}, "Did you mean 'restitution'"),
         ({"grid": {"damping.linear": [0.5]}}, r"grid: damping.linear: scene 'drop-ball' has no \[damping\]"),
@@ -203,13 +204,13 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"summary": ["x"]}}, "grid: summary: no such field"),
         ({"grid": {"start.position[3]": [0.5]}}, "which has no entry 3"),
         ({"grid": {"body.mass[0]": [0.5]}}, "which has no entry 0"),
-        ({"grid": {"body mass": [0.5]}}, "'body mass' is no field; write it as"),
+        ({"grid": {"body mass": [0.5]}}, "'body mass' is not a valid field name; write it as"),
         ({"grid": {"start.position[1]": [0.0]}}, "there the body is 0.1 m below the floor"),
-        ({"grid": {"start.position": [[0, 2, 0]], "start.position[1]": [1.5]}}, "sets what start.position sets"),
+        ({"grid": {"start.position": [[0, 2, 0]], "start.position[1]": [1.5]}}, "is a part of start.position, which is swept as well; leave one of them out"),
         ({"grid": {"engine.kappa": [0.1]}}, "document's option 'kappa' is unknown"),
         ({"grid": {"engine.law": ["notes"]}}, "document's law 'notes' is unknown. Did you mean 'note'"),
         ({"random": {"seed": 1, "body.mass": {"from": 1, "to": 2}}}, "random: count: missing"),
-        ({"random": {"count": 2, "seed": 1}}, "random: nothing to draw"),
+        ({"random": {"count": 2, "seed": 1}}, "random: no field is given; add one with its range"),
         ({"random": {"count": 2, "seed": 1, "body.mass": [1, 2]}}, "must be a range to draw from"),
         ({"random": {"count": 2, "seed": 1, "body.mass": {"from": 1, "to": 2, "count": 3}}}, "body.mass: count: unknown key"),
         (
@@ -217,11 +218,11 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
             r"body.mass: is in \[grid\] and in \[random\]",
         ),
         ({"random": {"count": 10**16, "seed": 1, "body.mass": {"from": 1, "to": 2}}}, "count: got 10000000000000000"),
-        ({"random": {"count": 10**15, "seed": 1, "body.mass": {"from": 1, "to": 2}}, "dts": [1e-3, 2e-3]}, r"these are 2e\+15 jobs"),
+        ({"random": {"count": 10**15, "seed": 1, "body.mass": {"from": 1, "to": 2}}, "dts": [1e-3, 2e-3]}, r"the sweep has 2e\+15 jobs; at most 1e\+15 are allowed"),
     ],
 )
-def test_specs_that_are_none(change, message):
-    """One line: where, what was given, what is allowed."""
+def test_spec_that_is_not_valid_is_refused_in_one_line(change, message):
+    """The line says where, what was given, and what is allowed."""
     with pytest.raises(DropspinError) as error:
         load_sweep(BALL | change)
     assert re.search(message, str(error.value)), str(error.value)
@@ -237,27 +238,26 @@ def test_specs_that_are_none(change, message):
         ({"start.velocity[0]": [-0.0]}, {"start.velocity[0]": [0]}),
     ],
 )
-def test_the_same_job_has_the_same_key(one, other):
-    """However it is written."""
+def test_equivalent_values_have_the_same_key(one, other):
     keys = [hashes(load_sweep(BALL | {"engines": ["document[law=coulomb]"], "grid": grid}), 0, 1) for grid in (one, other)]
     assert keys[0] == keys[1]
 
 
-def test_values_are_judged_in_company():
-    """A tall box fits where it is also put higher: what only some combination refuses is told of its jobs, not of the spec."""
+def test_value_that_is_valid_in_some_combination_is_accepted():
+    """A tall box fits where it also starts higher; the jobs in which it does not fit report it in their rows."""
     grid = {"body.half_extents[1]": [0.1, 2.0], "start.position[1]": [0.7, 2.5]}
     assert load_sweep(BALL | {"scenes": ["drop-box-anyhow"], "grid": grid}).size == 4
 
 
-def test_the_spec_of_the_page_is_one(tmp_path):
-    """docs/sweeps.md, with a scene of one's own."""
-    page = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+def test_spec_of_the_documentation_is_valid(tmp_path):
+    """docs/sweeps.md, with a scene file of the user."""
+    page = (Path(__file__).parents[3] / "docs" / "sweeps.md").read_text(encoding="utf-8")
     (tmp_path / "spec.toml").write_text(page.split("```toml\n")[1].split("```")[0])
     (tmp_path / "mine.toml").write_text((CATALOGUE / "drop-box-anyhow.toml").read_text(encoding="utf-8"))
     assert load_sweep(tmp_path / "spec.toml").size == 2 * 2 * 2 * 100 * 11 * 3 * 2 * 1000
 
 
-def test_paths_of_scenes_are_seen_from_the_spec(tmp_path):
+def test_paths_of_scenes_are_relative_to_the_spec(tmp_path):
     (tmp_path / "mine.toml").write_text('duration = 1.0\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
     (tmp_path / "spec.toml").write_text('scenes = ["mine.toml"]\nengines = ["document"]\ndts = [0.01]\n[grid]\nbody.mass = [1.0, 2.0]\n')
     assert load_sweep(tmp_path / "spec.toml").size == 2

@@ -1,0 +1,122 @@
+"""Quantities at each state of many motions side by side: the formulas of `scenarios.mechanics` in one compiled loop."""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.measuring import motions
+from comparisons.measuring.motions import Array, Mask, Motions, RowNumbers, Setup, is_touching
+from scenarios import mechanics
+from scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
+
+REACH = 1.0 + 1e-9
+"""Of the body's size: a body whose centre of mass is higher is out of the floor's reach."""
+
+
+class _States(NamedTuple):
+    """`StateQuantities` of many motions."""
+
+    height: Array
+    kinetic_energy: Array
+    energy: Array
+    lowest_height: Array
+    touching: Mask
+
+
+def motions_side_by_side(
+    setup: Setup, states: Array, dt: Array, velocity_lag: Array, last_row: RowNumbers, unit_tolerance: float
+) -> tuple[Motions, Mask]:
+    """Motions from their states, ready to be measured.
+
+    Args:
+        setup: What moves.
+        states: Shape (B, n, 13).
+        dt: Time between two rows [s], shape (B,).
+        velocity_lag: How far velocities lag positions [s], shape (B,).
+        last_row: The last row of each motion, shape (B,); later ones are ignored.
+        unit_tolerance: How far the length of a quaternion may be from 1.
+
+    Returns:
+        The motions, and whether the states of each are valid: finite, with unit quaternions.
+    """
+    shape = states.shape[:2]
+    height, kinetic, energy, lowest = (np.empty(shape) for _ in range(4))
+    touching, valid = np.zeros((shape[0], shape[1] - 1), dtype=bool), np.ones(shape[0], dtype=bool)
+    shared = (setup.mass, setup.inertia, setup.vertices, setup.rounding, setup.size, setup.origin, setup.gravity, setup.gravity_strength)
+    given = [_for_each(values, shape[0]) for values in (*shared, setup.damping_share(dt), dt, velocity_lag)]
+    rows = np.ascontiguousarray(states)
+    _kernel()(
+        height, kinetic, energy, lowest, touching, valid, rows, unit_tolerance, np.ascontiguousarray(last_row, dtype=np.int64), *given
+    )
+    return Motions(setup, _States(height, kinetic, energy, lowest, touching), dt, last_row), valid
+
+
+def _for_each(values: Array, size: int) -> NDArray[np.float64]:
+    """Values with one entry for each motion, in the memory layout that the kernel is compiled for."""
+    return np.array(np.broadcast_to(values, (size, *values.shape[1:])), order="C")
+
+
+@cache
+def _kernel() -> Callable[..., None]:
+    from numba.extending import register_jitable
+
+    from reference_impl.kernels import compile_cached
+
+    for formula in (*mechanics.FORMULAS, is_touching):
+        register_jitable(formula)
+    return compile_cached(_fill, *(Path(module) for module in (__file__, mechanics.__file__, motions.__file__)))
+
+
+def _fill(
+    height: Any,
+    kinetic: Any,
+    energy: Any,
+    lowest: Any,
+    touching: Any,
+    valid: Any,
+    states: Any,
+    unit_tolerance: float,
+    last_row: Any,
+    mass: Any,
+    inertia: Any,
+    vertices: Any,
+    rounding: Any,
+    size: Any,
+    origin: Any,
+    gravity: Any,
+    strength: Any,
+    damping_share: Any,
+    dt: Any,
+    lag: Any,
+) -> None:
+    for body in range(states.shape[0]):
+        i, o, g, last = inertia[body], (origin[body, 0], origin[body, 1], origin[body, 2]), gravity[body], last_row[body]
+        tensor = ((i[0, 0], i[0, 1], i[0, 2]), (i[1, 0], i[1, 1], i[1, 2]), (i[2, 0], i[2, 1], i[2, 2]))
+        pull = (g[0], g[1], g[2])
+        for row in range(last + 1):
+            s = states[body, row]
+            x, q, v, w = (s[0], s[1], s[2]), (s[3], s[4], s[5], s[6]), (s[7], s[8], s[9]), (s[10], s[11], s[12])
+            total = 0.0
+            for k in range(13):
+                total += 0.0 * s[k]  # 0 if all are finite, else NaN
+            length = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+            valid[body] &= abs(length - 1.0 + total) <= unit_tolerance
+            height[body, row] = s[1]
+            kinetic[body, row] = kinetic_energy_of(mass[body], tensor, q, v, w)
+            energy[body, row] = energy_of(kinetic[body, row], mass[body], x, v, o, pull, lag[body])
+            lowest[body, row] = np.inf
+            if s[1] <= REACH * size[body]:
+                offset = np.inf
+                for k in range(vertices.shape[1]):
+                    offset = min(offset, offset_of(q, (vertices[body, k, 0], vertices[body, k, 1], vertices[body, k, 2])))
+                lowest[body, row] = s[1] + offset - rounding[body]
+            if row < last:
+                n = states[body, row + 1]
+                after = (n[7], n[8], n[9])
+                touching[body, row] = is_touching(v, after, dt[body], pull, strength[body], damping_share[body])
+        for quantity in (height, kinetic, energy, lowest):
+            quantity[body, last + 1 :] = quantity[body, last]

@@ -1,0 +1,251 @@
+"""What is measured of a motion without a reference solution: first contact, energy scale, rebound, rest.
+
+The same definitions serve one motion and many side by side. A quantity of a motion has shape (...): () for one motion, (B,) for B motions;
+a quantity at each state has shape (..., n).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios import Scenario, Trajectory
+from scenarios.mechanics import Components, energy, energy_origin, kinetic_energy, lowest_height, scalar_product
+from scenarios.model import TOUCHING
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+RowNumbers = NDArray[np.intp]
+
+
+class StateQuantities(Protocol):
+    """Quantities at each state of a motion; rows after the last one of a shorter motion repeat its last state."""
+
+    @property
+    def height(self) -> Array:
+        """Of the centre of mass [m], shape (..., n)."""
+
+    @property
+    def kinetic_energy(self) -> Array:
+        """[J], shape (..., n)."""
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic plus potential energy, velocity synchronised with position [J], shape (..., n)."""
+
+    @property
+    def lowest_height(self) -> Array:
+        """Of the body's lowest point above the floor [m], shape (..., n); inf is allowed where no point can be below the floor."""
+
+    @property
+    def touching(self) -> Mask:
+        """In which steps the floor changes the velocity (`is_touching`), shape (..., n - 1)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What moves, and what acts on it. Among many motions, a first axis of length 1 stands for values that all share.
+
+    Attributes:
+        mass: [kg], shape (...).
+        inertia: In the body frame [kg m²], shape (..., 3, 3).
+        vertices: From the centre of mass, body frame [m], shape (..., m, 3).
+        rounding: Radius of the vertices [m], shape (...).
+        size: Distance of the farthest point of the body from the centre of mass [m], shape (...).
+        origin: Where the potential energy is 0 [m], shape (..., 3).
+        clearance: Height of the lowest point above the floor at the start [m], shape (...).
+        gravity: [m/s²], shape (..., 3).
+        damping: Decay rate of the velocity [1/s], shape (...); None where damping is not modelled.
+        floor: Whether there is a floor.
+    """
+
+    mass: Array
+    inertia: Array
+    vertices: Array
+    rounding: Array
+    size: Array
+    origin: Array
+    clearance: Array
+    gravity: Array
+    damping: Array | None
+    floor: bool
+
+    @classmethod
+    def of(cls, scene: Scenario) -> "Setup":
+        """The setup of one scene."""
+        body = scene.body
+        return cls(
+            mass=np.asarray(body.mass),
+            inertia=body.inertia_tensor,
+            vertices=body.vertices,
+            rounding=np.asarray(body.rounding),
+            size=np.asarray(body.size),
+            origin=energy_origin(scene),
+            clearance=np.asarray(scene.clearance),
+            gravity=scene.acceleration,
+            damping=None if scene.damping is None else np.asarray(scene.damping.linear),
+            floor=scene.floor is not None,
+        )
+
+    def __getitem__(self, motions: RowNumbers | Mask) -> "Setup":
+        """The setups of some of many motions."""
+        return self._with_arrays(lambda values: values if len(values) == 1 else values[motions])
+
+    def as_batch(self) -> "Setup":
+        """The setup of one motion as that of a batch of one."""
+        return self._with_arrays(lambda values: values[np.newaxis])
+
+    def _with_arrays(self, change: Callable[[Array], Array]) -> "Setup":
+        changed: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        changed.update({name: change(value) for name, value in changed.items() if isinstance(value, np.ndarray)})
+        return Setup(**changed)
+
+    @cached_property
+    def starts_above_floor(self) -> Mask:
+        """Whether the body has to fall to touch the floor, shape (...)."""
+        return self.floor & (self.clearance > TOUCHING * self.size)
+
+    @cached_property
+    def gravity_strength(self) -> Array:
+        """|g| [m/s²], shape (...)."""
+        x, y, z = np.moveaxis(self.gravity, -1, 0)
+        return np.sqrt(scalar_product((x, y, z), (x, y, z)))
+
+    def damping_share(self, dt: Array) -> Array:
+        """Twice the share of its velocity that a body loses by damping in a step, shape (...)."""
+        return np.zeros_like(dt) if self.damping is None else 2.0 * dt * self.damping
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """One motion, or many side by side.
+
+    Attributes:
+        setup: What moves.
+        states: Quantities at each state.
+        dt: Time between two rows [s], shape (...).
+        last_row: The last row of each motion, shape (...).
+    """
+
+    setup: Setup
+    states: StateQuantities
+    dt: Array
+    last_row: RowNumbers
+
+    @classmethod
+    def of(cls, scene: Scenario, motion: Trajectory) -> "Motions":
+        """One motion of a scene: at least two rows, equally far apart in time."""
+        return cls(Setup.of(scene), _StatesOfOne(scene, motion), np.asarray(motion.t[1] - motion.t[0]), np.asarray(len(motion) - 1))
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic plus potential energy, velocity synchronised with position [J], shape (..., n)."""
+        return self.states.energy
+
+    @property
+    def lowest_height(self) -> Array:
+        """Of the body's lowest point above the floor [m], shape (..., n)."""
+        return self.states.lowest_height
+
+    @cached_property
+    def energy_scale(self) -> Array:
+        """The scene's energy [J], shape (...): M g H down to the floor or the start's kinetic energy, whichever is larger.
+
+        H is the body's size for one that starts on the floor, and without a floor. The scale is 0 where nothing moves and nothing pulls.
+        """
+        setup = self.setup
+        height = np.where(setup.starts_above_floor, setup.clearance, setup.size)
+        return np.maximum(setup.mass * setup.gravity_strength * height, self.states.kinetic_energy[..., 0])
+
+    @cached_property
+    def first_contact(self) -> tuple[RowNumbers, RowNumbers]:
+        """The rows just before and just after the floor first changes the velocity, shape (...) each; -1 where it never does.
+
+        The row after a contact that lasts to the end is the last one.
+        """
+        if not self.setup.floor:
+            return np.full(self.last_row.shape, -1), np.full(self.last_row.shape, -1)
+        touching = self.states.touching
+        before = touching.argmax(axis=-1)
+        is_free = ~touching & (np.arange(touching.shape[-1]) > before[..., None])
+        after = np.where(is_free.any(axis=-1), is_free.argmax(axis=-1), self.last_row)
+        touches = touching.any(axis=-1)
+        return np.where(touches, before, -1), np.where(touches, after, -1)
+
+    @cached_property
+    def first_flight_end(self) -> RowNumbers:
+        """The row just before the first contact, or the last row, shape (...)."""
+        before, _ = self.first_contact
+        return np.where(before < 0, self.last_row, before)
+
+    @cached_property
+    def rebound(self) -> Array:
+        """Largest height of the centre of mass after the first contact, over its height at the start, shape (...); 0 without a contact."""
+        height, (before, after) = self.states.height, self.first_contact
+        later = np.where(np.arange(height.shape[-1]) >= after[..., None], height, -np.inf)
+        with np.errstate(invalid="ignore", divide="ignore"):  # without a floor a start may have height 0
+            return np.where(before < 0, 0.0, later.max(axis=-1) / height[..., 0])
+
+    @cached_property
+    def last_row_in_motion(self) -> RowNumbers:
+        """The last row in which M v²/2 + ω·L/2 is above M (2 g dt)²/2, and above a millionth of M g times the body's size, shape (...)."""
+        setup, g = self.setup, self.setup.gravity_strength
+        still = setup.mass * np.maximum(2.0 * (g * self.dt) ** 2, 1e-6 * g * setup.size)
+        moves = self.states.kinetic_energy > still[..., None]
+        last = moves.shape[-1] - 1 - moves[..., ::-1].argmax(axis=-1)
+        return np.where(moves.any(axis=-1), np.minimum(last, self.last_row), 0)
+
+
+def is_touching(before: Components, after: Components, dt: float, gravity: Components, strength: float, damping_share: float) -> Any:
+    """Whether the floor changes the velocity in a step, from the velocities before and after it.
+
+    Without contact, a step changes the velocity by gravity and damping alone. What is left over counts as contact above
+    1e-3 of gravity's share, 1e-6 of the speed (an engine in single precision) and twice the damping's share (each engine
+    damps by a law of its own). Plain arithmetic as in `scenarios.mechanics`: of one step, or of arrays of steps.
+    """
+    x = after[0] - before[0] - dt * gravity[0]
+    y = after[1] - before[1] - dt * gravity[1]
+    z = after[2] - before[2] - dt * gravity[2]
+    allowed = 1e-3 * dt * strength + (1e-6 + damping_share) * np.sqrt(scalar_product(before, before))
+    return np.sqrt(scalar_product((x, y, z), (x, y, z))) > allowed
+
+
+@dataclass(frozen=True, eq=False)
+class _StatesOfOne:
+    """`StateQuantities` of one motion of a scene."""
+
+    scene: Scenario
+    motion: Trajectory
+
+    @property
+    def height(self) -> Array:
+        return self.motion.position[:, 1]
+
+    @cached_property
+    def kinetic_energy(self) -> Array:
+        return kinetic_energy(self.scene, self.motion)
+
+    @cached_property
+    def energy(self) -> Array:
+        return energy(self.scene, self.motion)
+
+    @cached_property
+    def lowest_height(self) -> Array:
+        return lowest_height(self.scene, self.motion)
+
+    @cached_property
+    def touching(self) -> Mask:
+        setup, dt = Setup.of(self.scene), np.asarray(self.motion.t[1] - self.motion.t[0])
+        before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
+        found: Mask = is_touching(
+            before, after, float(dt), tuple(setup.gravity), float(setup.gravity_strength), float(setup.damping_share(dt))
+        )
+        return found
+
+
+def at_rows(values: Array, rows: RowNumbers | int) -> Array:
+    """The value of each motion at a row of its own: shapes (..., n) and (...) to (...)."""
+    return np.take_along_axis(values, np.asarray(rows)[..., None], axis=-1)[..., 0]

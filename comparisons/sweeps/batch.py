@@ -1,0 +1,271 @@
+"""Jobs of the reference implementation side by side: arrays of parameters go to its kernels, without building a scene for each job.
+
+Some jobs are left to `single.run_single`: those that are not ordinary (a body below the floor, a time step that does not fit, a friction
+that the impact law does not support) and those that the kernels refuse. The result of a job has the same bits as when it is run by itself.
+"""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+import reference_impl
+from comparisons.engines.document import Document, reference_body, reference_world
+from comparisons.measuring.batch import motions_side_by_side
+from comparisons.measuring.motions import Setup
+from comparisons.running.recording import FEWEST_STEPS, MOST_STEPS
+from comparisons.running.verification import UNIT_TOLERANCE
+from comparisons.sweeps.fields import Path, path_of, set_field, with_fields
+from comparisons.sweeps.jobs import OPTION, Jobs
+from comparisons.sweeps.outcomes import Outcomes, requested_metrics
+from comparisons.sweeps.single import scene_of
+from scenarios import Scenario, SceneError, Trajectory
+from scenarios.body import Body
+from scenarios.ensemble import clearances, spread_starts
+from scenarios.model import TOUCHING, unit
+from scenarios.state import ORIENTATION, PARTS, POSITION
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+BATCH_BYTES = 8 * 2**20
+"""States that are held in memory at a time; more would not be faster."""
+ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}
+
+
+def run_batch(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
+    """Run the jobs that can be run side by side; the verdicts of all others stay empty."""
+    for indices in _groups(jobs):
+        group = jobs[indices]
+        engine = group.engine_at(0)
+        scene = _representative_scene(group)
+        # The steps that a sequential contact leaves unsolved are reported for each job, and are counted only for a job by itself.
+        if isinstance(engine, Document) and engine.option("contact") == "mean" and scene is not None:
+            _run_group(group, indices, engine, scene, outcomes, metrics)
+
+
+def _is_array_field(name: str, column: NDArray[Any]) -> bool:
+    """Whether the kernels take a field as an array, with one value for each job."""
+    path = path_of(name)
+    in_vector = len(path) == 3 and (path[0] == "start" or path[:2] == ("gravity", "acceleration"))
+    return column.dtype == float and (in_vector or path in ARRAY_FIELDS or path[0] in ("duration", "body"))
+
+
+def _groups(jobs: Jobs) -> Iterator[Indices]:
+    """The indices of jobs that differ only in fields that the kernels take as arrays."""
+    columns = [column for name, column in jobs.values.items() if name.startswith(OPTION) or not _is_array_field(name, column)]
+    if not columns:
+        yield np.arange(len(jobs))
+        return
+    groups: dict[str, list[int]] = {}
+    for index, values in enumerate(zip(*columns, strict=True)):
+        groups.setdefault(repr(values), []).append(index)
+    yield from map(np.array, groups.values())
+
+
+def _representative_scene(jobs: Jobs) -> Scenario | None:
+    """A scene with the structure of all jobs of a group; the fields that differ are passed as arrays. None if no such scene is valid."""
+    shared = [(name, column[0]) for name, column in jobs.fields.items() if not _is_array_field(name, column)]
+    for others in ((), jobs.fields.items()):
+        try:
+            return with_fields(jobs.scene, [*shared, *((name, column[0]) for name, column in others)])
+        except SceneError:
+            continue
+    return None
+
+
+@dataclass(frozen=True)
+class _Parameters:
+    """Jobs of one group as arrays; a leading axis of 1 stands for values that all share.
+
+    Attributes:
+        body: The bodies for the kernels.
+        world: The worlds for the kernels.
+        starts: Shape (B, 13).
+        dts: Time steps [s], shape (B,).
+        steps: Shape (B,).
+        setup: What moves, for the metrics.
+    """
+
+    body: reference_impl.Body
+    world: reference_impl.World
+    starts: Array
+    dts: Array
+    steps: NDArray[np.int64]
+    setup: Setup
+
+    def __getitem__(self, indices: Indices) -> "_Parameters":
+        return _Parameters(*(_selected(getattr(self, field.name), indices) for field in fields(self)))
+
+
+def _selected(given: Any, indices: Indices) -> Any:
+    """Some rows of every array that has one for each job."""
+    if isinstance(given, np.ndarray):
+        return given if len(given) == 1 else given[indices]
+    if isinstance(given, Setup):
+        return given[indices]
+    if isinstance(given, reference_impl.Body | reference_impl.World):
+        return type(given)(*(_selected(getattr(given, field.name), indices) for field in fields(given)))
+    if isinstance(given, reference_impl.Floor):
+        return reference_impl.Floor(*(_selected(part, indices) for part in given))
+    return None if given is None else tuple(_selected(part, indices) for part in given)
+
+
+def _run_group(jobs: Jobs, indices: Indices, engine: Document, scene: Scenario, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
+    """Run the jobs of a group in order of their number of steps, as many at a time as `BATCH_BYTES` allow."""
+    parameters, is_ordinary = _parameters(jobs, scene)
+    is_ordinary &= _is_accepted(jobs, engine, scene)
+    order = np.flatnonzero(is_ordinary)[np.argsort(parameters.steps[is_ordinary], kind="stable")]
+    for selected in _batches(parameters.steps[order]):
+        chosen = order[selected]
+        batch = parameters[chosen]
+        try:
+            simulator = reference_impl.Simulator(batch.body, batch.world, batch.dts, engine.methods())
+            start = time.perf_counter()
+            recorded = simulator.run(batch.starts, int(batch.steps[-1]), threads=1)
+            seconds = time.perf_counter() - start
+        except ValueError:
+            continue  # a value that the kernels refuse: run by itself, each of these jobs gets a row of its own
+        outcomes.time_per_step[indices[chosen]] = seconds / (int(batch.steps[-1]) * len(chosen))
+        _measure(batch.setup, recorded, batch.dts, batch.steps, indices[chosen], outcomes)
+        if metrics:
+            _measure_requested(jobs, indices, chosen, recorded, outcomes, metrics)
+
+
+def _measure_requested(
+    jobs: Jobs, indices: Indices, chosen: Indices, recorded: Array, outcomes: Outcomes, metrics: tuple[str, ...]
+) -> None:
+    """Record the metrics that the spec asks for, one motion after the other."""
+    for index, states in zip(chosen, recorded, strict=True):
+        row = indices[index]
+        if outcomes.verdict[row] == "measured":
+            dt, rows = float(jobs.dts[index]), int(outcomes.steps[row]) + 1
+            motion = Trajectory.from_states(dt * np.arange(rows, dtype=float), states[:rows], 0.5 * dt)
+            outcomes.metrics[row] = requested_metrics(scene_of(jobs, index), motion, metrics)
+
+
+def _measure(setup: Setup, states: Array, dts: Array, steps: NDArray[np.int64], indices: Indices, outcomes: Outcomes) -> None:
+    """Record the outcomes of motions; the verdict of one that is not valid stays empty, because a job by itself reports the reason."""
+    motions, valid = motions_side_by_side(setup, states, dts, 0.5 * dts, steps, UNIT_TOLERANCE)
+    if valid.all():
+        outcomes.set_measured(indices, states, motions)
+    elif valid.any():
+        _measure(setup[valid], states[valid], dts[valid], steps[valid], indices[valid], outcomes)
+
+
+def _batches(steps: NDArray[np.int64]) -> Iterator[slice]:
+    """Slices of jobs, which are in order of their number of steps, whose states take at most `BATCH_BYTES`."""
+    first = 0
+    while first < len(steps):
+        last = first + 1
+        while last < len(steps) and (last + 1 - first) * (1 + steps[last]) * 13 * 8 <= BATCH_BYTES:
+            last += 1
+        yield slice(first, last)
+        first = last
+
+
+def _is_accepted(jobs: Jobs, engine: Document, scene: Scenario) -> NDArray[np.bool_]:
+    """Which jobs have a friction that the engine's impact law supports; that depends only on whether there is friction."""
+    friction = jobs.fields.get("floor.friction")
+    if friction is None or friction.dtype == object:
+        return np.full(len(jobs), engine.declines(scene) is None)
+    accepted = np.zeros(len(jobs), dtype=bool)
+    for selected in (friction > 0.0, friction == 0.0):
+        if selected.any():
+            accepted[selected] = engine.declines(with_fields(scene, [("floor.friction", float(friction[selected][0]))])) is None
+    return accepted
+
+
+def _parameters(jobs: Jobs, scene: Scenario) -> tuple[_Parameters, NDArray[np.bool_]]:
+    """The parameters of jobs, and which jobs are ordinary."""
+    columns = {path_of(name): column for name, column in jobs.fields.items() if _is_array_field(name, column)}
+    bodies, is_built = _bodies(scene, {path: column for path, column in columns.items() if path[0] == "body"})
+    radius, vertices = (np.array([getattr(body, name) for body in bodies]) for name in ("rounding", "vertices"))
+    starts = _starts(jobs, scene, columns, vertices, radius)
+    world = _world(jobs, scene, columns)
+    setup = Setup(
+        mass=np.array([body.mass for body in bodies]),
+        inertia=np.array([body.inertia_tensor for body in bodies]),
+        vertices=vertices,
+        rounding=radius,
+        size=np.array([body.size for body in bodies]),
+        origin=_origins(scene, starts, np.array([body.resting_height for body in bodies])),
+        clearance=clearances(starts, vertices, radius),
+        gravity=np.zeros((1, 3)) if world.gravity is None else world.gravity,
+        damping=None if world.damping is None else np.asarray(world.damping[0]),
+        floor=scene.floor is not None,
+    )
+    with np.errstate(all="ignore"):  # of values that are not ordinary
+        ratio = columns.get(("duration",), scene.duration) / jobs.dts
+        is_ordinary = is_built & (ratio + 1e-9 >= FEWEST_STEPS) & (ratio + 1e-9 <= MOST_STEPS)
+    if scene.floor is not None:
+        is_ordinary &= setup.clearance >= -0.5 * TOUCHING * setup.size  # a start nearer to the limit is left to the scene's own check
+    steps = np.where(is_ordinary, np.floor(np.where(is_ordinary, ratio, 0.0) + 1e-9), 0).astype(np.int64)
+    reference = [reference_body(body) for body in bodies]
+    body = reference_impl.Body(*(np.array([getattr(one, field.name) for one in reference]) for field in fields(reference_impl.Body)))
+    return _Parameters(body, world, starts, jobs.dts, steps, setup), is_ordinary
+
+
+def _world(jobs: Jobs, scene: Scenario, columns: dict[Path, Array]) -> reference_impl.World:
+    """What acts on the bodies, one value for each job."""
+
+    def column(path: Path, otherwise: float | Array) -> Array:
+        return columns.get(path, np.full(len(jobs), otherwise))
+
+    world = reference_world(scene)
+    if scene.gravity is not None:
+        gravity = [column(("gravity", "acceleration", axis), value) for axis, value in enumerate(scene.acceleration)]
+        world = replace(world, gravity=np.stack(gravity, axis=1))
+    if world.floor is not None:
+        floor = (column(("floor", name), getattr(world.floor, name)) for name in world.floor._fields)
+        world = replace(world, floor=reference_impl.Floor(*floor))
+    if world.damping is not None:
+        linear, angular = world.damping
+        world = replace(world, damping=(column(("damping", "linear"), linear), column(("damping", "angular"), angular)))
+    return world
+
+
+def _bodies(scene: Scenario, columns: dict[Path, Array]) -> tuple[list[Body], NDArray[np.bool_]]:
+    """One body for all jobs, or one for each, and which of them are valid; the scene's own body replaces one that is not."""
+    if not columns:
+        return [scene.body], np.ones(1, dtype=bool)
+    found: list[Body] = []
+    for values in zip(*columns.values(), strict=True):
+        content = {"body": scene.body.model_dump(exclude_none=True)}
+        for path, value in zip(columns, values, strict=True):
+            set_field(content, path, float(value))
+        try:
+            found.append(type(scene.body).model_validate(content["body"]))
+        except ValidationError:
+            found.append(scene.body)
+    tensors = np.array([body.inertia_tensor for body in found])
+    finite = np.isfinite(tensors).all(axis=(1, 2))
+    is_definite = np.linalg.eigvalsh(np.where(finite[:, np.newaxis, np.newaxis], tensors, 0.0))[:, 0] > 0.0
+    return found, is_definite & np.array([body is not scene.body for body in found])
+
+
+def _starts(jobs: Jobs, scene: Scenario, columns: dict[Path, Array], vertices: Array, radius: Array) -> Array:
+    """The start of each job, shape (B, 13)."""
+    starts = np.tile(scene.initial_state, (len(jobs), 1))
+    for kind, part in PARTS.items():
+        for axis in range(part.stop - part.start):
+            column = columns.get(("start", kind, axis))
+            if column is not None:
+                starts[:, part.start + axis] = column
+    if any(path[:2] == ("start", "orientation") for path in columns):
+        starts[:, ORIENTATION] = [unit(tuple(q)) if any(q) else q for q in starts[:, ORIENTATION].tolist()]
+    if jobs.seeds is None:
+        return starts
+    assert scene.ensemble is not None
+    return spread_starts(starts, scene.ensemble, jobs.seeds, vertices, radius, scene.floor is not None)
+
+
+def _origins(scene: Scenario, starts: Array, resting_heights: Array) -> Array:
+    """Where the potential energy of each job is 0 [m], shape (B, 3): as `scenarios.mechanics.energy_origin`."""
+    if scene.floor is None:
+        return starts[:, POSITION]
+    return np.outer(resting_heights, [0.0, 1.0, 0.0])

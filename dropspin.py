@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from scenarios.errors import SceneError as SceneError
     from scenarios.errors import UnknownName as UnknownName
     from scenarios.loading import load as load
+    from scenarios.loading import names as scene_names
     from scenarios.model import Scenario as Scenario
     from scenarios.trajectory import Trajectory as Trajectory
     from scenarios.truths import truth_for as truth_for

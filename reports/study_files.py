@@ -31,7 +31,7 @@ def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
 
 
 def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: Path) -> None:
-    """`tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot for each scene."""
+    """Write `tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot for each scene."""
     write_table(folder, "tradeoff", tradeoff.COLUMNS, [row for one in found for row in tradeoff.rows(one)])
     section = Section("What accuracy costs")
     for one in found:
@@ -43,10 +43,10 @@ def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: P
 
 
 def write_history(found: History, folder: Path) -> None:
-    """`history.csv` and `history.json` with every result of every run, `history.md`, and a plot for each scene."""
+    """Write `history.csv` and `history.json` with every result of every run, `history.md`, and a plot for each scene."""
     results = found.results.drop(columns="verdict").assign(run=[found.names[number] for number in found.results["run"]])
     table = results.merge(found.stamps, on="run")
-    known = table.astype(object).where(table.notna(), None)  # JSON knows no NaN
+    known = table.astype(object).where(table.notna(), None)  # JSON has no NaN
     records = [{str(key): value for key, value in row.items()} for row in known.to_dict("records")]
     write_table(folder, "history", [str(name) for name in table], records)
     scenes = list(dict.fromkeys(found.results["scene"]))

@@ -60,7 +60,11 @@ def test_imports_for_type_checkers_agree_with_those_at_run_time():
     """The same names, from the modules that define them; the first is for mypy and editors, the second for Python."""
     tree = ast.parse(Path(dropspin.__file__).read_text(encoding="utf-8"))
     [block] = [node for node in tree.body if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"]
-    declared = {alias.asname: (node.module, alias.name) for node in block.body for alias in node.names}
+    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+    declared = {alias.asname: (node.module, alias.name) for node in imports for alias in node.names}
+    for node in block.body:
+        if isinstance(node, ast.Assign):
+            declared[node.targets[0].id] = declared.pop(node.value.id)
     assert declared == dropspin._LOCATIONS
     for name, (module, home) in declared.items():
         found = getattr(importlib.import_module(module), home)

@@ -68,8 +68,8 @@ class ProfileComparison:
         parts = sorted(row["part"] for row in self.rows)
         half = parts[len(parts) // 2]
         return (
-            f"{self.engine}: {sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest step are mostly "
-            f"setting errors; the median share is {100 * half:.1f} %."
+            f"{self.engine}: {sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest time step "
+            f"are mostly setting errors; the median share is {100 * half:.1f} %."
         )
 
 

@@ -174,7 +174,7 @@ def test_a_run_replaces_an_earlier_run_and_nothing_else(small, tmp_path):
     precious = tmp_path / "thesis"
     precious.mkdir()
     (precious / "chapter1.tex").write_text("x")
-    with pytest.raises(DropspinError, match="holds files that are no run of dropspin"):
+    with pytest.raises(DropspinError, match="has files that dropspin run did not write"):
         write_report(small, precious)
     assert (precious / "chapter1.tex").read_text() == "x"
     with pytest.raises(DropspinError, match="is a file; choose a folder"):
@@ -203,22 +203,22 @@ def test_files_that_no_run_wrote_are_never_deleted(small, tmp_path, monkeypatch)
     keep = tmp_path / "precious" / "keep"
     keep.mkdir(parents=True)
     (keep / "thesis.txt").write_text("x")
-    with pytest.raises(DropspinError, match=r"holds files that are no run"):
+    with pytest.raises(DropspinError, match="has files that dropspin run did not write"):
         write_report(small, tmp_path / "precious" / "new" / "..")
     (keep / "run.json").write_text("{}")
-    with pytest.raises(DropspinError, match=r"'run\.json' for one"):
+    with pytest.raises(DropspinError, match=r"'run\.json'; move"):
         write_report(small, keep)
     (keep / "thesis.txt").rename(tmp_path / "thesis.txt")
-    with pytest.raises(DropspinError, match=r"holds files that are no run"):
+    with pytest.raises(DropspinError, match="has files that dropspin run did not write"):
         write_report(small, keep)
     run = tmp_path / "run"
     write_report(small, run)
     (run / "my-notes.txt").write_text("x")
-    with pytest.raises(DropspinError, match=r"'my-notes\.txt' for one"):
+    with pytest.raises(DropspinError, match=r"'my-notes\.txt'; move"):
         write_report(small, run)
     (run / "my-notes.txt").unlink()
     (run / "plots" / "mine.svg").write_text("x")
-    with pytest.raises(DropspinError, match=r"'plots/mine\.svg' for one"):
+    with pytest.raises(DropspinError, match=r"'plots/mine\.svg'; move"):
         write_report(small, run)
     (run / "plots" / "mine.svg").unlink()
     run.chmod(0o700)
@@ -257,7 +257,7 @@ def test_a_swap_that_fails_brings_the_old_run_back(small, tmp_path, monkeypatch,
         return rename(self, to)
 
     monkeypatch.setattr(Path, "rename", fails_once)
-    with pytest.raises(DropspinError, match="Device or resource busy; the folder is as it was"):
+    with pytest.raises(DropspinError, match="Device or resource busy; the folder is unchanged"):
         write_report(small, target)
     assert (target / "results.csv").read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["run"]

@@ -108,7 +108,7 @@ def whole(shared):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_sweep_is_resumed(how, whole, tmp_path):
-    """Exit code 130 at once, written jobs are whole and counted, no process is left; resumed, the table is that of an uninterrupted sweep."""
+    """Exit code 130 at once; written jobs are counted; no process is left; resumed, the table is that of an uninterrupted sweep."""
     (tmp_path / "spec.toml").write_text(LONG)
     process = subprocess.Popen(
         [DROPSPIN, "sweep", "spec.toml", "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -58,10 +58,13 @@ if TYPE_CHECKING:
     from scenarios.errors import SceneError as SceneError
     from scenarios.errors import UnknownName as UnknownName
     from scenarios.loading import load as load
+    from scenarios.loading import names as _names
     from scenarios.model import Scenario as Scenario
     from scenarios.trajectory import Trajectory as Trajectory
     from scenarios.truths import truth_for as truth_for
     from scenarios.truths.truth import Truth as Truth
+
+    scene_names = _names  # mypy exports a name that is imported as another only if it is assigned
 
 _HOMES = {
     "comparisons.calibration": ("Calibration", "calibrate"),

@@ -17,7 +17,7 @@ JUDGED = FAILURES | BREAKDOWNS | {"passed", "limited", "declined", "missing"}
 
 
 def junit_xml(results: Results, baseline: str | None = None) -> bytes:
-    """The document.
+    """The checks of a run as JUnit XML.
 
     Args:
         results: The run, with the rows of a check if there was one.
@@ -63,5 +63,5 @@ def _with_text(result: Failure | Error, text: str) -> Failure | Error:
 
 
 def _printable(text: str) -> str:
-    """Without the characters that XML has no way to write; an engine's last words may hold any."""
+    """A text without the characters that XML cannot contain; an engine's error message may have any."""
     return "".join(sign if sign in "\n\t" or sign.isprintable() else "�" for sign in text)

@@ -14,11 +14,11 @@ from reports.views.failures import Failure
 from reports.views.run import overview
 
 MOST_FAILURES = 100
-"""Failures listed in a summary; JUnit and JSON have them all."""
+"""Failures that a summary lists; JUnit and JSON have all."""
 
 
 def run_markdown(results: Results) -> str:
-    """The report of a run in short."""
+    """A short report of a run."""
     return page("report.md", **overview(results))
 
 

@@ -1,4 +1,4 @@
-"""What a study leaves behind: a folder that is there before the work, and tables as CSV and JSON."""
+"""Output of studies: a folder that is created before the work, and tables as CSV and JSON."""
 
 import csv
 import json
@@ -13,12 +13,12 @@ from scenarios import DropspinError
 
 @contextmanager
 def folder_made(folder: str) -> Iterator[Path]:
-    """A folder to write into, made now, so that one that cannot be written fails before the work and not after it.
+    """Create a folder to write into, so that one that cannot be written fails before the work and not after it.
 
-    On leaving, what was made and stayed empty goes again.
+    On leaving, created folders that stayed empty are removed.
 
     Raises:
-        DropspinError: On entering, if it cannot be made, or nothing can be written there.
+        DropspinError: On entering, if the folder cannot be created or written.
     """
     path = Path(folder)
     made: list[Path] = []
@@ -33,7 +33,7 @@ def folder_made(folder: str) -> Iterator[Path]:
         yield path
     finally:
         for one in made:
-            with suppress(OSError):  # it holds the tables, or somebody else's
+            with suppress(OSError):  # it holds the tables, or other files
                 one.rmdir()
 
 

@@ -1,4 +1,4 @@
-"""Pages from Jinja templates, HTML and Markdown; what stands in HTML is escaped."""
+"""Pages from Jinja templates, HTML and Markdown; values in HTML are escaped."""
 
 import re
 from functools import cache
@@ -11,7 +11,7 @@ from reports.views import numbers
 
 
 def page(template: str, **content: Any) -> str:
-    """A page of one of the templates in `reports/templates/`."""
+    """A page from one of the templates in `reports/templates/`."""
     return _environment().get_template(template).render(content)
 
 
@@ -32,12 +32,12 @@ def _environment() -> Environment:
 
 
 def _markdown_cell(text: str) -> str:
-    """Text that stays within its cell of a Markdown table and means nothing else there."""
+    """Text escaped for a cell of a Markdown table."""
     return re.sub(r"([\\|`*_\[\]<>#])", r"\\\1", " ".join(str(text).split()))
 
 
 def _markdown_code(text: str) -> str:
-    """Text as code, whatever backticks it has."""
+    """Text as Markdown code; the fence is longer than any run of backticks in it."""
     fence = "`" * (1 + max((len(found) for found in re.findall("`+", text)), default=0))
     room = " " if len(fence) > 1 else ""
     return f"{fence}{room}{text}{room}{fence}"

@@ -1,4 +1,4 @@
-"""A run's folder, written whole or not at all."""
+"""The folder of a run: written completely or not at all; it replaces only an earlier run."""
 
 import json
 import os
@@ -29,8 +29,8 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Sectio
 
     Args:
         results: The run.
-        folder: Where to; made if it does not exist.
-        sections: What other studies have to tell, for the report.
+        folder: The folder; it is created if it does not exist.
+        sections: Sections of studies, for the report.
 
     Returns:
         The path of report.html.
@@ -44,7 +44,7 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Sectio
 
 
 def fill(results: Results, folder: Path, sections: Sequence[Section] = (), png: bool = False) -> None:
-    """Write everything of a run into an empty folder."""
+    """Write the data, the reports and the plots of a run into an empty folder."""
     save(results, folder)
     results.table.to_csv(folder / "results.csv", index=False)
     (folder / "plots").mkdir()
@@ -61,7 +61,7 @@ def fill(results: Results, folder: Path, sections: Sequence[Section] = (), png: 
 
 @contextmanager
 def run_folder(folder: str | Path) -> Iterator[Path]:
-    """An empty folder beside the one asked for, which it replaces when the block ends well; else nothing is left of it.
+    """An empty folder beside the one asked for, which it replaces when the block succeeds; else it is removed.
 
     Raises:
         DropspinError: On entering, if the folder holds something else or cannot be written.
@@ -81,11 +81,11 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
         _assert_replaceable(folder, target)
         _swap(unfinished, target)
     except OSError as error:
-        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; the folder is as it was.") from error
+        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; the folder is unchanged.") from error
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
         for parent in made:
-            with suppress(OSError):  # it holds the run, or somebody else's
+            with suppress(OSError):  # it holds the run, or other files
                 parent.rmdir()
 
 
@@ -93,9 +93,9 @@ PARTS = "[0-9]*"
 
 
 class MeasuredScenes:
-    """The scenes of a run that are measured already, on disk beside the folder that the run will have.
+    """The scenes of a run that were measured already, on disk beside the folder of the run.
 
-    A run that is interrupted, or killed, leaves them there; one that ends well does not.
+    A run that is interrupted or killed leaves them there, for `--resume`; a run that succeeds removes them.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -103,7 +103,7 @@ class MeasuredScenes:
         self._path = target.with_name(f".{target.name[:100]}-measured")
 
     def keep(self, part: Results) -> None:
-        """Write a scene's results, whole or not at all."""
+        """Write the results of a scene, completely or not at all."""
         [scene] = part.scenes
         self._path.mkdir(exist_ok=True)
         unfinished = Path(tempfile.mkdtemp(prefix="unfinished-", dir=self._path))
@@ -114,23 +114,23 @@ class MeasuredScenes:
         return len(list(self._path.glob(PARTS)))
 
     def parts(self) -> list[Results]:
-        """What there is, in no order."""
+        """The results of the scenes that were kept."""
         return [load_results(path) for path in sorted(self._path.glob(PARTS))]
 
     def clear(self) -> None:
-        """Forget it."""
+        """Remove them."""
         shutil.rmtree(self._path, ignore_errors=True)
 
 
 def _umask() -> int:
-    """The process's own; it can only be read by setting it."""
+    """The umask of this process, which can only be read by setting it."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
 
 
 def _swap(unfinished: Path, target: Path) -> None:
-    """Put the new folder in the place of the old one, if there is one; if that fails the old one goes back."""
+    """Put the new folder in the place of an old one; if that fails, put the old one back."""
     if not target.exists():
         unfinished.rename(target)
         return
@@ -152,18 +152,18 @@ def _assert_replaceable(given: str | Path, target: Path) -> None:
         raise DropspinError(f"{given}: is a file; choose a folder.")
     if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
         raise DropspinError(
-            f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it, or work from outside."
+            f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it."
         )
     known = _files_of_run(target)
     strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
     if strangers:
         raise DropspinError(
-            f"{given}: holds files that are no run of dropspin, {strangers[0]!r} for one; move them away, or choose an empty or new folder."
+            f"{given}: has files that dropspin run did not write, such as {strangers[0]!r}; move them away, or choose an empty or new folder."
         )
 
 
 def _files_of_run(folder: Path) -> set[str]:
-    """Everything that a run wrote into its folder, as far as it can be told; nothing if no run is there."""
+    """The files that a run wrote to its folder; empty if the folder has no run."""
     try:
         content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         arrays, scenes = {*content["trajectories"], *content["ensembles"]}, content["scenes"]

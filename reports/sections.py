@@ -1,4 +1,4 @@
-"""What a study has to tell, part by part: a Markdown page of its own, and a section in the report of a run."""
+"""The section of a study: a Markdown page of its own, and a part of the report of a run."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ class Section:
     parts: list[Part] = field(default_factory=list)
 
     def add_heading(self, content: str) -> None:
-        """Begin a part of the section."""
+        """Add a heading."""
         self.parts.append({"kind": "heading", "content": content})
 
     def add_text(self, content: str) -> None:
@@ -41,12 +41,12 @@ class Section:
         self.parts.append({"kind": "text", "content": content})
 
     def add_list(self, items: Sequence[str]) -> None:
-        """Add sentences, a line each; nothing if there are none."""
+        """Add a list of sentences, unless it is empty."""
         if items:
             self.parts.append({"kind": "list", "items": list(items)})
 
     def add_table(self, rows: Sequence[Mapping[str, str]]) -> None:
-        """Add a table; nothing if it has no rows."""
+        """Add a table, unless it has no rows."""
         if rows:
             self.parts.append({"kind": "table", "rows": [dict(row) for row in rows]})
 
@@ -55,13 +55,13 @@ class Section:
         self.parts.append({"kind": "picture", "name": name, "svg": svg(figure, name)})
 
     def write(self, folder: Path, stem: str) -> None:
-        """Write the page, its pictures, and what the report of a run takes it from."""
+        """Write the Markdown page, its pictures, and `section.json`, from which a report takes the section."""
         (folder / FILE).write_text(json.dumps({"title": self.title, "parts": self.parts}, indent=1), encoding="utf-8")
         pictures = [part for part in self.parts if part["kind"] == "picture"]
         for picture in pictures:
             (folder / f"{picture['name']}.svg").write_text(picture["svg"], encoding="utf-8")
-        told = "\n\n".join([f"# {self.title}", *map(_markdown, self.parts)])
-        (folder / f"{stem}.md").write_text(f"{told}\n", encoding="utf-8")
+        page = "\n\n".join([f"# {self.title}", *map(_markdown, self.parts)])
+        (folder / f"{stem}.md").write_text(f"{page}\n", encoding="utf-8")
 
 
 class _Prose(BaseModel):
@@ -91,16 +91,16 @@ class _File(BaseModel):
 
 
 def read_section(folder: str) -> Section:
-    """What a study has left in its folder.
+    """The section that a study wrote to its folder.
 
     Raises:
-        DropspinError: There is none, or it is damaged.
+        DropspinError: The folder has no section, or a damaged one.
     """
     try:
         return Section(**_File.model_validate_json((Path(folder) / FILE).read_bytes()).model_dump())
     except (OSError, ValueError):
         raise DropspinError(
-            f"{folder}: holds no study, or a damaged one; give a folder that dropspin tradeoff or dropspin limits wrote."
+            f"{folder}: has no study, or a damaged one; give a folder that dropspin tradeoff or dropspin limits wrote."
         ) from None
 
 

@@ -46,7 +46,7 @@ def write_history(found: History, folder: Path) -> None:
     """Write `history.csv` and `history.json` with every result of every run, `history.md`, and a plot per scene."""
     results = found.results.drop(columns="verdict").assign(run=[found.names[number] for number in found.results["run"]])
     table = results.merge(found.stamps, on="run")
-    known = table.astype(object).where(table.notna(), None)  # JSON knows no NaN
+    known = table.astype(object).where(table.notna(), None)  # JSON has no NaN
     records = [{str(key): value for key, value in row.items()} for row in known.to_dict("records")]
     write_table(folder, "history", [str(name) for name in table], records)
     scenes = list(dict.fromkeys(found.results["scene"]))

@@ -1,12 +1,14 @@
 """Trajectories: the states of a body over time."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -42,11 +44,28 @@ class Trajectory:
         """All states, shape (n, 13)."""
         return np.hstack([self.position, self.orientation, self.velocity, self.angular_velocity])
 
+    def to_frame(self) -> "pd.DataFrame":
+        """A table with a row for each time and a column for each of the 13 components, such as `position_y` and `orientation_w`.
+
+        Returns:
+            A pandas DataFrame; its index is the time `t` [s].
+        """
+        import pandas as pd
+
+        parts = {"position": "xyz", "orientation": "xyzw", "velocity": "xyz", "angular_velocity": "xyz"}
+        columns = [f"{part}_{axis}" for part, axes in parts.items() for axis in axes]
+        return pd.DataFrame(self.states, index=pd.Index(self.t, name="t"), columns=columns)
+
+    def __repr__(self) -> str:
+        if len(self) == 0:
+            return "<Trajectory: no states>"
+        return f"<Trajectory: {len(self)} states from t = {self.t[0]:g} s to {self.t[-1]:g} s>"
+
     def __len__(self) -> int:
         return len(self.t)
 
     def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Self:
-        """The same motion at some of its times."""
+        """The motion at some of its times."""
         position, orientation = self.position[rows], self.orientation[rows]
         return type(self)(self.t[rows], position, orientation, self.velocity[rows], self.angular_velocity[rows], self.velocity_lag)
 

@@ -1,38 +1,78 @@
-"""What the packages promise to whoever imports them."""
+"""What is imported when, and what `import dropspin` offers."""
 
+import ast
 import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import dropspin
 
-def modules_after(statement):
-    program = f"import sys\n{statement}\nprint(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    return {name.split(".")[0] for name in done.stdout.split()}
+SLOW = {"numba", "pandas", "pyarrow", "matplotlib", "mujoco", "pybullet", "scipy.stats", "scipy.spatial", "scipy.optimize"}
+EVERYTHING = {"click", "numpy", "pandas", "pydantic", "rich", "scipy", "scenarios", "comparisons", "reports", "reference_impl"}
+COMMAND = "import sys, os\nsys.argv = ['dropspin', *{!r}]\nimport dropspin\ntry:\n    dropspin.main()\nexcept SystemExit:\n    pass\n"
+
+
+def modules_after(program):
+    """The names of all modules that a fresh interpreter has imported after a program."""
+    done = subprocess.run([sys.executable, "-c", f"{program}\nimport sys\nprint(*sys.modules)"], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
 
 
 @pytest.mark.parametrize(
-    ("statement", "absent"),
+    ("program", "absent"),
     [
-        ("import scenarios", {"mujoco", "pybullet", "numba", "pandas", "matplotlib", "mpmath"}),
+        ("import dropspin", EVERYTHING),
+        ("import dropspin; dir(dropspin)", EVERYTHING),
+        ("import dropspin; dropspin.load", SLOW | {"scipy", "comparisons", "reports", "rich"}),
+        ("import scenarios", SLOW | {"scipy", "mpmath"}),
         ("import reference_impl", {"mujoco", "pybullet", "pandas", "pydantic", "scenarios"}),
-        ("import comparisons", {"mujoco", "pybullet", "numba", "matplotlib", "jinja2", "rich", "reports"}),
-        ("import reports.commands.main", {"mujoco", "pybullet", "numba", "pandas", "scipy", "matplotlib", "rich"}),
-        ("import dropspin_command", {"scenarios", "comparisons", "reports", "click"}),
-        ("import dropspin_pytest", {"scenarios", "comparisons", "reports", "reference_impl", "click", "numpy", "tomlkit", "filelock"}),
-        ("import reports", {"mujoco", "pybullet", "numba", "matplotlib"}),
+        ("import comparisons", SLOW | {"jinja2", "rich", "reports"}),
+        ("import reports", SLOW | {"jinja2", "rich"}),
+        ("import dropspin_pytest", EVERYTHING | {"tomlkit", "filelock"}),
+        (COMMAND.format(["--help"]), EVERYTHING - {"click", "reports"}),
+        (COMMAND.format(["list"]), SLOW | {"scipy", "jinja2"}),
+        (COMMAND.format(["list", "metrics"]), SLOW | {"scipy", "jinja2"}),
+        (COMMAND.format(["show", "drop-ball"]), SLOW | {"scipy", "jinja2"}),
     ],
+    ids=lambda case: case.splitlines()[1] if isinstance(case, str) and "\n" in case else case if isinstance(case, str) else "",
 )
-def test_imports_are_lazy(statement, absent):
-    """In a fresh interpreter, what is slow or optional is not loaded before it is needed."""
-    assert not modules_after(statement) & absent
+def test_slow_and_optional_modules_are_not_imported_before_they_are_needed(program, absent):
+    """In a fresh interpreter, so that help, lists and scenes are printed at once."""
+    assert not modules_after(program) & absent
 
 
-@pytest.mark.parametrize("package", ["scenarios", "reference_impl", "comparisons", "reports"])
-def test_public_names(package):
-    """`__all__` is sorted by kind and complete: every name in it exists and says what it is."""
+def test_every_public_name_resolves():
+    """And `dir(dropspin)` lists them, for completion."""
+    assert set(dir(dropspin)) == set(dropspin.__all__)
+    for name in dropspin.__all__:
+        assert getattr(dropspin, name) is not None
+
+
+def test_an_unknown_public_name_raises_attribute_error():
+    with pytest.raises(AttributeError, match="module 'dropspin' has no attribute 'rnu'"):
+        dropspin.rnu  # noqa: B018
+
+
+def test_imports_for_type_checkers_agree_with_those_at_run_time():
+    """The same names, from the modules that define them; the first is for mypy and editors, the second for Python."""
+    tree = ast.parse(Path(dropspin.__file__).read_text(encoding="utf-8"))
+    [block] = [node for node in tree.body if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"]
+    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+    declared = {alias.asname: (node.module, alias.name) for node in imports for alias in node.names}
+    for node in block.body:
+        if isinstance(node, ast.Assign):
+            declared[node.targets[0].id] = declared.pop(node.value.id)
+    assert declared == dropspin._LOCATIONS
+    for name, (module, home) in declared.items():
+        found = getattr(importlib.import_module(module), home)
+        assert getattr(found, "__module__", module) in (module, "builtins"), f"{name} is defined in another module"
+
+
+@pytest.mark.parametrize("package", ["scenarios", "reference_impl"])
+def test_names_of_a_package_exist(package):
     module = importlib.import_module(package)
     assert module.__doc__
     for name in module.__all__:

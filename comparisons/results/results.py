@@ -12,6 +12,8 @@ from comparisons.results.provenance import digest
 from scenarios import Scenario, Trajectory
 
 TrajectoryKey = tuple[str, str, float]
+NEGLIGIBLE = 1e-4
+"""Errors below this (relative to the scene's scale, in m or in rad) are not mentioned in summaries and reports."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,25 @@ class Results:
         counts = self.table["verdict"].value_counts()
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         return f"<Results: scenes {', '.join(self.scenes)}; engines {', '.join(self.engines)}; {len(self.table)} measurements: {verdicts}>"
+
+    def summary(self) -> str:
+        """A line for each engine: how many checks passed and failed, how many runs broke down, and the scenes with model errors."""
+        return "\n".join(self._summary_of(engine) for engine in self.engines)
+
+    def _summary_of(self, engine: str) -> str:
+        verdicts = self.table.loc[self.table["engine"] == engine, "verdict"]
+        passed, failed = int((verdicts == "passed").sum()), int(verdicts.isin(FAILURES).sum())
+        parts = [f"{passed} checks passed, {failed} failed"]
+        parts += [
+            f"{count} {verdict}"
+            for verdict in ("diverged", "crashed", "timed_out", "declined")
+            if (count := int((verdicts == verdict).sum()))
+        ]
+        errors = self.asymptotic_errors("model")
+        scenes = errors.loc[(errors["engine"] == engine) & (errors["value"].abs() > NEGLIGIBLE), "scene"].unique()
+        if len(scenes):
+            parts.append(f"model errors in {', '.join(scenes)}")
+        return f"{engine}: {'; '.join(parts)}."
 
     @property
     def measurements(self) -> pd.DataFrame:

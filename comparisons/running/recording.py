@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from comparisons.engines.base import Diverged, Engine, EngineMissing, KnownLimitation, Simulation
 from comparisons.engines.registry import engine as engine_named
+from comparisons.engines.registry import engine_names
 from comparisons.judging.verdicts import Verdict
 from comparisons.running.verification import BATCH_ULPS, verified_limitations, verified_record, verify_build, verify_start
-from scenarios import DropspinError, Scenario, Trajectory, load
+from scenarios import DropspinError, Scenario, SceneError, Trajectory, load
 
 Array = NDArray[np.float64]
 
@@ -212,7 +213,12 @@ def as_scene(scene: Any) -> Scenario:
         return scene
     if not isinstance(scene, str):
         raise DropspinError(f"scene: got {_described(scene)}; give a name such as 'drop-ball', a file's path, or a Scenario from load().")
-    return load(scene)
+    try:
+        return load(scene)
+    except SceneError:
+        if scene.partition("[")[0].strip() in engine_names():
+            raise DropspinError(f"scene {scene!r} is an engine; give the scene first and the engine second.") from None
+        raise
 
 
 def verify_time_step(scene: Scenario, dt: float) -> None:

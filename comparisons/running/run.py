@@ -97,14 +97,19 @@ def prepare_run(
     return PreparedRun(chosen, truths, entries, names, dts)
 
 
+ONE_OR_SEVERAL = {
+    "scenes": "a Scenario, a name such as 'drop-ball', or a list of these",
+    "engines": "an Engine, a name such as 'mujoco', or a list of these",
+    "dt": "a number of seconds, or a list of these",
+}
+
+
 def _several(name: str, given: Any, single: tuple[type, ...]) -> list[Any]:
     """One thing or several as a list."""
     if isinstance(given, single):
         return [given]
-    if not isinstance(given, Iterable) or isinstance(given, Mapping):
-        raise DropspinError(
-            f"{name}: got a {type(given).__name__}; give one of {' or '.join(kind.__name__ for kind in single)}, or a list."
-        )
+    if not isinstance(given, Iterable) or isinstance(given, Mapping | str | bytes):
+        raise DropspinError(f"{name}: got {given!r} ({type(given).__name__}); give {ONE_OR_SEVERAL[name]}.")
     return list(given)
 
 

@@ -1,1 +1,1 @@
-"""Verbs of the command line that have a file of their own."""
+"""The commands, one a file; `main` finds them by name."""

@@ -16,7 +16,7 @@ from reports.commands.options import as_json
 @click.option("-o", "--output", default="out/history", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
 @as_json
 def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> None:
-    """Follow each result over runs, commits and versions of engines, and find the runs in which some moved.
+    """Follow each result over runs, commits and versions of engines, and find the runs in which results moved.
 
     RUN is a folder that dropspin run -o wrote, or a folder of such folders; runs are sorted by the time they were started.
     """
@@ -40,10 +40,10 @@ def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> No
 
 
 def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
-    """The folders of runs at some places: each is one, or holds some.
+    """The folders of runs at some places, each a run or a folder of runs.
 
     Raises:
-        DropspinError: At one of them there is none.
+        DropspinError: A place is neither.
     """
     from scenarios import DropspinError
 
@@ -60,7 +60,7 @@ def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
 
 
 def _load_runs(found: dict[str, Path]) -> dict[str, Any]:
-    """Their results, by the shortest names that are unique."""
+    """The results of runs, by the shortest names that are unique."""
     from comparisons.results.store import load_results
 
     short = {place: path.resolve().name for place, path in found.items()}

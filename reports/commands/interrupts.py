@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, handled wherever they arrive."""
+"""Ctrl-C and SIGTERM, recorded so that an interrupt that a callback swallows still stops the command."""
 
 import signal
 import sys
@@ -7,14 +7,14 @@ _interrupts: list[int] = []
 
 
 def handle_interrupts() -> None:
-    """Treat SIGTERM like Ctrl-C from now on, so that nothing unfinished is left behind; record both."""
+    """Treat SIGTERM like Ctrl-C from now on, so that unfinished files are removed; record both."""
     for one in (signal.SIGINT, signal.SIGTERM):
         signal.signal(one, _interrupt)
     sys.unraisablehook = _report_unless_interrupted
 
 
 def stop_if_interrupted() -> None:
-    """Raise a recorded interrupt again: one that arrives in a callback of an engine or of the compiler is swallowed there."""
+    """Raise a recorded interrupt again: callbacks of engines and of the compiler swallow exceptions."""
     if _interrupts:
         raise KeyboardInterrupt
 
@@ -25,6 +25,6 @@ def _interrupt(number: int, frame: object) -> None:
 
 
 def _report_unless_interrupted(found: "sys.UnraisableHookArgs") -> None:
-    """Report an exception that cannot be raised, unless it is an interrupt, which `stop_if_interrupted` raises again."""
+    """Report an exception that Python cannot raise, unless it is an interrupt, which `stop_if_interrupted` raises again."""
     if not isinstance(found.exc_value, KeyboardInterrupt):
         sys.__unraisablehook__(found)

@@ -13,9 +13,9 @@ from reports.commands.options import as_json, time_limit_option
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
 @click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
 @click.option(
-    "--axis", "axes", multiple=True, metavar="AXIS", help="What to vary, such as spin; repeat for more. [default: all of a scene]"
+    "--axis", "axes", multiple=True, metavar="AXIS", help="What to vary, such as spin; repeat for more. [default: every axis of a scene]"
 )
-@click.option("--dt", default=5e-3, show_default=True, type=float, metavar="SECONDS", help="The time step, where it is not what is varied.")
+@click.option("--dt", default=5e-3, show_default=True, type=float, metavar="SECONDS", help="The time step, for every axis but step.")
 @click.option(
     "--within",
     default=0.1,
@@ -37,7 +37,7 @@ def limits_command(
     output: str,
     json_output: bool,
 ) -> None:
-    """Find where engines break: steps, spins, heights, inertias, masses, restitutions, durations and sizes at their extremes.
+    """Find where engines break, along axes: time step, spin, height, inertia ratio, mass, restitution, duration and scale.
 
     Without arguments: five scenes (two spins, a ball, a box, a block) and the methods that differ on them; some minutes.
     """
@@ -57,7 +57,7 @@ def limits_command(
     having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in {*axes} & AXES.keys())]
     found = []
     with folder_made(output) as folder:
-        for scene in having or loaded[:1]:  # find_limits says which axes it has
+        for scene in having or loaded[:1]:  # the error of find_limits lists the axes of a scene
             with share_bar(scene.name) as progress:
 
                 def on_progress(what: str, share: float) -> None:

@@ -1,4 +1,4 @@
-"""The command line: the group of commands, and what every error ends in."""
+"""The command line: the group of commands, and the exit code of every error."""
 
 import io
 import os
@@ -29,8 +29,8 @@ COMMANDS = {
     "tradeoff": "Measure what accuracy costs.",
 }
 """The commands, each in `reports/commands/NAME.py`, and their line in the help."""
-INTERRUPTED = 130  # 128 + SIGINT, as shells have it
-INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor the user's mistake
+INTERRUPTED = 130  # 128 + SIGINT, as in shells
+INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor a usage error
 
 
 def main() -> None:
@@ -46,7 +46,7 @@ def main() -> None:
         click.echo(f"dropspin: interrupted; {details[0] if details else 'nothing was written'}.", err=True)
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # the reader has gone; Python would flush into the closed pipe at exit
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # Python would flush into the closed pipe at exit
         sys.exit(INTERRUPTED)
     except OSError as error:
         click.echo(f"dropspin: {error}", err=True)
@@ -78,7 +78,7 @@ def _run() -> int:
 
 
 class _LazyGroup(click.Group):
-    """A group whose commands are imported when they are called, so that the help does not wait for them."""
+    """A group that imports a command only when it is called, so that the help needs none of them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)

@@ -26,7 +26,7 @@ def replay_command(
 ) -> None:
     """Show the motion in 3D: a run's scenes, engines overlaid or side by side, the exact motion as a ghost.
 
-    Play, scrub, slow down, turn the view; contacts and impulses are shown where the floor acts. The page is one file and needs no network.
+    The page plays, scrubs, slows down and turns the view, and shows contacts and impulses. It is one file and needs no network.
     """
     from comparisons.results.store import load_results
     from reports.html.replay import replay_page

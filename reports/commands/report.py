@@ -9,13 +9,17 @@ import click
 @click.command("report")
 @click.argument("run", metavar="RUN")
 @click.option(
-    "--add", "studies", multiple=True, metavar="FOLDER", help="Add what dropspin tradeoff or limits wrote there; repeat for more."
+    "--add",
+    "studies",
+    multiple=True,
+    metavar="FOLDER",
+    help="Add the study that dropspin tradeoff or limits wrote to this folder; repeat for more.",
 )
 @click.option("--png", is_flag=True, help="Write the plots as PNG too.")
 def report_command(run: str, studies: tuple[str, ...], png: bool) -> None:
     """Write the report of a run again: with other studies, with plots as PNG, or after an update of dropspin.
 
-    Studies and PNGs are those asked for this time. A replay in the folder stays.
+    The new report has only the studies and PNGs of this call. A replay in the folder stays.
     """
     from comparisons.results.store import load_results
     from reports.run_folder import fill, run_folder

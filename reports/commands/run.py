@@ -51,8 +51,8 @@ def run_command(
 ) -> int:
     """Run scenes with engines, side by side, and write the report.
 
-    SCENE is a name of the catalogue, the path of a TOML file, or core: the core catalogue. Without arguments: the core catalogue,
-    three engines, three time steps.
+    SCENE is a name of the catalogue, the path of a TOML file, or core for the core catalogue. The default is the core catalogue
+    with three engines at three time steps.
 
     Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
     """
@@ -122,7 +122,7 @@ def _run(
 
 
 def _checked(results: "Results", file: "BaselineFile | None", json_output: bool) -> "Checked":
-    """A run that was written, compared with the baseline; without anything to compare its rows are printed all the same."""
+    """A written run, compared with the baseline; if no accepted result is covered, its rows are printed before the error."""
     from comparisons.regressions.checking import NothingAccepted, check
     from reports.terminal.rows import json_rows
     from scenarios import DropspinError

@@ -10,7 +10,7 @@ from comparisons.judging.convergence import STUDIES
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.provenance import first_settings
-from comparisons.results.results import Results
+from comparisons.results.results import NEGLIGIBLE, Results
 from reports.pages import page
 from reports.plots.colours import engine_colours
 from reports.plots.figures import FIGURES
@@ -20,7 +20,7 @@ from reports.replay import as_data, replay_of
 from reports.sections import Section
 from reports.views import numbers
 from reports.views.error_budget import error_budgets
-from reports.views.findings import NEGLIGIBLE, counts, profile_comparisons, verdicts
+from reports.views.findings import counts, profile_comparisons, verdicts
 from reports.views.leading_errors import leading_errors, step_costs
 from reports.views.run import LASTING, overview
 from reports.views.scene import left_out, modelled

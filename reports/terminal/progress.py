@@ -1,4 +1,4 @@
-"""Progress and status on a terminal, plain lines elsewhere; all of it on the standard error."""
+"""Progress and status on the standard error: bars on a terminal, plain lines elsewhere."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +12,7 @@ from rich.text import Text
 
 @contextmanager
 def progress_bar(total: int) -> Iterator[Callable[[str, str, float], None]]:
-    """A bar on a terminal; elsewhere one line a scene. All of it on the standard error."""
+    """A bar on a terminal, one line for each scene elsewhere."""
     console = Console(stderr=True)
     if not console.is_terminal:
         seen: set[str] = set()
@@ -36,7 +36,7 @@ def progress_bar(total: int) -> Iterator[Callable[[str, str, float], None]]:
 
 @contextmanager
 def status(text: str) -> Iterator[None]:
-    """Say what is going on while it goes on."""
+    """Show a text while the block runs."""
     console = Console(stderr=True)
     if not console.is_terminal:
         click.echo(text, err=True)
@@ -48,7 +48,7 @@ def status(text: str) -> Iterator[None]:
 
 @contextmanager
 def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
-    """A bar of a share of work done on a terminal; elsewhere one line. On the standard error."""
+    """A bar of the share of work done on a terminal, one line elsewhere."""
     console = Console(stderr=True)
     if not console.is_terminal:
         click.echo(f"running {title}", err=True)
@@ -60,14 +60,15 @@ def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
         yield lambda what, share: bar.update(task, completed=share, description=f"{title}: {what}")
 
 
-EVERY = 5.0  # s, between two lines
+EVERY = 5.0
+"""Seconds between two lines."""
 
 
 @contextmanager
 def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
-    """A bar of jobs done, with their rate and the time left, on a terminal; elsewhere a line every few seconds. On the standard error.
+    """A bar of jobs done, with their rate and the time left, on a terminal; a line every few seconds elsewhere.
 
-    What is told first was done before, and says nothing of the rate.
+    The first call gives the jobs that an earlier run has done; they do not count towards the rate.
     """
     console = Console(stderr=True)
     start, before, done, last = time.monotonic(), -1, 0, 0.0

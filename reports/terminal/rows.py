@@ -1,4 +1,4 @@
-"""Rows of words as a table on a terminal, or as JSON."""
+"""Rows as a table on a terminal, or as JSON."""
 
 import json
 import math
@@ -28,7 +28,7 @@ def print_rows(rows: list[dict[str, str]], json_output: bool) -> None:
 
 
 def json_rows(frame: "pd.DataFrame") -> str:
-    """A table as JSON, to the last digit; what is no finite number is null."""
+    """A table as JSON with all digits; a number that is not finite is null."""
     rows = [
         {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row.items()}
         for row in frame.to_dict("records")

@@ -15,7 +15,7 @@ from reports.views.failures import Failure, failures
 from reports.views.findings import finding_sentences, orders, verdict_sentence
 from reports.views.numbers import MARKS, formatted, trend, word
 
-NUMBER_WIDTH = 9  # as in -1.23e-04: a narrow terminal may fold names and split the table, never a number
+NUMBER_WIDTH = 9  # of -1.23e-04; a narrow terminal folds names and splits the table, but never cuts a number
 NAME_WIDTH, GAP = 20, 3
 STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diverged": "bold red", "timed_out": "bold red"}
 

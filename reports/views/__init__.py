@@ -1,1 +1,1 @@
-"""Data to words and rows, one command a file; no HTML, no terminal codes."""
+"""Results as sentences and rows, one file for each command; no HTML, no terminal codes."""

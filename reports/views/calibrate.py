@@ -1,4 +1,4 @@
-"""`dropspin calibrate` in words: settings and what was measured with them."""
+"""`dropspin calibrate` in words: the settings, and the values measured with them."""
 
 import math
 from dataclasses import asdict
@@ -25,7 +25,7 @@ def friction(text: str) -> str | float:
 
 
 def measured_rows(found: Calibration) -> Rows:
-    """What a calibrated engine was measured to do."""
+    """The values that were measured with the calibrated settings."""
     return [{"measured": one.name, "value": _with_unit(one), "how": one.how} for one in found.measured]
 
 
@@ -36,12 +36,12 @@ def _with_unit(one: Measured) -> str:
 
 
 def setting_rows(found: Calibration) -> Rows:
-    """What to set."""
+    """The settings and the reasons for them."""
     return [{"set": name, "to": str(value), "why": found.reasons.get(name, "")} for name, value in found.settings.items()]
 
 
 def as_data(found: Calibration) -> dict[str, Any]:
-    """All of a calibration, as JSON has it."""
+    """A calibration for JSON."""
     return {
         "engine": found.engine,
         "measured": [asdict(one) | {"value": None if math.isnan(one.value) else one.value} for one in found.measured],

@@ -18,10 +18,10 @@ from reports.views.failures import Failure
 from reports.views.findings import counts, verdict_sentence
 
 MOST_FAILURES = 12
-"""Failures printed one by one; JUnit and JSON have them all."""
+"""Failures that are printed; JUnit and JSON have all."""
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 MOST_ANNOTATIONS = 10
-"""As many as GitHub shows for one step."""
+"""The number that GitHub shows for one step."""
 
 
 class BaselineFile(NamedTuple):
@@ -56,7 +56,7 @@ def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
 
 
 def _notes(checked: Checked, file: BaselineFile, known: int) -> list[str]:
-    """What a check says besides its failures."""
+    """Improvements, new results, accepted results that were not run, and known failures."""
     better, new = (checked.changes[checked.changes["change"] == change] for change in ("better", "new"))
     notes = []
     if len(better):
@@ -65,9 +65,8 @@ def _notes(checked: Checked, file: BaselineFile, known: int) -> list[str]:
         notes.append(f"{_results(len(new))} new and not yet accepted: {file.accept_command}")
     if len(checked.not_run):
         pairs = len(checked.not_run.drop_duplicates(["scene", "engine"]))
-        notes.append(
-            f"{len(checked.not_run):,} accepted results are not covered by this run ({pairs} scene–engine {'pair' if pairs == 1 else 'pairs'})."
-        )
+        counted = f"{pairs} scene–engine {'pair' if pairs == 1 else 'pairs'}"
+        notes.append(f"{len(checked.not_run):,} accepted results are not covered by this run ({counted}).")
     if known:
         notes.append(f"{known:,} known {'failure' if known == 1 else 'failures'}, not counted as failed.")
     return notes
@@ -85,7 +84,7 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, own: str) -> str:
 
 
 def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bool) -> list[str]:
-    """What was accepted of a run, and what was not."""
+    """How many results of a run were accepted, and which cannot be."""
     changed = found["change"].value_counts()
     changes = ", ".join(f"{changed[one]:,} {one}" for one in ("new", "worse", "moved", "better", "gone", "same") if one in changed)
     scenes = f"{len(results.scenes)} {'scene' if len(results.scenes) == 1 else 'scenes'}"
@@ -93,8 +92,7 @@ def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bo
     tally = counts(results)
     if tally.failed and not known_failures:
         listed.append(
-            f"{tally.failed:,} checks of this run fail, and dropspin check will fail, whatever is accepted; "
-            "--known-failures accepts them as known."
+            f"{tally.failed:,} checks of this run fail, so dropspin check will fail too; --known-failures accepts them as known failures."
         )
     unknown = tally.failed - int(comparable_results(results)["verdict"].isin(FAILURES).sum())
     if unknown and known_failures:
@@ -105,7 +103,7 @@ def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bo
 
 
 def annotations(found: Sequence[Failure]) -> list[str]:
-    """Commands by which GitHub shows failures beside a run, where the check runs there."""
+    """The commands by which a runner of GitHub shows failures; empty elsewhere."""
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return []
     return [
@@ -119,7 +117,7 @@ def _without_baseline(results: Results) -> Results:
 
 
 def _of_engine(engine: str, rows: pd.DataFrame, changes: pd.DataFrame) -> str:
-    """Where accepted results of an engine fail, and what moved most."""
+    """The scenes in which accepted results of an engine fail, and the largest change."""
     scenes = rows["scene"].nunique()
     total = len({*changes.loc[changes["engine"] == engine, "scene"], *rows["scene"]})
     measured = rows[rows["value"].notna()]

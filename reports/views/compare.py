@@ -1,4 +1,4 @@
-"""`dropspin compare` in words: what changed between two runs, tables and sentences, and data for programs."""
+"""`dropspin compare` in words: the changes between two runs as tables, sentences, and data for JSON."""
 
 import math
 from collections.abc import Hashable, Mapping
@@ -13,7 +13,7 @@ from reports.views.numbers import formatted, subject
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
 """The heading of each kind of change, worst first."""
 MOST_LINES = 12
-"""Lines of a table; JSON has them all."""
+"""Lines of a table; JSON has all."""
 
 
 def listed(changes: Changes) -> list[str]:
@@ -31,7 +31,7 @@ def listed(changes: Changes) -> list[str]:
 
 
 def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
-    """A title and rows for each kind of change that there is."""
+    """A title and rows for each kind of change that occurs."""
     found = []
     for change, word in TITLES.items():
         results = changes.of(change)
@@ -43,7 +43,7 @@ def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
 
 
 def sentences(changes: Changes) -> list[str]:
-    """What the changes are attributed to, what was not compared, the speeds, and the verdict last."""
+    """The attributions, the scenes that were not compared, the speeds, and the verdict last."""
     found = [
         f"{engine}: {_counted(changes, engine)}. {one.message[0].upper()}{one.message[1:]}." for engine, one in changes.attributions.items()
     ]

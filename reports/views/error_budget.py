@@ -7,8 +7,7 @@ from typing import Any
 
 from comparisons.judging.convergence import ARTEFACTS, SATURATION
 from comparisons.judging.error_budget import PLATEAU
-from comparisons.results.results import Results
-from reports.views.findings import NEGLIGIBLE
+from comparisons.results.results import NEGLIGIBLE, Results
 from reports.views.numbers import formatted
 
 Parts = tuple[float, float, float]

@@ -6,10 +6,7 @@ from typing import Any
 from comparisons.engines.base import calibrated_label
 from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
-from comparisons.results.results import Results
-
-NEGLIGIBLE = 1e-4
-"""Errors below this (relative to the scene's scale, in m or in rad) are not mentioned."""
+from comparisons.results.results import NEGLIGIBLE, Results
 
 # Worst first: the verdict that represents a scene and an engine in the matrix.
 SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "limited", "no_truth", "passed", "measured")
@@ -71,8 +68,8 @@ class ProfileComparison:
         parts = sorted(row["part"] for row in self.rows)
         half = parts[len(parts) // 2]
         return (
-            f"{self.engine}: {sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest step are mostly "
-            f"setting errors; the median share is {100 * half:.1f} %."
+            f"{self.engine}: {sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest time step "
+            f"are mostly setting errors; the median share is {100 * half:.1f} %."
         )
 
 

@@ -8,7 +8,7 @@ MOST_RESULTS = 6
 
 
 def rows(found: History) -> list[dict[str, str]]:
-    """Every run in which results moved, and those that moved most."""
+    """The results that moved most, for every run in which some moved."""
     return [row for move in found.moves for row in _of_move(found, move)]
 
 

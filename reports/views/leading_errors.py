@@ -1,4 +1,4 @@
-"""Engines and methods side by side: what each is wrong by where it matters, and what its steps cost."""
+"""Engines side by side: the leading error of each in each scene, and the relative cost of its steps."""
 
 import math
 from dataclasses import dataclass
@@ -10,15 +10,15 @@ from scenarios import truth_for
 
 @dataclass(frozen=True)
 class Leading:
-    """The error that a scene is about, at its finest step.
+    """The leading error of a scene at its finest time step.
 
     Attributes:
         scene: Name of the scene.
-        metric: What the scene is about.
-        unit: Of the errors.
-        dt: The step [s].
-        sizes: By engine: the size of the error; NaN where there is none.
-        least: The engines whose error is the least, or within 1 % of it; where one is as small as rounding, all that are.
+        metric: The leading metric of the scene.
+        unit: Unit of the errors.
+        dt: Time step [s].
+        sizes: By engine, the size of the error; NaN where it is undefined.
+        least: The engines with the smallest error or one within 1 % of it; where errors are within rounding, all engines with such errors.
     """
 
     scene: str
@@ -30,7 +30,7 @@ class Leading:
 
 
 def leading_errors(results: Results) -> list[Leading]:
-    """Of each scene with a truth the error that it is about, in each engine."""
+    """The leading error of each scene with an exact solution."""
     found = []
     for name, scene in results.scenes.items():
         if truth_for(scene) is None:
@@ -51,7 +51,7 @@ def leading_errors(results: Results) -> list[Leading]:
 
 
 def step_costs(results: Results) -> dict[str, float]:
-    """What a step of each engine costs over the cheapest one's in the same scene at the same dt: the median; NaN where none was timed."""
+    """By engine, the median time per step relative to the fastest engine in the same scene at the same dt; NaN where none was timed."""
     timed = results.table[results.table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
     least = timed.groupby(["scene", "dt"])["time_per_step"].transform("min")
     ratios = (timed["time_per_step"] / least).groupby(timed["engine"]).median()

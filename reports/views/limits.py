@@ -1,4 +1,4 @@
-"""`dropspin limits` in words: the largest steps, the range in which each engine is sound, tables and files."""
+"""`dropspin limits` in words: the largest time steps, and the range in which each engine is sound."""
 
 import math
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def _row(scan: AxisScan, point: ScanPoint) -> dict[str, Any]:
 
 
 def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
-    """The largest steps, by scene and engine."""
+    """The largest time steps, by scene and engine."""
     table = []
     for one in found:
         spin = float(np.linalg.norm(one.scene.start.angular_velocity)) if one.scene.floor is None else 0.0
@@ -52,7 +52,7 @@ def _step(dt: float | None, spin: float) -> str:
 
 
 def range_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
-    """How far each engine is sound along each axis, and what comes beyond."""
+    """The range in which each engine is sound along each axis, and the failure modes beyond."""
     return [
         {
             "scene": scan.scene.name,

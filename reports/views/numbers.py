@@ -42,12 +42,12 @@ def word(verdict: str) -> str:
 
 
 def step(dt: float) -> str:
-    """A time step in seconds; → 0 for what several steps give together."""
+    """A time step in seconds; → 0 for an extrapolation of several."""
     return "→ 0" if math.isnan(dt) else f"{dt:g}"
 
 
 def in_ms(dt: float) -> str:
-    """A time step in milliseconds; → 0 for what several steps give together."""
+    """A time step in milliseconds; → 0 for an extrapolation of several."""
     return "→ 0" if math.isnan(dt) else f"{1e3 * dt:g} ms"
 
 

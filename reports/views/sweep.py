@@ -1,4 +1,4 @@
-"""`dropspin sweep` in words: for each engine how its jobs ended, and the worst values measured."""
+"""`dropspin sweep` in words: for each engine the verdicts of its jobs, and the worst values measured."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ class Tally:
 
 
 def tallies(where: str) -> dict[str, Tally]:
-    """By engine, part by part: the table may be larger than memory."""
+    """The tallies by engine, counted part by part, as the table may be larger than memory."""
     found: dict[str, Tally] = {}
     for part in read_parts(where, ["engine", "verdict", "steps", "time_per_step", *WORST]):
         frame = part.to_pandas()

@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 
+from scenarios.errors import DropspinError
 from scenarios.model import Scenario
 from scenarios.truths.bounce import bounce_ladder
 from scenarios.truths.corner_impact import corner_impact
@@ -27,7 +28,12 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
 
     Returns:
         A callable of times [s] that returns a `Trajectory`, with the impacts in `events` and the end of its validity in `horizon`.
+
+    Raises:
+        DropspinError: It is not a `Scenario`.
     """
+    if not isinstance(scene, Scenario):
+        raise DropspinError(f"scene: got {scene!r} ({type(scene).__name__}); give a Scenario, as load() returns it.")
     if law is not None:
         return corner_impact(scene, law)
     for problem in (flight, bounce_ladder, rocking, slipping, corner_impact, coulomb_slide, coulomb_turn):

@@ -14,6 +14,7 @@ from comparisons.results.store import load_results
 from comparisons.running.run import run
 from reports import run_folder
 from reports.html.report import html_report
+from reports.markdown import run_markdown
 from reports.plots.figures import report_figures
 from reports.plots.svg import svg
 from reports.run_folder import write_report
@@ -173,7 +174,7 @@ def test_a_run_replaces_an_earlier_run_and_nothing_else(small, tmp_path):
     precious = tmp_path / "thesis"
     precious.mkdir()
     (precious / "chapter1.tex").write_text("x")
-    with pytest.raises(DropspinError, match="holds files that are no run of dropspin"):
+    with pytest.raises(DropspinError, match="has files that dropspin run did not write"):
         write_report(small, precious)
     assert (precious / "chapter1.tex").read_text() == "x"
     with pytest.raises(DropspinError, match="is a file; choose a folder"):
@@ -202,22 +203,22 @@ def test_files_that_no_run_wrote_are_never_deleted(small, tmp_path, monkeypatch)
     keep = tmp_path / "precious" / "keep"
     keep.mkdir(parents=True)
     (keep / "thesis.txt").write_text("x")
-    with pytest.raises(DropspinError, match=r"holds files that are no run"):
+    with pytest.raises(DropspinError, match="has files that dropspin run did not write"):
         write_report(small, tmp_path / "precious" / "new" / "..")
     (keep / "run.json").write_text("{}")
-    with pytest.raises(DropspinError, match=r"'run\.json' for one"):
+    with pytest.raises(DropspinError, match=r"'run\.json'; move"):
         write_report(small, keep)
     (keep / "thesis.txt").rename(tmp_path / "thesis.txt")
-    with pytest.raises(DropspinError, match=r"holds files that are no run"):
+    with pytest.raises(DropspinError, match="has files that dropspin run did not write"):
         write_report(small, keep)
     run = tmp_path / "run"
     write_report(small, run)
     (run / "my-notes.txt").write_text("x")
-    with pytest.raises(DropspinError, match=r"'my-notes\.txt' for one"):
+    with pytest.raises(DropspinError, match=r"'my-notes\.txt'; move"):
         write_report(small, run)
     (run / "my-notes.txt").unlink()
     (run / "plots" / "mine.svg").write_text("x")
-    with pytest.raises(DropspinError, match=r"'plots/mine\.svg' for one"):
+    with pytest.raises(DropspinError, match=r"'plots/mine\.svg'; move"):
         write_report(small, run)
     (run / "plots" / "mine.svg").unlink()
     run.chmod(0o700)
@@ -256,20 +257,20 @@ def test_a_swap_that_fails_brings_the_old_run_back(small, tmp_path, monkeypatch,
         return rename(self, to)
 
     monkeypatch.setattr(Path, "rename", fails_once)
-    with pytest.raises(DropspinError, match="Device or resource busy; the folder is as it was"):
+    with pytest.raises(DropspinError, match="Device or resource busy; the folder is unchanged"):
         write_report(small, target)
     assert (target / "results.csv").read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
-def test_markdown_cells_hold_anything(tmp_path):
+def test_markdown_cells_hold_anything():
     """Bars, line breaks and asterisks in names and reasons stay within their cells."""
     scene = load("spin-principal").model_dump(exclude_none=True, exclude={"expect"}) | {
         "name": "a|b`c`*d*",
         "expect": [{"metric": "energy_error", "within": [1.0, 2.0], "reason": "has | pipe and\nnewline"}],
     }
     found = run(load(scene), "mujoco", 1e-2)
-    markdown = (write_report(found, tmp_path / "run").parent / "report.md").read_text(encoding="utf-8")
+    markdown = run_markdown(found)
     tables = [line for line in markdown.splitlines() if line.startswith("|")]
     assert {len(re.findall(r"(?<!\\)\|", line)) for line in tables} == {3}
     [failed] = [line for line in markdown.splitlines() if line.startswith("- ✗")]

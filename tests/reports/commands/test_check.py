@@ -47,7 +47,7 @@ def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, 
         assert "Reproduce: dropspin run drop-ball -e my_engine:MyEngine --dt 0.004 --baseline dropspin-baseline.toml -o out/again" in first
         assert "my-engine: accepted results fail in 1 of 2 scenes; the largest change is in restitution error (drop-ball)." in output
         assert "Changed since they were accepted: my-engine good → failing." in output
-        assert f"If this change is intended: dropspin accept out/failing {' '.join(BASELINE)} --reason \"…\"" in output
+        assert f'If this change is intended: dropspin accept out/failing {" ".join(BASELINE)} --reason "…"' in output
     if release == "crashing":
         assert f"drop-ball · {LABEL} · 0.004 s: crashed. its process was ended by SIGABRT" in output
         assert "If this change is intended" not in output
@@ -220,7 +220,9 @@ def of_another_run(folder):
     frame.assign(scene="fall-spin").to_parquet(folder / "results.parquet", index=False)
 
 
-@pytest.mark.parametrize(("damage", "message"), [(without_names, "lacks dts, names"), (of_another_run, "its table has scenes that run.json does not have")])
+@pytest.mark.parametrize(
+    ("damage", "message"), [(without_names, "lacks dts, names"), (of_another_run, "its table has scenes that run.json does not have")]
+)
 def test_files_of_different_runs_are_refused(damage, message, repository, tmp_path):
     """Each file can be read, but they do not belong together: one line that says so."""
     shutil.copytree(repository / "out/good", tmp_path / "run")

@@ -150,7 +150,9 @@ def whole(shared):
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_interrupted_run_is_resumed(how, whole, tmp_path):
     """Measured scenes are kept; with --resume only the others are run, and the table is that of an uninterrupted run."""
-    process = subprocess.Popen([DROPSPIN, *INTERRUPTED, "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [DROPSPIN, *INTERRUPTED, "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     assert process.stderr is not None
     while "drop-ball" not in process.stderr.readline():
         pass

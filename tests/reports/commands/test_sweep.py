@@ -48,7 +48,9 @@ def test_a_sweep_prints_the_worst_values_and_runs_nothing_twice(tmp_path):
     assert again.stderr.count("\n") == 1
     resumed = dropspin("sweep", "spec.toml", "-o", "out/mine", "--resume", "--json", cwd=tmp_path)
     rows = json.loads(resumed.stdout)
-    assert [(row["engine"], row["jobs"], row["verdicts"]) for row in rows] == [(name, 10, {"measured": 10}) for name in ("mujoco", "pybullet")]
+    assert [(row["engine"], row["jobs"], row["verdicts"]) for row in rows] == [
+        (name, 10, {"measured": 10}) for name in ("mujoco", "pybullet")
+    ]
     found = read_sweep(str(tmp_path / "out/mine"))
     for row in rows:
         assert row["worst_penetration"] == found[found["engine"] == row["engine"]]["penetration"].max()
@@ -106,7 +108,7 @@ def whole(shared):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_sweep_is_resumed(how, whole, tmp_path):
-    """Exit code 130 at once, written jobs are whole and counted, no process is left; resumed, the table is that of an uninterrupted sweep."""
+    """Exit code 130 at once; written jobs are counted; no process is left; resumed, the table is that of an uninterrupted sweep."""
     (tmp_path / "spec.toml").write_text(LONG)
     process = subprocess.Popen(
         [DROPSPIN, "sweep", "spec.toml", "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

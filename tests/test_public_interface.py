@@ -1,0 +1,119 @@
+"""`import dropspin as ds`: what a notebook calls first, and what wrong arguments end in."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import dropspin as ds
+
+
+@pytest.fixture(scope="module")
+def results():
+    """One scene, one engine, one time step."""
+    return ds.run("drop-ball", "mujoco", dt=4e-3)
+
+
+def test_run_takes_one_or_several_names_or_objects(results):
+    """The rows are the same, but for the time they took."""
+    again = ds.run([ds.load("drop-ball")], [ds.engine("mujoco")], dt=[4e-3])
+    pd.testing.assert_frame_equal(again.table.drop(columns="time_per_step"), results.table.drop(columns="time_per_step"))
+
+
+def test_run_measures_every_combination_at_the_default_time_steps():
+    found = ds.run(["spin-principal", "fall-spin"], ["mujoco", "pybullet"])
+    measured = found.table.dropna(subset=["dt"])
+    combinations = measured.loc[~measured["engine"].str.contains(" "), ["scene", "engine", "dt"]].drop_duplicates()
+    own = combinations[combinations["engine"].isin(found.engines)]
+    assert len(own) == 2 * 2 * len(ds.DEFAULT_DTS)
+
+
+def test_the_table_has_a_row_for_each_measurement(results):
+    assert {"scene", "engine", "metric", "dt", "value", "verdict", "reason", "tolerance"} <= set(results.table.columns)
+    assert set(results.table["scene"]) == {"drop-ball"}
+    assert set(results.table["engine"]) == {"mujoco"}
+    assert set(results.table["dt"]) == {4e-3}
+
+
+def test_repr_of_results_counts_the_verdicts(results):
+    verdicts = ", ".join(f"{count} {verdict}" for verdict, count in results.table["verdict"].value_counts().items())
+    assert repr(results) == f"<Results: scenes drop-ball; engines mujoco; {len(results.table)} measurements: {verdicts}>"
+
+
+def test_summary_has_a_line_for_each_engine():
+    """Counts of checks, and the scenes with model errors."""
+    found = ds.run(["spin-asymmetric", "fall-spin"], ["document", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
+    lines = dict(line.split(": ", 1) for line in found.summary().splitlines())
+    assert tuple(lines) == found.engines
+    for engine, line in lines.items():
+        mine = found.table[found.table["engine"] == engine]
+        counts = mine["verdict"].value_counts()
+        assert line.startswith(f"{counts['passed']} checks passed, {counts.get('failed', 0)} failed")
+        models = mine[(mine["kind"] == "asymptotic_error") & (mine["cause"] == "model") & (mine["value"].abs() > 1e-4)]
+        named = line.partition("model errors in ")[2].rstrip(".")
+        assert (named.split(", ") if named else []) == list(models["scene"].unique())
+    assert lines["document"].endswith("; model errors in spin-asymmetric.")
+    assert "model errors" not in lines["mujoco"]
+
+
+def test_summary_counts_breakdowns(results):
+    broken = results.table.assign(verdict="crashed")
+    assert (
+        type(results)(broken, results.scenes, results.engines, {}).summary() == f"mujoco: 0 checks passed, 0 failed; {len(broken)} crashed."
+    )
+
+
+def test_a_trajectory_as_a_table(results):
+    """A column for each component, the time as index."""
+    motion = ds.simulate("drop-ball", "mujoco", dt=1e-2)
+    frame = motion.to_frame()
+    assert frame.index.name == "t"
+    np.testing.assert_array_equal(frame.index, motion.t)
+    np.testing.assert_array_equal(frame.to_numpy(), motion.states)
+    assert list(frame.columns) == [
+        *("position_x", "position_y", "position_z"),
+        *("orientation_x", "orientation_y", "orientation_z", "orientation_w"),
+        *("velocity_x", "velocity_y", "velocity_z"),
+        *("angular_velocity_x", "angular_velocity_y", "angular_velocity_z"),
+    ]
+    np.testing.assert_array_equal(frame["angular_velocity_z"], motion.angular_velocity[:, 2])
+
+
+def test_repr_of_a_trajectory_is_one_line():
+    motion = ds.truth_for(ds.load("spin-principal"))(np.linspace(0.0, 0.5, 6))
+    assert repr(motion) == "<Trajectory: 6 states from t = 0 s to 0.5 s>"
+    assert repr(motion[:0]) == "<Trajectory: no states>"
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: ds.load("drop-bal"),
+            "scene 'drop-bal' is not in the catalogue and no file of that name exists. Did you mean 'drop-ball'?",
+        ),
+        (lambda: ds.load(3), "scene: got 3 (int); give a catalogue name, a path or a mapping."),
+        (lambda: ds.load(None), "scene: got None (NoneType); give a catalogue name, a path or a mapping."),
+        (lambda: ds.run("mujoco", "drop-ball"), "scene 'mujoco' is an engine; give the scene first and the engine second."),
+        (lambda: ds.run("mujoco[integrator=rk4]", "drop-ball"), "scene 'mujoco[integrator=rk4]' is an engine; give the scene first"),
+        (lambda: ds.simulate("mujoco", "drop-ball", 1e-2), "scene 'mujoco' is an engine; give the scene first and the engine second."),
+        (lambda: ds.run(3, "mujoco"), "scenes: got 3 (int); give a Scenario, a name such as 'drop-ball', or a list of these."),
+        (lambda: ds.run([3], "mujoco"), "scene: got 3 (int); give a name such as 'drop-ball', a file's path, or a Scenario from load()."),
+        (lambda: ds.run("drop-ball", None), "engines: got None (NoneType); give an Engine, a name such as 'mujoco', or a list of these."),
+        (lambda: ds.run("drop-ball", [3]), "engine: got 3 (int); give a name such as 'mujoco', or an Engine."),
+        (lambda: ds.run("drop-ball", "mujocco"), "engine 'mujocco' is unknown. Did you mean 'mujoco'?"),
+        (lambda: ds.run("drop-ball", "mujoco", dt="fast"), "dt: got 'fast' (str); give a number of seconds, or a list of these."),
+        (lambda: ds.run("drop-ball", "mujoco", dt=["fast"]), "dt: got 'fast' (str); a time step is a number of seconds."),
+        (lambda: ds.run("drop-ball", "mujoco", dt=True), "dt: got True (bool); a time step is a number of seconds."),
+        (lambda: ds.run("drop-ball", "mujoco", dt=[]), "dt: got none; give at least one."),
+        (lambda: ds.run([], "mujoco"), "scenes: got none; give at least one."),
+        (lambda: ds.truth_for("drop-ball"), "scene: got 'drop-ball' (str); give a Scenario, as load() returns it."),
+        (lambda: ds.measure("drop-ball", 3), "motion: got a int; give a Trajectory, such as simulate() returns."),
+        (lambda: ds.load_results("absent"), "absent: not the folder of a run, or damaged (FileNotFoundError"),
+    ],
+)
+def test_a_wrong_argument_ends_in_one_sentence(call, message):
+    """Which argument, what was given, what to give; of type DropspinError."""
+    with pytest.raises(ds.DropspinError) as error:
+        call()
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)

@@ -17,9 +17,9 @@ class Attribution:
     """What the changes of an engine's results are attributed to.
 
     Attributes:
-        origin: `absent` if there are no measurements in one of the runs; the engine's version, else its adapter's code, else its settings; the
-            surroundings (dropspin, its code, the libraries, the machine); `either` where both differ and the cause cannot be isolated;
-            `nothing` where the whole provenance is the same.
+        origin: `absent` if one of the runs has no measurements; `engine` for its version, else `adapter` for the adapter's code, else
+            `settings`; `surroundings` for dropspin, its code, the libraries and the machine; `either` if both differ and the cause cannot
+            be isolated; `nothing` if the whole provenance is the same.
         message: The same in a sentence, without the engine's name.
     """
 

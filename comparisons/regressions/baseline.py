@@ -109,7 +109,13 @@ def load_baseline(path: str | Path) -> Baseline:
         DropspinError: It is not a baseline; the text says where, what was given, what is allowed.
     """
     where = str(path)
-    written = validated(_File, where, read_toml(Path(path), where, "baseline", LARGEST_FILE))
+    content = read_toml(Path(path), where, "baseline", LARGEST_FILE)
+    if content.get("format", FORMAT) != FORMAT:
+        raise DropspinError(
+            f"{where}: format {content['format']!r}, written by {_writer(content)}, cannot be read; this version reads format {FORMAT}. "
+            "Accept the results again into a new file."
+        )
+    written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     lines = []
     for scene, engines in written.results.items():
@@ -128,6 +134,15 @@ def load_baseline(path: str | Path) -> Baseline:
                     unit = "1" if kind == "order" else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
                     lines.append(key | line.model_dump() | {"unit": unit})
     return Baseline(acceptances, written.engines, written.scenes, _table(lines))
+
+
+def _writer(content: Mapping[str, Any]) -> str:
+    """The versions of dropspin that results of another format were accepted from, as far as the file says."""
+    try:
+        versions = {f"dropspin {one['versions']['dropspin']}" for one in content["accepted"].values()}
+    except (AttributeError, KeyError, TypeError):
+        versions = set()
+    return ", ".join(sorted(versions)) or "another version of dropspin"
 
 
 def accept(

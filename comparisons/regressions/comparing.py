@@ -17,7 +17,7 @@ class Changes:
     """What differs between two runs.
 
     Attributes:
-        results: The comparable results as `values.changes` gives them, largest change first; `change` is same, better, worse, moved, new or gone.
+        results: The comparable results as `values.changes` gives them, largest change first.
         attributions: By engine, what its changes are attributed to.
         surroundings: What differs that all engines share, as text.
         other_scenes: Scenes that are different in the later run, so that their results are not compared.

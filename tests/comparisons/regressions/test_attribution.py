@@ -1,0 +1,57 @@
+"""Changes are attributed to the engine, its adapter, its settings, or the surroundings."""
+
+import pytest
+
+from comparisons.regressions.attribution import attribute
+
+STAMP = {
+    "versions": {"dropspin": "1", "numpy": "2", "numba": "3", "scipy": "4"},
+    "python": "3.11.7",
+    "cpu": "A",
+    "platform": "Linux",
+    "code": "c",
+    "adapters": {"candidate": "a"},
+    "settings": {"candidate": {"drop-ball dt=0.001": {"version": "1.0", "solref": 1}}},
+}
+
+
+def settings(version, solref):
+    return {"settings": {"candidate": {"drop-ball dt=0.001": {"version": version, "solref": solref}}}}
+
+
+@pytest.mark.parametrize(
+    ("now", "unmoved", "origin", "message"),
+    [
+        (
+            {},
+            [],
+            "nothing",
+            "the provenance of both runs is the same; the engine is not deterministic, or has changed without a new version",
+        ),
+        (settings("1.1", 1), [], "engine", "attributed to the engine: candidate 1.0 → 1.1"),
+        (settings("1.0", 2), [], "settings", "attributed to its settings: its settings (solref)"),
+        (settings("1.1", 2), [], "engine", "attributed to the engine: candidate 1.0 → 1.1, its settings (solref)"),
+        ({"adapters": {"candidate": "b"}}, [], "adapter", "attributed to its adapter: the code of candidate's adapter"),
+        ({"cpu": "B"}, [], "surroundings", "attributed to the surroundings: processor A → B"),
+        ({"code": "d"}, [], "surroundings", "attributed to the surroundings: dropspin's own code"),
+        ({"versions": STAMP["versions"] | {"numpy": "2.1"}}, [], "surroundings", "attributed to the surroundings: numpy 2 → 2.1"),
+        (
+            {"cpu": "B", "adapters": {"candidate": "b"}},
+            ["other"],
+            "adapter",
+            "attributed to its adapter: the code of candidate's adapter; processor A → B differ too, but the results of other are the same",
+        ),
+        (
+            {"cpu": "B", "adapters": {"candidate": "b"}},
+            [],
+            "either",
+            "the code of candidate's adapter, processor A → B; the cause cannot be isolated, as no engine's results stayed the same",
+        ),
+        ({"settings": {}}, [], "absent", "it has no measurements in the later run: it broke down, declined, or is missing"),
+    ],
+)
+def test_changes_are_attributed_to_what_differs(now, unmoved, origin, message):
+    """The engine's version before its adapter before its settings; the surroundings unless an unmoved engine rules them out."""
+    found = attribute(STAMP, STAMP | now, "candidate", unmoved)
+    assert found.origin == origin
+    assert found.message == message

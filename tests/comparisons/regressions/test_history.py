@@ -1,0 +1,44 @@
+"""Results over runs: the run in which they moved."""
+
+from dataclasses import replace
+
+import pytest
+from support.releases import TURNING, Broken, Candidate, Euler, part, released
+
+from comparisons.regressions.history import history
+from scenarios import DropspinError
+
+
+def dated(*runs):
+    """Runs by name, each a day after the one before."""
+    return {
+        name: replace(one, provenance={**one.provenance, "started": f"2026-01-0{day}"})
+        for day, (name, one) in enumerate(zip("abcd", runs, strict=False), start=1)
+    }
+
+
+def test_history_finds_the_run_in_which_results_moved(before, release):
+    """Runs are sorted by time; an engine that broke down in between is followed past that run."""
+    runs = dated(
+        before,
+        released(release(Candidate), "1.1"),
+        part(release(Broken, "mujoco"), "drop-ball"),
+        released(release(Euler), "2.0"),
+    )
+    found = history(dict(reversed(runs.items())))
+    assert found.names == ["a", "b", "c", "d"]
+    [move] = found.moves
+    assert (move.engine, move.before, move.run) == ("candidate", 1, 3)
+    assert move.attribution.origin == "engine"
+    assert "candidate 1.1 → 2.0" in move.attribution.message
+    assert set(move.results["scene"]) >= TURNING
+
+
+def test_history_of_one_run_is_refused(before):
+    with pytest.raises(DropspinError, match=r"^a history needs two runs or more, got 1; give more, or a folder of runs\.$"):
+        history({"a": before})
+
+
+def test_scene_that_changed_while_an_engine_was_absent_moves_nothing(before, longer_fall):
+    """Results of the scene before its change are not compared with later ones."""
+    assert not history(dated(part(before, "fall-spin"), part(longer_fall, engines=["mujoco"]), longer_fall)).moves

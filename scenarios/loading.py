@@ -45,7 +45,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         name = scene.get("name", "scene")
         return _validate(str(name), "", {key: value for key, value in scene.items() if key != "name"})
     if not isinstance(scene, str | Path):
-        raise SceneError(f"scene: got {_shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
+        raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     path = _find(scene)
     try:
         str(path).encode()

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+
 if TYPE_CHECKING:
     import pandas as pd
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from comparisons.calibration import Calibration as Calibration
     from comparisons.calibration import calibrate as calibrate
-    from comparisons.conformance.checks import CheckResult as CheckResult
     from comparisons.conformance.checks import conform as conform
+    from comparisons.conformance.outcomes import CheckResult as CheckResult
     from comparisons.engines.base import AsBuilt as AsBuilt
     from comparisons.engines.base import BatchSimulation as BatchSimulation
     from comparisons.engines.base import Diverged as Diverged
@@ -65,7 +65,8 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "comparisons.calibration": ("Calibration", "calibrate"),
-    "comparisons.conformance.checks": ("CheckResult", "conform"),
+    "comparisons.conformance.checks": ("conform",),
+    "comparisons.conformance.outcomes": ("CheckResult",),
     "comparisons.engines.base": (
         "AsBuilt",
         "BatchSimulation",

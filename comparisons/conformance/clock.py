@@ -24,7 +24,7 @@ LATE = 0.3
 
 
 def check_time(engine: Engine, check: str) -> CheckResult:
-    """Rows are as far apart in time as asked, and of one time: position, attitude and velocity of free motions measure it."""
+    """Intervals between rows have the length asked for, and all parts of a row one time; free motions measure both."""
     ticks = {dt: _ticks(engine, "coasting", dt, _by_position) for dt in STEPS_TRIED}
     asked = ", ".join(f"{dt:g}" for dt in STEPS_TRIED)
     lengths = np.array([float(np.diff(times).mean()) * dt for dt, times in ticks.items()])
@@ -32,7 +32,7 @@ def check_time(engine: Engine, check: str) -> CheckResult:
         between = np.diff(times)
         if np.ptp(between) > NEAR_ENOUGH * max(abs(between.mean()), 1.0):
             raise CheckFailed(
-                f"rows are not uniform in time: at dt = {dt:g} s they are {between.min() * dt:.4g} to {between.max() * dt:.4g} s apart"
+                f"rows are not uniform in time: at dt = {dt:g} s intervals are {between.min() * dt:.4g} to {between.max() * dt:.4g} s long"
             )
     if not np.allclose(lengths, STEPS_TRIED, rtol=NEAR_ENOUGH):
         if np.ptp(lengths) <= NEAR_ENOUGH * abs(lengths[0]):

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def check_repeats(engine: Engine, check: str) -> CheckResult:
-    """The same scene gives the same bits, whatever else runs in the process."""
+    """The same scene gives the same bits after and beside other simulations."""
     a, b = accepted_scene(engine), accepted_scene(engine, "turning", "coasting")
     first, stepped = recorded(engine, a), advanced(engine, a)
     if not all(_same(first, recorded(engine, a)) and _same(stepped, advanced(engine, a)) for _ in range(SEVERAL)):

@@ -125,7 +125,7 @@ def check_record(engine: Engine, check: str) -> CheckResult:
     _verify_equal(rows[0], stepped[0], "record's first row differs from the state before any step, which it must be")
     _verify_equal(rows, stepped, f"record({A_FEW_STEPS}) differs from {A_FEW_STEPS} times advance(1) and state()")
     if _difference(sparse, rows[::SEVERAL]) > ROUNDING and _difference(sparse, rows[: len(sparse)]) <= ROUNDING:
-        raise CheckFailed(f"record ignores `every`: with every={SEVERAL} its rows are one step apart")
+        raise CheckFailed(f"record ignores `every`: with every={SEVERAL} it returns consecutive steps")
     _verify_equal(sparse, rows[::SEVERAL], f"record with every={SEVERAL} differs from each third row with every=1")
     _verify_equal(rows[-1], end, "after record, state() differs from the last row")
     _verify_equal(again[0], stepped[-1], "a second record does not begin at the current state")

@@ -43,7 +43,7 @@ def calibrated_specification(scene: Scenario, dt: float, integrator: str, pair: 
         scene: The scene.
         dt: Time step [s].
         integrator: A key of `INTEGRATORS`.
-        pair: Settings of the contact pair; without any, MuJoCo looks for neither contacts nor constraints.
+        pair: Settings of the contact pair; without any, MuJoCo detects neither contacts nor constraints.
         flags: Solver settings that the installed version has, by their names in MJCF.
     """
     spec, body = _free_body(scene, dt, integrator)

@@ -56,7 +56,7 @@ def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_scene_gives_the_same_bits_after_and_beside_others(name):
-    """A, B, A: a scene gives the same bits whatever ran before it, and while another simulation is open."""
+    """A, B, A: a scene gives the same bits after another scene, and while another simulation is open."""
     a, b = scenarios.load("spin-asymmetric"), scenarios.load("spin-dzhanibekov")
     if engine(name).declines(scenarios.load("drop-ball")) is None:
         a, b = scenarios.load("drop-box-corner"), scenarios.load("drop-ball")

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine
+from comparisons.running.inputs import EngineEntry, installed_engine, verify_time_step
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
-from comparisons.running.recording import EngineEntry, verify_time_step
 from comparisons.running.start_phases import START_PHASES
 from scenarios import DropspinError, Scenario, load
 
@@ -72,7 +72,7 @@ class Calibration:
 
 
 def calibrate(
-    engine: Engine,
+    engine: Engine | str,
     restitution: float,
     dt: float,
     friction: str | float = "none",
@@ -83,7 +83,7 @@ def calibrate(
     """The settings that give a restitution at a time step, measured.
 
     Args:
-        engine: The engine; its options choose among its contact models.
+        engine: The engine or its name; its options choose among its contact models.
         restitution: From 0 to 1.
         dt: Time step [s].
         friction: 'none', 'infinite' or a coefficient.
@@ -93,6 +93,7 @@ def calibrate(
     Raises:
         DropspinError: The engine has no such settings, or broke down with them.
     """
+    engine = installed_engine(engine)
     scene = drop(restitution, friction, shape)
     verify_time_step(scene, dt)
     refusal = engine.declines(scene)

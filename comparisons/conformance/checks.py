@@ -10,8 +10,8 @@ from comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckRes
 from comparisons.conformance.probes import PROBES
 from comparisons.conformance.protocol import check_builds, check_claims, check_record, check_refusals, check_settings, check_states
 from comparisons.engines.base import Diverged, Engine, EngineMissing
+from comparisons.running.inputs import EngineEntry, engine_entry
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
-from comparisons.running.recording import EngineEntry, engine_entry
 from comparisons.running.verification import BuildMismatch
 from scenarios.errors import UnknownName
 

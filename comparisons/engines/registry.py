@@ -52,6 +52,8 @@ def engine(name: str) -> Engine:
         EngineMissing: A package it needs is not installed; the text says how to get it.
         DropspinError: It is not an engine, or cannot be imported or created.
     """
+    if not isinstance(name, str):
+        raise DropspinError(f"engine: got {name!r} ({type(name).__name__}); give a name such as 'mujoco'.")
     match = re.fullmatch(r"\s*([\w.:-]+)\s*(?:\[(.*)\])?\s*", name)
     if match is None:
         raise DropspinError(f"engine {name!r}: write a name, or a name with options, such as mujoco[integrator=rk4].")

@@ -1,7 +1,7 @@
 """The study behind `dropspin limits`: engines along every axis of a scene."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product, takewhile
@@ -11,8 +11,8 @@ from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
 from comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
+from comparisons.running.inputs import as_scene, engine_entry, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import as_scene, engine_entry, verify_time_step
 from scenarios import DropspinError, Scenario
 from scenarios.errors import UnknownName
 
@@ -73,7 +73,7 @@ def _last_in_a_row(points: Sequence[ScanPoint], allowed: Sequence[str]) -> float
 
 def find_limits(
     scene: Scenario | str,
-    engines: Sequence[str | Engine] = (),
+    engines: Engine | str | Iterable[Engine | str] = (),
     axes: Sequence[str] = (),
     *,
     dt: float = DT,
@@ -100,7 +100,7 @@ def find_limits(
     if not 0.0 < within < math.inf:
         raise DropspinError(f"within: got {within!r}; give a number above 0, a ratio or an angle in radians.")
     chosen = _axes(scene, tuple(dict.fromkeys(axes)))
-    named = [engine_entry(name) for name in engines or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
     entries = list({one.label: one for one in named}.values())
     left_out = {one.label: one.missing for one in entries if one.engine is None}
     work = list(product([one for one in entries if one.engine is not None], chosen))

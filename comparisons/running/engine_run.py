@@ -11,7 +11,8 @@ from comparisons.measuring.metrics import metrics_for
 from comparisons.measuring.tolerances import perturbed
 from comparisons.results.ensembles import EnsembleOutcome
 from comparisons.running.ensembles import run_ensemble
-from comparisons.running.recording import Breakdown, EngineEntry, classify, record, time_steps
+from comparisons.running.inputs import EngineEntry
+from comparisons.running.recording import Breakdown, classify, record, time_steps
 from scenarios import Scenario, Trajectory, truth_for
 
 TIMING_REPEATS = 3

@@ -24,7 +24,8 @@ from pebble import ProcessExpired, ProcessPool
 
 from comparisons.judging.verdicts import Verdict
 from comparisons.running.engine_run import EngineRun, run_engine
-from comparisons.running.recording import Breakdown, EngineEntry
+from comparisons.running.inputs import EngineEntry
+from comparisons.running.recording import Breakdown
 from scenarios import Scenario
 
 Given = TypeVarTuple("Given")

@@ -9,27 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Diverged, Engine, EngineMissing, KnownLimitation, Simulation
-from comparisons.engines.registry import engine as engine_named
-from comparisons.engines.registry import engine_names
+from comparisons.engines.base import Diverged, Engine, KnownLimitation, Simulation
 from comparisons.judging.verdicts import Verdict
+from comparisons.running.inputs import as_scene, installed_engine, verify_time_step
 from comparisons.running.verification import BATCH_ULPS, verified_limitations, verified_record, verify_build, verify_start
-from scenarios import DropspinError, Scenario, SceneError, Trajectory, load
+from scenarios import DropspinError, Scenario, Trajectory
 
 Array = NDArray[np.float64]
-
-FEWEST_STEPS = 4
-MOST_STEPS = 2_000_000
-"""Steps of one run; 32 start phases of that many fit into a machine's memory."""
-
-
-@dataclass(frozen=True)
-class EngineEntry:
-    """An engine that takes part in a run; `missing` says why one that was asked for cannot."""
-
-    label: str
-    engine: Engine | None
-    missing: str = ""
 
 
 @dataclass(frozen=True)
@@ -76,14 +62,12 @@ def simulate(scene: Scenario | str, engine: Engine | str, dt: float, every: int 
         Diverged: The engine gave up.
     """
     scene = as_scene(scene)
-    entry = engine_entry(engine)
-    if entry.engine is None:
-        raise EngineMissing(entry.missing)
+    chosen = installed_engine(engine)
     verify_time_step(scene, dt)
-    refusal = entry.engine.declines(scene)
+    refusal = chosen.declines(scene)
     if refusal is not None:
-        raise DropspinError(f"{entry.label} declines {scene.name}: {refusal}.")
-    recording = record(entry.engine, scene, dt, every)
+        raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
+    recording = record(chosen, scene, dt, every)
     for limitation in recording.limitations:
         warnings.warn(limitation.message, stacklevel=2)
     return recording.motion
@@ -184,55 +168,3 @@ def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> tuple[
 def velocity_lag(simulation: Simulation, dt: float) -> float:
     """How far a simulation's velocities lag its positions [s]."""
     return 0.5 * dt if simulation.staggered else 0.0
-
-
-def engine_entry(engine: Engine | str) -> EngineEntry:
-    """An engine by its name, or an engine object, as an entry of a run.
-
-    Raises:
-        DropspinError: There is no engine of that name, or it is neither an engine nor a name.
-    """
-    if isinstance(engine, Engine):
-        return EngineEntry(engine.label, engine)
-    if not isinstance(engine, str):
-        raise DropspinError(f"engine: got {_described(engine)}; give a name such as 'mujoco', or an Engine.")
-    try:
-        created = engine_named(engine)
-    except EngineMissing as error:
-        return EngineEntry(engine.strip(), None, str(error))
-    return EngineEntry(created.label, created)
-
-
-def as_scene(scene: Any) -> Scenario:
-    """A scene, or the scene of a catalogue name or of a file's path.
-
-    Raises:
-        DropspinError: It is neither, or there is no such scene.
-    """
-    if isinstance(scene, Scenario):
-        return scene
-    if not isinstance(scene, str):
-        raise DropspinError(f"scene: got {_described(scene)}; give a name such as 'drop-ball', a file's path, or a Scenario from load().")
-    try:
-        return load(scene)
-    except SceneError:
-        if scene.partition("[")[0].strip() in engine_names():
-            raise DropspinError(f"scene {scene!r} is an engine; give the scene first and the engine second.") from None
-        raise
-
-
-def verify_time_step(scene: Scenario, dt: float) -> None:
-    """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s]."""
-    if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):
-        raise DropspinError(f"dt: got {_described(dt)}; a time step is a number of seconds.")
-    if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 <= MOST_STEPS):
-        raise DropspinError(
-            f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be "
-            f"at least {scene.duration / MOST_STEPS:g} s and at most {scene.duration / FEWEST_STEPS:g} s."
-        )
-
-
-def _described(value: object) -> str:
-    """A value of a wrong type for a message: its type, and the value if it is short."""
-    text = repr(value)
-    return f"{text} ({type(value).__name__})" if len(text) <= 40 else f"a {type(value).__name__}"

@@ -11,8 +11,8 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
 from comparisons.results.provenance import adapter_code, provenance
 from comparisons.results.results import Results, joined
+from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import EngineEntry, as_scene, engine_entry, verify_time_step
 from comparisons.running.scene_run import run_scene
 from comparisons.running.start_phases import StartPhase
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
@@ -83,10 +83,10 @@ def prepare_run(
     Raises:
         DropspinError: The request cannot be run.
     """
-    chosen = [as_scene(one) for one in _several("scenes", scenes, (Scenario, str))]
-    asked = _several("engines", engines, (Engine, str))
+    chosen = [as_scene(one) for one in several("scenes", scenes)]
+    asked = several("engines", engines)
     entries = [engine_entry(one) for one in asked]
-    dts = _several("dt", dt, (int, float))
+    dts = several("dt", dt)
     for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
         if not given:
             raise DropspinError(f"{name}: got none; give at least one.")
@@ -95,22 +95,6 @@ def prepare_run(
     _verify_request(chosen, truths, dts, labels)
     names = {entry.label: name.strip() for entry, name in zip(entries, asked, strict=True) if isinstance(name, str)}
     return PreparedRun(chosen, truths, entries, names, dts)
-
-
-ONE_OR_SEVERAL = {
-    "scenes": "a Scenario, a name such as 'drop-ball', or a list of these",
-    "engines": "an Engine, a name such as 'mujoco', or a list of these",
-    "dt": "a number of seconds, or a list of these",
-}
-
-
-def _several(name: str, given: Any, single: tuple[type, ...]) -> list[Any]:
-    """One thing or several as a list."""
-    if isinstance(given, single):
-        return [given]
-    if not isinstance(given, Iterable) or isinstance(given, Mapping | str | bytes):
-        raise DropspinError(f"{name}: got {given!r} ({type(given).__name__}); give {ONE_OR_SEVERAL[name]}.")
-    return list(given)
 
 
 def _verify_request(scenes: Sequence[Scenario], truths: Sequence[Truth | None], dts: Sequence[float], labels: Sequence[str]) -> None:

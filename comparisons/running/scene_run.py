@@ -27,8 +27,9 @@ from comparisons.results.measurement import Case, Measurement, as_table
 from comparisons.results.results import Results, TrajectoryKey
 from comparisons.running.engine_run import EngineRun
 from comparisons.running.ensembles import judge_differences, judge_means
+from comparisons.running.inputs import EngineEntry
 from comparisons.running.processes import EngineProcesses
-from comparisons.running.recording import Breakdown, EngineEntry, divergence
+from comparisons.running.recording import Breakdown, divergence
 from comparisons.running.start_phases import StartPhase, start_phases
 from scenarios import Scenario, Trajectory
 
@@ -148,7 +149,7 @@ def _judge_metric(scene: Scenario, dt: float, label: str, metric: Metric, cases:
     # A value that is not a number is a failure, expected or not; one that the step cannot resolve fails only an expectation.
     verdict = "failed" if np.isnan(average.value) and not unresolved else judgement.verdict
     if verdict == "failed" and not reason:
-        reason = f"{metric.name.replace('_', ' ')} is undefined: what it measures did not happen"
+        reason = "what it measures did not happen"
     return average, replace(judgement, verdict=verdict, reason=reason, cause="unresolved" if unresolved else "")
 
 

@@ -17,7 +17,7 @@ import reference_impl
 from comparisons.engines.document import Document, reference_body, reference_world
 from comparisons.measuring.batch import motions_side_by_side
 from comparisons.measuring.motions import Setup
-from comparisons.running.recording import FEWEST_STEPS, MOST_STEPS
+from comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
 from comparisons.running.verification import UNIT_TOLERANCE
 from comparisons.sweeps.fields import Path, path_of, set_field, with_fields
 from comparisons.sweeps.jobs import OPTION, Jobs

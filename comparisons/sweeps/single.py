@@ -4,7 +4,8 @@ import numpy as np
 
 from comparisons.measuring.batch import motions_side_by_side
 from comparisons.measuring.motions import Setup
-from comparisons.running.recording import Breakdown, divergence, try_record, verify_time_step
+from comparisons.running.inputs import verify_time_step
+from comparisons.running.recording import Breakdown, divergence, try_record
 from comparisons.running.verification import UNIT_TOLERANCE
 from comparisons.sweeps.fields import with_fields
 from comparisons.sweeps.jobs import Jobs

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from comparisons.engines.registry import engine
 from comparisons.measuring.metrics import METRICS
-from comparisons.running.recording import verify_time_step
+from comparisons.running.inputs import verify_time_step
 from comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
 from comparisons.sweeps.fields import NoSuchField, verify_field, with_fields
 from comparisons.sweeps.jobs import OPTION, Sweep, configured

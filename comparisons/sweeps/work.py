@@ -12,8 +12,9 @@ import pyarrow as pa
 
 from comparisons.engines.document import Document
 from comparisons.results.provenance import code, provenance, versions
+from comparisons.running.inputs import EngineEntry
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
-from comparisons.running.recording import Breakdown, EngineEntry
+from comparisons.running.recording import Breakdown
 from comparisons.sweeps.dispatch import run_jobs
 from comparisons.sweeps.folder import PARTS_PER_FOLDER, SweepFolder
 from comparisons.sweeps.jobs import Jobs, Sweep

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from comparisons.engines.base import Diverged, Engine
-from comparisons.running.recording import MOST_STEPS, EngineEntry, time_steps
+from comparisons.running.inputs import MOST_STEPS, EngineEntry
+from comparisons.running.recording import time_steps
 from scenarios import Scenario
 
 LONG_ENOUGH = 2e-3

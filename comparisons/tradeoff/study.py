@@ -4,15 +4,15 @@ Timed is native stepping alone, of all entries in turn, round after round: a dis
 of costs are taken round by round.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 
 import numpy as np
 
 from comparisons.engines.base import Engine
 from comparisons.measuring.metrics import leading_metric, metrics_for
+from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, several
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
-from comparisons.running.recording import EngineEntry, as_scene, engine_entry
 from comparisons.tradeoff.costs import cost, costs_per_world
 from comparisons.tradeoff.errors import errors_over_steps
 from comparisons.tradeoff.points import CostPoint, TradeOff
@@ -48,7 +48,7 @@ OnProgress = Callable[[str, float], None]
 
 def tradeoff(
     scene: Scenario | str,
-    engines: Sequence[str | Engine] = (),
+    engines: Engine | str | Iterable[Engine | str] = (),
     metric: str | None = None,
     *,
     on_progress: OnProgress = lambda what, share: None,
@@ -75,7 +75,7 @@ def tradeoff(
     known = [one.name for one in metrics_for(scene, truth)]
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
-    entries = [engine_entry(name) for name in engines or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    entries = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
     with EngineProcesses(resources) as processes:
         ladders, left_out = _errors(entries, scene, [chosen, of_the_motion], processes, on_progress)
         found = _with_costs(ladders, scene, processes, on_progress)

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from comparisons.engines.base import EngineMissing
 from comparisons.engines.registry import engine
 from comparisons.results.provenance import processor, versions
+from comparisons.running.inputs import EngineEntry, engine_entry
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
-from comparisons.running.recording import EngineEntry, engine_entry, simulate
+from comparisons.running.recording import simulate
 from scenarios import DropspinError, load
 
 Rows = list[dict[str, str]]

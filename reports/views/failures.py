@@ -86,7 +86,8 @@ def what_fails(row: Row) -> str:
         return f"{what} is {row['value']:.6g}, {row['reason']}"
     allowed = bound(row["lower"], row["upper"])
     expected = f", expected {allowed}" if allowed else ""
-    return f"{what} is {formatted(row['value'])}{expected}: {row['reason']}"
+    value = "undefined" if math.isnan(row["value"]) else formatted(row["value"])
+    return f"{what} is {value}{expected}: {row['reason']}"
 
 
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:

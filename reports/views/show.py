@@ -48,7 +48,7 @@ def _allowed(expectation: Expectation) -> str:
 
 def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     """What an engine builds of a scene, read back, with its settings."""
-    from comparisons.running.recording import verify_time_step
+    from comparisons.running.inputs import verify_time_step
     from comparisons.running.verification import verify_build
 
     verify_time_step(scene, dt)

@@ -13,7 +13,7 @@ from comparisons.conformance.probes import PROBES
 from comparisons.engines.base import KnownLimitation
 from comparisons.engines.pybullet_engine import PyBullet
 from comparisons.engines.registry import engine
-from comparisons.running.recording import EngineEntry
+from comparisons.running.inputs import EngineEntry
 from comparisons.running.run import run
 from scenarios import load
 from scenarios.errors import UnknownName

@@ -357,7 +357,7 @@ def test_limit_cycle_of_a_lively_ball(mu):
     assert impacts.max() == pytest.approx(9.8 * h / (1 - mu), rel=0.02)
 
 
-def test_no_torsional_friction():
+def test_mean_contact_has_no_torsional_friction():
     """Known fault: a flat box that sticks at its mean contact point spins about the vertical for ever."""
     body, world = cube(0.2), World(G, Floor(0.0, STICKS))
     state = np.array([0, 0.2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 10.0, 0], dtype=float)
@@ -365,7 +365,7 @@ def test_no_torsional_friction():
     assert rows[-1, 11] == pytest.approx(10.0, rel=1e-9)
 
 
-def test_sliding_flat_box_stops_and_turns_at_once():
+def test_mean_contact_turns_a_sliding_flat_box():
     """Known fault: eq 17 at the mean point of a flat sliding box: v_x → 1, ω_z = -2 in one step, for a cube of corner masses."""
     body = cube(0.5)
     state = np.array([0, 0.5 - 1e-6, 0, 0, 0, 0, 1, 3.0, -1e-3, 0, 0, 0, 0], dtype=float)
@@ -376,7 +376,7 @@ def test_sliding_flat_box_stops_and_turns_at_once():
 
 
 def test_eq_17_can_pull():
-    """Known fault: in a tenth of random sticking impacts of a box, the less the livelier, the floor pulls the corner down."""
+    """Known fault: in a share of random sticking impacts of a box, smaller for higher restitution, the floor pulls the corner down."""
     shares = []
     for mu in (0.0, 0.5, 0.9):
         rng = np.random.default_rng(1)
@@ -389,8 +389,8 @@ def test_eq_17_can_pull():
     assert shares[0] > shares[1] > shares[2] > 0.0
 
 
-def test_a_fast_small_body_is_swallowed_by_the_floor():
-    """Known fault: a cube of 10 cm dropped from 5 m at 1/60 s is wholly below the floor after one step, and stays there."""
+def test_fast_small_body_stays_below_the_floor():
+    """Known fault: a cube of 10 cm dropped from 5 m at 1/60 s is completely below the floor after one step, and stays there."""
     body = cube(0.05)
     state = np.array([0, 5.04, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
     heights = reference_impl.simulate(state, body, World(G, Floor(0.0, STICKS)), 1 / 60, 600)[:, 1]
@@ -399,7 +399,7 @@ def test_a_fast_small_body_is_swallowed_by_the_floor():
 
 
 def test_damping_factors_per_step_have_no_limit():
-    """Known fault of the note's c: .98 a step is 1.2 per second at 1/60 s and 20 at 1 ms; our rates are the same at both."""
+    """Known fault: a factor of .98 a step is a rate of 1.2 /s at 1/60 s and 20 /s at 1 ms; a rate decays alike at both."""
     rates = {h: -np.log(0.98) / h for h in (1 / 60, 1e-3)}
     assert rates[1 / 60] == pytest.approx(1.212, abs=1e-3)
     assert rates[1e-3] == pytest.approx(20.2, abs=1e-2)

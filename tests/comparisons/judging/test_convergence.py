@@ -137,7 +137,7 @@ def test_a_known_fault_passes_for_the_engine_it_is_known_of_alone():
     """The note's plateau is expected of `document`; the same plateau of a stranger fails."""
     known = study(run("spin-asymmetric", "document"), "angular_momentum_direction_error", "asymptotic_error")
     assert (known["cause"], known["verdict"]) == ("model", "passed")
-    assert "fault of the note" in known["reason"]
+    assert "fault of Wang's method" in known["reason"]
     stranger = run("spin-asymmetric", with_error(None, lambda dt: 0.7))
     assert study(stranger, "orientation_error", "asymptotic_error")["verdict"] == "failed"
     assert stranger.exit_code() == 1

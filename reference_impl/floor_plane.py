@@ -14,6 +14,6 @@ def along_normal(a):
 
 @compiled
 def vertex(R, body, i):
-    """Offset from the centre of mass to vertex i. A rounded vertex touches at its lowest point (a departure from the note, for balls)."""
+    """Offset from the centre of mass to vertex i. A rounded vertex touches at its lowest point (for balls; not in the lecture note)."""
     r = R @ row(body.points, i)
     return Vec3(r.x, r.y - body.radius, r.z)

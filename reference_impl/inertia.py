@@ -14,7 +14,7 @@ def total_mass(masses: NDArray[np.float64]) -> float:
 def vertex_inertia(points: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Eq 8 with its masses: I_body = Σ mᵢ (pᵢᵀpᵢ 1 − pᵢpᵢᵀ).
 
-    The lecture note prints the formula without mᵢ; masses of 1 give it as printed, whatever mass the body has.
+    The lecture note prints the formula without mᵢ; masses of 1 give it as printed, for any mass of the body.
 
     Args:
         points: Vertices in the body frame, from the centre of mass [m], shape (n, 3).

@@ -31,7 +31,7 @@ MAX_SWEEPS = 2000
 
 @compiled
 def collide_normal(x, q, v, w, body, floor, law):
-    """For `law=normal`: without friction, whatever coefficient the floor has."""
+    """For `law=normal`: without friction, for any coefficient of the floor."""
     return _sweep(x, q, v, w, body, floor, 0.0)
 
 

@@ -3,7 +3,7 @@
 With u = v + ω × r the velocity of the point, K = 1/M - r* I⁻¹ r* (eq 15 of Wang's lecture note), e the restitution and f the friction:
 
     note       K j = -(1 + e) u_n N without friction (eq 15), K j = -u - e u_n N with infinite friction (eq 17)
-    normal     j = -(1 + e) u_n / (N·K N) N, whatever the friction
+    normal     j = -(1 + e) u_n / (N·K N) N for any friction
     poisson    normal without friction; with infinite friction K j = s N - u,  s = e max(-N·K⁻¹u, 0) / (N·K⁻¹N)
     clamped    normal without friction; with infinite friction eq 17 with the largest restitution up to e that adds no energy
     coulomb    eq 17 while it stays within the cone of f, else j = j_n (N - f t), t along u's tangential part

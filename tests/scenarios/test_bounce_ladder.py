@@ -1,4 +1,4 @@
-"""The bounce ladder against mpmath's event by event sums, and its limits."""
+"""The bounce ladder compared with sums of single bounces by mpmath, and its range of validity."""
 
 import math
 
@@ -24,8 +24,8 @@ def ball(restitution=0.5, height=1.0, g=9.8, velocity=(0.0, 0.0, 0.0), spin=(0.0
 
 
 @pytest.mark.parametrize(("restitution", "zeno"), [(0.3, 0.838972), (0.5, 1.355262), (0.7, 2.559939), (0.9, 8.583325)])
-def test_zeno_time(restitution, zeno):
-    """The impacts pile up at t₀ + 2 u₀ e / (g (1 - e)); published to six decimals for a drop of 1 m."""
+def test_impacts_accumulate_at_zeno_s_time(restitution, zeno):
+    """The impacts accumulate at t₀ + 2 u₀ e / (g (1 - e)); published to six decimals for a drop of 1 m."""
     truth = truth_for(ball(restitution, duration=zeno + 0.01))
     assert truth.events[-1].time == pytest.approx(zeno, abs=1e-6)
     assert truth([zeno + 0.005]).position[0, 1] == pytest.approx(0.1, abs=1e-15)
@@ -33,7 +33,7 @@ def test_zeno_time(restitution, zeno):
 
 
 @given(st.floats(0.05, 1.0), st.floats(0.01, 20), st.floats(-3, 3))
-def test_against_mpmath(restitution, height, upward):
+def test_bounces_match_sums_with_forty_digits(restitution, height, upward):
     """Ten bounces summed one by one with 40 digits: times, speeds and apexes to 1e-13 relative."""
     truth = truth_for(ball(restitution, height, velocity=(0.0, upward, 0.0), duration=20.0))
     with mpmath.mp.workdps(40):
@@ -57,15 +57,13 @@ def test_against_mpmath(restitution, height, upward):
             time += 2 * speed / g
 
 
-def test_elastic_ball_keeps_its_energy():
-    """At e = 1 every apex is the drop height, for as long as asked."""
+def test_ball_of_restitution_1_rebounds_to_the_drop_height():
     truth = truth_for(ball(1.0, duration=100.0))
     assert len(truth.events) == math.floor((100 + math.sqrt(2 / 9.8)) / (2 * math.sqrt(2 / 9.8)))
     assert all(event.after[8] == pytest.approx(math.sqrt(19.6), rel=1e-13) for event in truth.events)
 
 
-def test_dead_ball_stays():
-    """At e = 0 there is one impact, and rest."""
+def test_ball_of_restitution_0_rests_after_one_impact():
     truth = truth_for(ball(0.0))
     assert len(truth.events) == 1
     np.testing.assert_array_equal(truth([1.0, 2.0]).velocity, 0.0)
@@ -77,16 +75,15 @@ def test_rest_speed_ends_the_ladder():
     assert [round(float(event.after[8]), 3) for event in truth.events] == [2.214, 1.107, 0.553, 0.0]
 
 
-def test_sideways_motion_and_spin_go_on():
-    """A smooth floor changes neither."""
+def test_frictionless_floor_changes_neither_sideways_motion_nor_spin():
     truth = truth_for(ball(velocity=(2.0, 0.0, -1.0), spin=(0.0, 3.0, 4.0)))
     end = truth([2.5])
     np.testing.assert_allclose(end.position[0, [0, 2]], [5.0, -2.5], rtol=1e-15)
     np.testing.assert_array_equal(end.angular_velocity[0], [0.0, 3.0, 4.0])
 
 
-def test_what_it_is_not_valid_for():
-    """A rough floor with sideways motion, a tilted box, damping, slanting gravity: no ladder."""
+def test_bounce_ladder_is_limited_to_its_range_of_validity():
+    """Not with friction and sideways motion, for a tilted box, or with damping."""
     assert truth_for(ball(velocity=(1.0, 0.0, 0.0), friction="infinite")).name == "ball-impact"
     assert truth_for(ball(spin=(1.0, 0.0, 0.0), friction=0.3)).name == "ball-impact"
     assert truth_for(ball(friction="infinite")).name == "bounce-ladder"
@@ -98,30 +95,29 @@ def test_what_it_is_not_valid_for():
     assert truth_for(load(ball().model_dump(exclude_none=True) | {"damping": {"linear": 0.1}})) is None
 
 
-def test_times_outside_are_refused():
-    """A truth does not guess."""
-    with pytest.raises(ValueError, match="holds for 0 <= t <= 3 s"):
+def test_times_outside_the_horizon_are_rejected():
+    with pytest.raises(ValueError, match="the exact solution 'bounce-ladder' is valid for 0 <= t <= 3 s"):
         truth_for(ball())([-0.1])
-    with pytest.raises(ValueError, match="holds for 0 <= t <= 3 s"):
+    with pytest.raises(ValueError, match="the exact solution 'bounce-ladder' is valid for 0 <= t <= 3 s"):
         truth_for(ball())([3.1])
 
 
 @pytest.mark.parametrize("height", [0.0, 1e-17, 5e-11])
-def test_a_hair_above_the_floor_is_on_it(height):
-    """A ball laid down at restitution 1 lies; it does not bounce a nanometre high a billion times."""
+def test_ball_within_rounding_of_the_floor_rests_on_it(height):
+    """At restitution 1 it does not bounce a nanometre high a billion times."""
     truth = truth_for(ball(1.0, height, duration=1000.0))
     assert truth is not None
     np.testing.assert_allclose(truth([0.0, 1000.0]).position[:, 1], 0.1, rtol=0, atol=1e-10)
 
 
-def test_more_bounces_than_can_be_listed():
-    """There is no ladder of a million rungs: the truth ends after ten, and memory does not."""
+def test_ladder_of_too_many_bounces_is_replaced_by_ten_impacts():
+    """A million bounces would not fit into memory."""
     truth = truth_for(ball(1.0, 1e-6, duration=3600.0))
     assert (truth.name, len(truth.events)) == ("ball-impact", 10)
 
 
-def test_a_flat_box_may_spin_about_the_vertical():
-    """On a smooth floor it lands flat whatever its turn; about any other axis it does not."""
+def test_flat_box_may_spin_about_the_vertical_only():
+    """On a frictionless floor it then lands flat."""
     box = ball().model_dump(exclude_none=True)
     box["body"] = {"shape": "box", "mass": 1.0, "half_extents": [0.1, 0.1, 0.3]}
     box["start"] |= {"angular_velocity": [0.0, 3.0, 0.0]}

@@ -1,4 +1,4 @@
-"""A sliding box: Coulomb's law of even slowing, and where it is no longer the truth."""
+"""A sliding box: uniform deceleration by Coulomb friction, and its range of validity."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def sliding(friction=0.3, velocity=(3.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), height
 
 
 @pytest.mark.parametrize("velocity", [(3.0, 0.0, 0.0), (0.0, 0.0, -2.0), (-1.2, 0.0, 1.6)])
-def test_it_stops_where_its_energy_is_spent(velocity):
+def test_box_stops_where_friction_has_done_its_work(velocity):
     """After v²/(2 f g), at v/(f g), to 1e-15; on the way kinetic energy and the work of friction add up, to 1e-14."""
     scene = sliding(velocity=velocity)
     truth = truth_for(scene)
@@ -49,20 +49,20 @@ def test_it_stops_where_its_energy_is_spent(velocity):
         sliding(gravity={"acceleration": [1.0, -9.8, 0.0]}),
     ],
 )
-def test_what_it_is_not_valid_for(scene):
-    """Tipping, sticking, spin, a fall, rest, damping, a slope."""
+def test_slide_is_limited_to_its_range_of_validity(scene):
+    """Not with tipping, sticking, spin, a fall, rest, damping or a slope."""
     truth = truth_for(scene)
     assert truth is None or truth.name != "coulomb-slide"
 
 
-def test_it_is_valid_up_to_where_the_box_would_tip():
-    """F h = b is the limit."""
+def test_slide_is_valid_until_the_box_would_tip():
+    """The limit is f h = b."""
     assert truth_for(sliding(friction=2.99)).name == "coulomb-slide"
     assert truth_for(sliding(friction=3.01)) is None
 
 
-def test_a_body_whose_base_does_not_lie_under_it_tips():
-    """Three feet ahead of the centre of mass: it falls over backwards, whatever friction does."""
+def test_body_whose_base_is_not_below_its_centre_of_mass_tips():
+    """Three feet ahead of the centre of mass: it falls backwards with any friction."""
     body = {"shape": "vertices", "points": [[0.5, -0.2, 0.3], [0.5, -0.2, -0.3], [0.2, -0.2, 0.0], [-0.9, 0.3, 0.0]]}
     body |= {"masses": [0.1, 0.1, 0.1, 1.0]}
     feet = -load({"name": "feet", "duration": 1.0, "body": body}).body.vertices[:, 1].min()

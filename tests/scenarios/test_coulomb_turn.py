@@ -1,4 +1,4 @@
-"""A box that turns flat on a rough floor: Coulomb's law of even slowing, and where it is no longer the truth."""
+"""A box that turns flat on a rough floor: uniform deceleration by Coulomb friction, and its range of validity."""
 
 import numpy as np
 import pytest
@@ -26,8 +26,8 @@ def turning(spin=(0.0, -8.0, 0.0), orientation=(0.0, 0.3, 0.0, 0.9), height=0.1,
 
 @pytest.mark.parametrize(("upright", "moment"), [(0, 0.05), (1, 0.06), (2, 0.07)])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_friction_at_the_corners_spends_the_energy(upright, moment, direction):
-    """On any face: the work of f M g/4 at each corner along its path of ρ φ is what is lost, and nothing is left; to 1e-14."""
+def test_energy_lost_is_the_work_of_friction_at_the_corners(upright, moment, direction):
+    """On any face: f M g/4 at each corner along its path of ρ φ, until all energy is lost; to 1e-13."""
     axis = np.roll([1.0, 0.0, 0.0], upright)
     quaternion = {0: [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)], 1: [0.0, 0.0, 0.0, 1.0], 2: [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]}[upright]
     assert abs(rotate(np.array(quaternion), axis)[1]) == pytest.approx(1.0)
@@ -55,7 +55,7 @@ def test_friction_at_the_corners_spends_the_energy(upright, moment, direction):
         {"body": {"shape": "sphere", "radius": 0.1, "mass": 2.0}},
     ],
 )
-def test_what_it_is_not_valid_for(change):
-    """Sticking, a fall, wobble, rest, a tilt, damping, a ball."""
+def test_turn_is_limited_to_its_range_of_validity(change):
+    """Not with sticking, a fall, another spin, rest, a tilt, damping or a ball."""
     truth = truth_for(turning(**change))
     assert truth is None or truth.name != "coulomb-turn"

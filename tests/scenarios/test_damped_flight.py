@@ -1,4 +1,4 @@
-"""Damped flight against 40 digits by other ways: mpmath's own formula for the path, Taylor series of Euler's equations for the turning."""
+"""Damped flight compared with 40 digits: a closed formula by mpmath for the path, Taylor series of Euler's equations for the rotation."""
 
 import mpmath
 import numpy as np
@@ -28,8 +28,8 @@ def thrown(linear=0.0, angular=0.0, spin=(0.0, 0.0, 0.0), moments=(1.0, 2.0, 3.0
 
 
 @pytest.mark.parametrize("rate", [1e-12, 1e-3, 0.3, 1.0, 1.2, 40.0])
-def test_path_against_forty_digits(rate):
-    """Against x = x₀ + (v₀ - g/k)(1 - e⁻ᵏᵗ)/k + g t/k, which in doubles loses all digits at small k; to 1e-14 of the distance."""
+def test_path_matches_forty_digits(rate):
+    """With x = x₀ + (v₀ - g/k)(1 - e⁻ᵏᵗ)/k + g t/k, which in doubles loses all digits at small k; to 1e-14 of the distance."""
     found = truth_for(thrown(linear=rate))(TIMES)
     scene = thrown(linear=rate)
     with mp.workdps(60):
@@ -45,7 +45,7 @@ def test_path_against_forty_digits(rate):
 
 @pytest.mark.parametrize("rate", [0.05, 0.7])
 @pytest.mark.parametrize("spin", [(0.3, 5.0, -0.2), (4.0, 0.1, 2.0)])
-def test_turning_against_taylor_series(rate, spin):
+def test_rotation_matches_taylor_series(rate, spin):
     """Attitude to 1e-12 rad and spin to 1e-13 of its start (measured 6e-14 and 2e-15), damping in the differential equation itself."""
     scene = thrown(angular=rate, spin=spin)
     found = truth_for(scene)(TIMES)
@@ -58,8 +58,7 @@ def test_turning_against_taylor_series(rate, spin):
 
 
 @given(st.floats(0.0, 5.0), st.floats(0.0, 5.0))
-def test_it_can_be_continued_from_any_time(rate, pause):
-    """The motion from a later state is the rest of the motion."""
+def test_motion_can_be_restarted_at_any_time(rate, pause):
     scene = thrown(linear=rate, angular=rate, spin=(0.3, 4.0, -0.2))
     truth = truth_for(scene)
     resumed = truth_for(scene.starting_at(truth([pause]).states[0]))
@@ -67,8 +66,7 @@ def test_it_can_be_continued_from_any_time(rate, pause):
     assert angle_between_orientations(resumed([1.0]).orientation[0], truth([pause + 1.0]).orientation[0]) <= 1e-11
 
 
-def test_no_damping_is_the_limit():
-    """At rates of 0 the free flight itself, bit for bit."""
+def test_damping_rates_of_0_give_the_free_flight_bit_for_bit():
     damped, content = thrown(spin=(1.0, 2.0, 3.0)), thrown(spin=(1.0, 2.0, 3.0)).model_dump(exclude_none=True)
     del content["damping"]
     np.testing.assert_array_equal(truth_for(damped)(TIMES).states, truth_for(load(content))(TIMES).states)

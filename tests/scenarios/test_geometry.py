@@ -1,4 +1,4 @@
-"""Rotations, mass properties and mechanics against SciPy and by hand."""
+"""Rotations, mass properties and mechanics compared with SciPy and with values by hand."""
 
 import numpy as np
 import pytest
@@ -16,8 +16,8 @@ vectors = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
 
 
 @given(quaternions, quaternions, vectors)
-def test_rotations_are_scipys(p, q, v):
-    """Product, rotation and its inverse, to 1e-15 of the size."""
+def test_rotations_match_scipy(p, q, v):
+    """Product, rotation and its inverse, to 1e-14."""
     P, Q = Rotation.from_quat(p), Rotation.from_quat(q)
     np.testing.assert_allclose(rotations.rotate(p, v), P.apply(v), rtol=0, atol=1e-14)
     np.testing.assert_allclose(rotations.unrotate(p, rotations.rotate(p, v)), v, rtol=0, atol=1e-14)
@@ -25,8 +25,8 @@ def test_rotations_are_scipys(p, q, v):
 
 
 @given(quaternions, vectors.filter(lambda v: np.linalg.norm(v) > 0.1), st.floats(1e-12, 3.1))
-def test_a_planted_angle_is_measured(q, axis, angle):
-    """From 1e-12 rad to nearly pi, to 1e-15; and q and -q are one orientation."""
+def test_angle_between_orientations_is_accurate_and_ignores_the_sign(q, axis, angle):
+    """From 1e-12 rad to nearly π, to 3e-15; q and -q are the same orientation."""
     turned = rotations.multiply(rotations.about(axis / np.linalg.norm(axis), np.array(angle)), q)
     assert rotations.angle_between_orientations(q, turned) == pytest.approx(angle, abs=3e-15)
     assert rotations.angle_between_orientations(q, -turned) == pytest.approx(angle, abs=3e-15)
@@ -44,8 +44,8 @@ def body(**table):
     return load({"duration": 1.0, "body": table}).body
 
 
-def test_inertia_in_words():
-    """Solid, corner masses, eq 8 as printed; a ball; a given tensor."""
+def test_inertia_of_each_keyword():
+    """Solid, corner masses, eq 8 as printed, given moments; a ball."""
     box = {"shape": "box", "half_extents": [1.0, 2.0, 3.0], "mass": 6.0}
     np.testing.assert_allclose(np.diag(body(**box).inertia_tensor), [26, 20, 10], rtol=1e-15)
     np.testing.assert_allclose(np.diag(body(**box, inertia="vertices").inertia_tensor), [78, 60, 30], rtol=1e-15)
@@ -55,8 +55,8 @@ def test_inertia_in_words():
 
 
 @given(quaternions)
-def test_principal_axes(q):
-    """The body's own in their order where they are; else those that the tensor was turned to, right-handed."""
+def test_principal_axes_of_diagonal_and_full_tensors(q):
+    """The body axes in their order if the tensor is diagonal, else right-handed axes that diagonalise it."""
     moments = np.diag([3.0, 1.0, 2.0])
     own, axes = principal_axes(moments)
     assert (own.tolist(), axes.tolist()) == ([3.0, 1.0, 2.0], np.eye(3).tolist())
@@ -80,7 +80,7 @@ def test_vertices_are_centred_on_their_masses():
 
 
 def test_resting_height_of_a_solid_set_of_vertices():
-    """The corners of a box rest as the box does."""
+    """The corners of a box have the resting height of the box."""
     corners = [[x, y, z] for x in (-1.0, 1.0) for y in (-2.0, 2.0) for z in (-3.0, 3.0)]
     assert body(shape="vertices", points=corners, mass=1.0).resting_height == pytest.approx(1.0, rel=1e-12)
 
@@ -97,8 +97,8 @@ def test_energy_momentum_and_height_by_hand():
     assert lowest_height(scene, motion)[0] == pytest.approx(5 - 0.15, rel=1e-15)
 
 
-def test_lag_is_half_a_step_of_power():
-    """Synchronised energy adds lag M g·v."""
+def test_synchronised_energy_adds_the_velocity_lag():
+    """By lag M g·v."""
     scene = load("drop-ball")
     states = np.array([[0, 1, 0, 0, 0, 0, 1, 0, -2, 0, 0, 0, 0]], dtype=float)
     motion = Trajectory.from_states(np.zeros(1), states, velocity_lag=0.01)

@@ -1,4 +1,4 @@
-"""One impulse at one point, by every law, against 40 digits: momentum balances and what the law says, as one system of linear equations."""
+"""One impulse at one point by every law, compared with 40 digits: momentum balances and the conditions of the law as one linear system."""
 
 import mpmath
 import numpy as np
@@ -88,11 +88,11 @@ def by_mpmath(law, corner, v, w, e, friction, inertia=INERTIA, mass=MASS):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("friction", ["none", "infinite", 0.3])
 @given(vectors.filter(lambda r: r[1] < -0.1), vectors.filter(lambda v: v[1] < -0.1), vectors, st.floats(0, 1))
-def test_each_law_against_forty_digits(law, friction, corner, v, w, e):
+def test_each_law_matches_forty_digits(law, friction, corner, v, w, e):
     """To 1e-12 of the largest velocity (measured 2e-14)."""
     u = v + np.cross(w, corner)
     if (friction == 0.3) != (law == "coulomb") or u[1] > -0.1 or np.hypot(u[0], u[2]) < 0.1:
-        return  # where a law is not defined, or two are not told apart
+        return  # where the law is not defined, or cannot be distinguished from another
     state = np.concatenate([[0, 1, 0], [0, 0, 0, 1], v, w])
     with mp.workdps(40):
         exact = by_mpmath(law, corner, v, w, e, friction)
@@ -102,7 +102,7 @@ def test_each_law_against_forty_digits(law, friction, corner, v, w, e):
 
 @pytest.mark.parametrize("name", ["drop-box-corner", "drop-box-sticking", "drop-box-tumble"])
 @pytest.mark.parametrize("law", ["normal", "note", "poisson", "clamped"])
-def test_a_whole_first_impact_against_forty_digits(name, law):
+def test_flight_and_first_impact_match_forty_digits(name, law):
     """Flight by Taylor series, the time by bisection of the corner's height, the impulse by linear equations: all to 1e-12."""
     scene = load(name)
     friction = "none" if law == "normal" else "infinite"
@@ -158,8 +158,8 @@ def to_body(q, a):
 
 
 @pytest.mark.parametrize("friction", [0.05, 0.2, 5.0])
-def test_a_ball_with_coulomb_friction(friction):
-    """It slips if f (1 + e) |u_n| is less than what stops it, |u_t| / (1 + 1/β) with I = β M R², else it does not. To 1e-14."""
+def test_ball_slips_or_sticks_by_its_coulomb_coefficient(friction):
+    """It slips if f (1 + e) |u_n| is less than |u_t| / (1 + 1/β), which stops it, with I = β M R². To 1e-14."""
     scene = load(
         {
             "name": "grazing",
@@ -180,7 +180,7 @@ def test_a_ball_with_coulomb_friction(friction):
     np.testing.assert_allclose(impact.after[RATES], [2.0 + kick[0], 2.4, 0.5 + kick[2], *spin], rtol=0, atol=2e-14 * 40)
 
 
-def test_which_law_is_a_floor_s_own():
-    """None but the normal impulse without friction, eq 17 where the floor grips, else Coulomb's."""
+def test_law_of_the_floor_follows_its_friction():
+    """The normal impulse without friction, eq 17 with infinite friction, else Coulomb's law."""
     assert [law_of(Floor(restitution=0.5, friction=f)) for f in ("none", 0.0, "infinite", 0.3)] == ["normal", "normal", "note", "coulomb"]
     assert truth_for(load("slide-box")).name == "coulomb-slide"

@@ -1,4 +1,4 @@
-"""Loading: good scenes come through unchanged, bad ones get one line that says where, what was given and what is allowed."""
+"""Loading scenes; the message for an invalid scene is one line that says where, what was given and what is allowed."""
 
 import math
 import re
@@ -14,14 +14,13 @@ MALFORMED = sorted((Path(__file__).parent / "malformed").glob("*.toml"))
 BALL = {"duration": 1.0, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}}
 
 
-def test_there_are_enough_malformed_files():
-    """A glob that finds nothing would test nothing."""
+def test_malformed_files_are_found():
     assert len(MALFORMED) >= 30
 
 
 @pytest.mark.parametrize("path", MALFORMED, ids=lambda path: path.stem)
-def test_malformed_file(path):
-    """Each file says in its first lines what its error must say; the error is one line that starts with the file."""
+def test_malformed_file_is_rejected_with_its_message(path):
+    """The first lines of each file state the expected text; the message is one line that starts with the file."""
     expected = re.findall(r"^# says: (.*)$", path.read_bytes().decode("latin-1"), flags=re.MULTILINE)
     assert expected
     with pytest.raises(SceneError) as caught:
@@ -33,8 +32,8 @@ def test_malformed_file(path):
         assert part in message
 
 
-def test_files_that_are_no_files(tmp_path):
-    """Missing, a directory, far too large, nested too deeply."""
+def test_unreadable_files_are_rejected(tmp_path):
+    """Missing, a directory, too large, nested too deeply."""
     with pytest.raises(SceneError, match=r"absent\.toml: No such file or directory; give the path"):
         load(tmp_path / "absent.toml")
     with pytest.raises(SceneError, match="is a directory; a scene is one TOML file"):
@@ -50,15 +49,14 @@ def test_files_that_are_no_files(tmp_path):
         load(deep)
 
 
-def test_did_you_mean():
-    """A slip in a name gets the nearest one, and the list."""
+def test_unknown_scene_suggests_the_nearest_name():
     with pytest.raises(SceneError, match=r"'drop-bal' is not in the catalogue.*Did you mean 'drop-ball'\?.*spin-principal"):
         load("drop-bal")
 
 
 @pytest.mark.parametrize("name", scenarios.names())
-def test_catalogue(name):
-    """Every scene says where it is from, has a truth, and gives each expectation's measured value in its reason."""
+def test_catalogue_scene_has_source_exact_solution_and_measured_values(name):
+    """The reason of each expectation states a measured value."""
     scene = load(name)
     assert scene.name == name
     assert scene.summary
@@ -70,7 +68,7 @@ def test_catalogue(name):
 
 
 def test_defaults_and_absent_tables():
-    """Origin, identity, at rest; nothing that is not in the file is modelled."""
+    """The default start is the origin, the identity, at rest; absent tables are None."""
     scene = load(BALL)
     np.testing.assert_array_equal(scene.initial_state, [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0])
     assert (scene.gravity, scene.floor, scene.damping, scene.ensemble) == (None, None, None, None)
@@ -78,7 +76,7 @@ def test_defaults_and_absent_tables():
 
 
 def test_orientation_is_normalised_once():
-    """Any length will do; a unit quaternion keeps its last digit, so that a saved scene loads as it was."""
+    """A unit quaternion keeps its last digit, so that a saved scene loads unchanged."""
     scene = load(BALL | {"start": {"orientation": [0.2, 0.1, -0.3, 0.9]}})
     assert math.hypot(*scene.start.orientation) == pytest.approx(1.0, abs=2e-16)
     again = load(scene.model_dump(exclude_none=True))
@@ -86,27 +84,26 @@ def test_orientation_is_normalised_once():
     assert again.digest == scene.digest
 
 
-def test_digest_is_of_the_physics():
-    """Text and expectations do not change it; a number does."""
+def test_digest_depends_on_the_motion_only():
+    """Not on texts and expectations."""
     scene = load("drop-ball")
     assert scene.model_copy(update={"summary": "x", "expect": ()}).digest == scene.digest
     assert scene.model_copy(update={"duration": 1.6}).digest != scene.digest
 
 
-def test_steps_do_not_lose_the_last_to_rounding():
+def test_last_step_is_not_lost_to_rounding():
     """1.5 / 0.001 is 1500 steps, 0.3 / 0.1 is 3."""
     assert load("drop-ball").steps(1e-3) == 1500
     assert load(BALL | {"duration": 0.3}).steps(0.1) == 3
 
 
-def test_a_name_from_the_mapping():
-    """A mapping may carry the name that a file would have; no name will do too."""
+def test_mapping_may_have_a_name():
+    """The default is `scene`."""
     assert load(BALL | {"name": "mine"}).name == "mine"
     assert load(BALL).name == "scene"
 
 
-def test_a_file_beside_a_catalogue_name_needs_a_path(tmp_path, monkeypatch):
-    """A bare name is the catalogue's; a path is a path."""
+def test_bare_name_is_the_catalogue_s_although_a_file_exists(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("drop-ball.toml").write_text('duration = 9.0\n[body]\nshape = "sphere"\nradius = 1.0\nmass = 1.0\n')
     assert load("drop-ball").duration == 1.5
@@ -114,8 +111,8 @@ def test_a_file_beside_a_catalogue_name_needs_a_path(tmp_path, monkeypatch):
     assert load(Path("drop-ball.toml")).duration == 9.0
 
 
-def test_scenes_are_equal_by_what_was_given():
-    """Whatever has been asked of one of them in between."""
+def test_scenes_are_equal_by_their_values():
+    """Cached properties have no influence."""
     one, other = load("drop-box-corner"), load("drop-box-corner")
     assert one.body.inertia_tensor.any()
     assert one.clearance > 0.0

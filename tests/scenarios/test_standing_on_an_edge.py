@@ -62,7 +62,7 @@ def standing(half=(0.2, 0.5), lean=-0.2, speed=0.0, friction="infinite", heading
 @pytest.mark.parametrize(
     ("name", "time", "angle", "speed"), [("tip-box", 0.99989682, 1.0, 2.87658296), ("slip-stick", 0.78614720, 1.2, 3.64150199)]
 )
-def test_published_falls(name, time, angle, speed):
+def test_falls_match_published_values(name, time, angle, speed):
     """From 0.1 rad, at rest: the time and speed at which a larger angle is reached, to the eight decimals given."""
     scene = load(name)
     end = truth_for(scene)([0.0, time])
@@ -73,7 +73,7 @@ def test_published_falls(name, time, angle, speed):
     assert np.abs(end.velocity[1, [0, 2]]).max() == 0.0 or name == "tip-box"
 
 
-def test_published_landing():
+def test_landing_ratio_matches_published_values():
     """Housner's ratio for corner masses, a = .2, b = .5: 1 - 2 a²/(2 R²) = .862069; for a solid box .793103."""
     for inertia, ratio in (("vertices", 0.862069), ("solid", 0.793103)):
         content = load("rock-block").model_dump(exclude={"expect", "origin"}, exclude_none=True)
@@ -93,7 +93,7 @@ def pendulum(square, angle, speed):
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.4, -0.35])
-def test_tipping_against_forty_digits(speed):
+def test_tipping_matches_taylor_series(speed):
     """ψ'' = p² sin ψ by Taylor series; angle and speed to 1e-13 (measured 2e-14)."""
     scene = standing(lean=-0.2, speed=speed)
     times = [0.1, 0.3, 0.5, 0.62]
@@ -112,7 +112,7 @@ def test_tipping_against_forty_digits(speed):
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.5, -0.3])
-def test_slipping_against_forty_digits(speed):
+def test_slipping_matches_taylor_series(speed):
     """Lagrange's equation (k + sin²ψ) ψ'' + sin ψ cos ψ ψ'² = (g/R) sin ψ, k = 1, by Taylor series; to 1e-13 (measured 3e-14).
 
     With d = 1/(1 + sin²ψ) as an unknown of its own, d' = -2 d² sin ψ cos ψ ψ', the equation is polynomial.
@@ -139,7 +139,7 @@ def test_slipping_against_forty_digits(speed):
     np.testing.assert_allclose(sideways[:, [0, 2]], np.outer(times, [0.3, -0.4]), atol=1e-15)
 
 
-def test_landings_against_forty_digits():
+def test_landings_match_taylor_series():
     """Three rockings: Taylor series to the landing, angular momentum about the new edge by vectors; times to 1e-13 (measured 1e-15)."""
     scene = standing(lean=0.6 * math.atan(0.4))
     truth = truth_for(scene)
@@ -165,8 +165,8 @@ def test_landings_against_forty_digits():
 @pytest.mark.parametrize("axes", AXES)
 @pytest.mark.parametrize("lean", [0.25, -0.25])
 @pytest.mark.parametrize("friction", ["infinite", "none"])
-def test_lands_on_the_right_face(axes, lean, friction):
-    """Whichever of the body's axes is the edge: the motion ends with the box flat, as high as half the box above the face it fell on."""
+def test_box_lands_on_the_face_that_it_falls_towards(axes, lean, friction):
+    """For any axis of the body as the edge, the centre ends at the half height above that face."""
     scene = standing(lean=lean, axes=axes, friction=friction)
     truth = truth_for(scene)
     assert truth.name == ("rocking" if friction == "infinite" else "slipping")
@@ -183,8 +183,8 @@ def test_lands_on_the_right_face(axes, lean, friction):
     st.floats(-3.0, 3.0),
     st.sampled_from(AXES),
 )
-def test_edge_at_rest_energy_kept_and_no_corner_below(a, h, share, heading, axes):
-    """Between landings the edge stands still, energy is kept to 1e-13 of M g R, and no corner sinks in by 1e-13 of the size."""
+def test_rocking_conserves_energy_on_a_fixed_edge_above_the_floor(a, h, share, heading, axes):
+    """Between landings the edge is at rest, energy is constant to 1e-13 of M g R, and no corner is below the floor by 1e-13 of the size."""
     lean = share * 0.999 * (math.atan2(a, h) if share > 0 else math.atan2(h, a))
     scene = standing(half=(a, h), lean=lean, heading=heading, axes=axes)
     truth = truth_for(scene)
@@ -202,8 +202,8 @@ def test_edge_at_rest_energy_kept_and_no_corner_below(a, h, share, heading, axes
         assert np.abs(speeds[~flat]).max(initial=0.0) <= 1e-13
 
 
-def test_it_comes_to_rest_where_it_stood():
-    """Rocking dies out like a bounce: at rest after Zeno's time, on the face it rocked on, where it was."""
+def test_rocking_ends_at_rest_in_place():
+    """After Zeno's time, on the face on which it rocked."""
     scene = standing(half=(0.5, 0.5), lean=math.pi / 4 - math.radians(0.1), duration=20.0)
     truth = truth_for(scene)
     end = truth([20.0])
@@ -216,15 +216,15 @@ def test_it_comes_to_rest_where_it_stood():
     np.testing.assert_allclose(end.position[0], flat, atol=1e-15)
 
 
-def test_a_wide_box_stays_down_at_once():
-    """Where Housner's ratio is not above 0 the old edge would be pressed into the floor: all stops."""
+def test_wide_box_stops_at_its_first_landing():
+    """Where Housner's ratio is not above 0 the old edge cannot rise."""
     scene = standing(lean=0.5, body={"shape": "box", "half_extents": [0.5, 0.2, 0.3], "mass": 2.0}, half=(0.5, 0.2))
     assert len(truth_for(scene).events) == 1
     assert not truth_for(scene)([3.0]).velocity.any()
 
 
-def test_after_a_landing_with_restitution_nothing_is_claimed():
-    """How a box rebounds from a whole face is not known: the truth ends where it lands."""
+def test_solution_with_restitution_ends_at_the_landing():
+    """The rebound of a whole face has no known solution."""
     scene = standing(lean=0.2, floor={"restitution": 0.5, "friction": "infinite"})
     truth = truth_for(scene)
     assert (truth.name, truth.events) == ("tipping", ())
@@ -237,12 +237,12 @@ def test_after_a_landing_with_restitution_nothing_is_claimed():
         {"floor": {"restitution": 0.0, "friction": 0.5}},
         {"damping": {"linear": 0.1}},
         {"gravity": {"acceleration": [0.1, -9.8, 0.0]}},
-        {"lean": -1e-9},  # which way it falls is for rounding to say
+        {"lean": -1e-9},  # rounding decides to which side it falls
         {"speed": -6.0},  # passes the top
         {"body": {"shape": "box", "half_extents": [0.2, 0.5, 0.3], "mass": 2.0, "inertia": [1e-3, 1e-3, 1e-3]}, "lean": -0.05},  # lifts off
     ],
 )
-def test_what_it_is_not_valid_for(change):
-    """Slip with friction, damping, a slope, balance, passing over, and a floor that would have to pull."""
+def test_stand_is_limited_to_its_range_of_validity(change):
+    """Not with slip and friction, damping, a slope, balance, passing the top, or a negative normal force."""
     truth = truth_for(standing(**change))
     assert truth is None or truth.name not in ("tipping", "rocking", "slipping")

@@ -196,7 +196,9 @@ def test_metrics_of_general_motions_have_the_same_bits_in_a_batch(seed, without)
     for rows, in_batch in zip(alone.first_contact, together.first_contact, strict=True):
         assert rows == in_batch[1]
     drift, gain, depth = standard_metrics(together)[1, :3]
-    assert (drift, gain) == ((energy_drift(alone), energy_gain(alone)) if scene.damping is None else (pytest.approx(np.nan, nan_ok=True),) * 2)
+    assert (drift, gain) == (
+        (energy_drift(alone), energy_gain(alone)) if scene.damping is None else (pytest.approx(np.nan, nan_ok=True),) * 2
+    )
     assert depth == (penetration(alone) if scene.floor is not None else pytest.approx(np.nan, nan_ok=True))
 
 

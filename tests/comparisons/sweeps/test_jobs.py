@@ -179,7 +179,10 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"floor.restitution": [0.5, 1.5]}}, "grid: floor.restitution: .* got 1.5; must be less than or equal to 1"),
         ({"grid": {"floor.restitution": {"from": 0, "to": 2, "count": 3}}}, "grid: floor.restitution: .* got 2.0; must be less"),
         ({"grid": {"floor.restitution": {"from": 0, "to": 1}}}, "floor.restitution: count: missing"),
-        ({"grid": {"floor.restitution": {"from": 1, "to": 0, "count": 3}}}, "from 1 to 0 does not increase; 'to' must be greater than 'from'"),
+        (
+            {"grid": {"floor.restitution": {"from": 1, "to": 0, "count": 3}}},
+            "from 1 to 0 does not increase; 'to' must be greater than 'from'",
+        ),
         ({"grid": {"floor.restitution": {"from": 0, "to": 1, "count": 3, "spacing": "log"}}}, "must start above 0"),
         ({"grid": {"floor.restitution": {"from": 0, "to": 1, "count": 1}}}, "count: got 1; must be greater than or equal to 2"),
         ({"grid": {"floor.restitution": 0.5}}, r"got 0.5; must be a list of values, or {from, to, count}"),
@@ -190,10 +193,16 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"start.position": [[0, 2, 0], [0.0, 2.0, 0.0]]}}, "names a value twice"),
         ({"grid": {"floor.restitution": [0.1], "floor": {"restitution": [0.5]}}}, "floor.restitution: is given twice"),
         ({"grid": {"engine.law": [[1, 2]]}}, "the value of an option is a word or a number"),
-        ({"grid": {"engine.law": ["note"]}, "engines": ["document[law=coulomb]"]}, r"document\[law=coulomb\] sets this option as well; leave it out there or here"),
+        (
+            {"grid": {"engine.law": ["note"]}, "engines": ["document[law=coulomb]"]},
+            r"document\[law=coulomb\] sets this option as well; leave it out there or here",
+        ),
         ({"grid": {"body.mass": [10**400]}}, "a whole number of 401 digits, which exceeds the range"),
         ({"grid": {"body.mass": [{"a": 1}]}}, "a value is a number, a word, or a list of them"),
-        ({"grid": {"body.mass": {"from": 1e-300, "to": 1e300, "count": 3, "spacing": "log"}}}, "exceeds the range of floating-point numbers"),
+        (
+            {"grid": {"body.mass": {"from": 1e-300, "to": 1e300, "count": 3, "spacing": "log"}}},
+            "exceeds the range of floating-point numbers",
+        ),
         ({"grid": {"start.position[01]": [2.0]}}, "is not a valid field name"),
         ({"grid": {"dt": [float("inf")]}, "dts": []}, "got inf; a time step is a number above 0"),
         ({"grid": {"ensemble.turn": [0.5]}, "scenes": ["drop-box-anyhow"]}, "has an effect only with seeds"),
@@ -206,7 +215,10 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"body.mass[0]": [0.5]}}, "which has no entry 0"),
         ({"grid": {"body mass": [0.5]}}, "'body mass' is not a valid field name; write it as"),
         ({"grid": {"start.position[1]": [0.0]}}, "there the body is 0.1 m below the floor"),
-        ({"grid": {"start.position": [[0, 2, 0]], "start.position[1]": [1.5]}}, "is a part of start.position, which is swept as well; leave one of them out"),
+        (
+            {"grid": {"start.position": [[0, 2, 0]], "start.position[1]": [1.5]}},
+            "is a part of start.position, which is swept as well; leave one of them out",
+        ),
         ({"grid": {"engine.kappa": [0.1]}}, "document's option 'kappa' is unknown"),
         ({"grid": {"engine.law": ["notes"]}}, "document's law 'notes' is unknown. Did you mean 'note'"),
         ({"random": {"seed": 1, "body.mass": {"from": 1, "to": 2}}}, "random: count: missing"),
@@ -218,7 +230,10 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
             r"body.mass: is in \[grid\] and in \[random\]",
         ),
         ({"random": {"count": 10**16, "seed": 1, "body.mass": {"from": 1, "to": 2}}}, "count: got 10000000000000000"),
-        ({"random": {"count": 10**15, "seed": 1, "body.mass": {"from": 1, "to": 2}}, "dts": [1e-3, 2e-3]}, r"the sweep has 2e\+15 jobs; at most 1e\+15 are allowed"),
+        (
+            {"random": {"count": 10**15, "seed": 1, "body.mass": {"from": 1, "to": 2}}, "dts": [1e-3, 2e-3]},
+            r"the sweep has 2e\+15 jobs; at most 1e\+15 are allowed",
+        ),
     ],
 )
 def test_spec_that_is_not_valid_is_refused_in_one_line(change, message):

@@ -1,112 +1,109 @@
-"""What a default run costs beside its stepping and recording, and a sweep a job beside its stepping: `make bench`.
+"""The cost of a default run relative to its stepping and recording, and of a job of a sweep beside its stepping: `make bench`.
 
-The run is made in this process, so that every part of it can be seen; ratios and shares are printed, because absolute times on a shared
+The run is made in this process, so that all of its parts can be timed. Ratios and shares are printed, because absolute times on a shared
 machine are noise.
 """
 
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-import comparisons
+import dropspin as ds
 import reference_impl
-import reports
-import scenarios
 from comparisons.engines.document import Document, DocumentSimulation, reference_body, reference_world
-from comparisons.engines.mujoco_engine import MuJoCo
-from comparisons.engines.mujoco_simulation import MuJoCoSimulation
-from comparisons.engines.pybullet_engine import PyBullet
-from comparisons.engines.pybullet_simulation import PyBulletSimulation
-from comparisons.running.recording import run_engine
-from comparisons.sweeps import load_sweep, run_sweep
+from comparisons.engines.mujoco_engine import MuJoCo, MuJoCoSimulation
+from comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
+from comparisons.running.engine_run import EngineRun, run_engine
+from comparisons.running.recording import EngineEntry
 
+DT = 4e-3
 JOBS = 10_000
 SWEEP = {
     "scenes": ["drop-box-anyhow"],
     "engines": ["document"],
-    "dts": [4e-3],
+    "dts": [DT],
     "random": {"count": JOBS, "seed": 1, "floor.restitution": {"from": 0.0, "to": 1.0}, "start.velocity[0]": {"from": -1.0, "to": 1.0}},
 }
 
-spent: dict[str, float] = defaultdict(float)
-within: list[str] = []
+seconds: dict[str, float] = defaultdict(float)
+active: list[str] = []
 
 
-def watch(owner: type, name: str, part: str) -> None:
-    """Count the time within a method, but not within one that is called by another that is watched."""
+def time_method(owner: type, name: str, part: str) -> None:
+    """Add the time spent in a method to a part of the run, unless another timed method calls it."""
     method: Callable[..., Any] = getattr(owner, name)
 
-    def watched(*given: Any, **named: Any) -> Any:
-        within.append(part)
+    def timed(*given: Any, **named: Any) -> Any:
+        active.append(part)
         start = time.perf_counter()
         try:
             return method(*given, **named)
         finally:
-            within.pop()
-            if not within:
-                spent[part] += time.perf_counter() - start
+            active.pop()
+            if not active:
+                seconds[part] += time.perf_counter() - start
 
-    setattr(owner, name, watched)
+    setattr(owner, name, timed)
 
 
-class Here:
-    """In the place of processes of their own."""
+class ProcessesHere:
+    """Stands for `EngineProcesses`; engines run in this process."""
 
-    def __init__(self, limits: comparisons.ResourceLimits) -> None:
+    def __init__(self, limits: ds.ResourceLimits) -> None:
         pass
 
-    def __enter__(self) -> "Here":
+    def __enter__(self) -> "ProcessesHere":
         return self
 
     def __exit__(self, *error: object) -> None:
         pass
 
-    def attempt(self, entry: Any, scene: Any, dt: float, phases: Any) -> Any:
-        """What an engine's process would do."""
-        return run_engine(entry, scene, dt, [phase.scene for phase in phases])
+    def run_engine(self, entry: EngineEntry, scene: ds.Scenario, dt: float, starts: Sequence[ds.Scenario]) -> EngineRun:
+        """Run a scene with an engine."""
+        return run_engine(entry, scene, dt, starts)
 
 
 def run_cost() -> None:
-    """A default run, its parts in terms of its stepping and recording."""
+    """Print the parts of a default run relative to its stepping and recording."""
     for simulation, name in product((DocumentSimulation, MuJoCoSimulation, PyBulletSimulation), ("record", "advance")):
-        watch(simulation, name, "stepping and recording")
+        time_method(simulation, name, "stepping and recording")
     for engine in (Document, MuJoCo, PyBullet):
-        watch(engine, "prepare", "building")
-    watch(Document, "record_ensemble", "stepping and recording")
-    import_module("comparisons.running.run").EngineProcesses = Here
-    core = [scene for scene in map(scenarios.load, scenarios.names()) if "core" in scene.tags]
-    comparisons.run(core[:1], ["document"])  # compiled
-    spent.clear()
+        time_method(engine, "prepare", "building")
+    time_method(Document, "record_batch", "stepping and recording")
+    import_module("comparisons.running.run").EngineProcesses = ProcessesHere
+    core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
+    ds.run(core[:1], "document")  # compiles
+    seconds.clear()
     start = time.perf_counter()
-    results = comparisons.run(core, ["document", "mujoco", "pybullet"])
-    spent["all of the run"] = time.perf_counter() - start
+    results = ds.run(core, ["document", "mujoco", "pybullet"])
+    seconds["all of the run"] = time.perf_counter() - start
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        reports.write(results, f"{folder}/run")
-        spent["plots and writing, after it"] = time.perf_counter() - start
-    for part, seconds in spent.items():
-        print(f"{part}: {seconds / spent['stepping and recording']:.2f} times its stepping and recording")
+        ds.write_report(results, f"{folder}/run")
+        seconds["the report, after the run"] = time.perf_counter() - start
+    for part, spent in seconds.items():
+        print(f"{part}: {spent / seconds['stepping and recording']:.2f} times its stepping and recording")
 
 
 def sweep_cost() -> None:
-    """A sweep of small jobs, over the bare stepping of as many bodies."""
-    asked = load_sweep(SWEEP)
-    scene = asked.scenes[0]
-    simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene), 4e-3)
-    states, steps = np.tile(scene.initial_state, (JOBS // 10, 1)), scene.steps(4e-3)
+    """Print the cost of a job in a sweep of small jobs, and the share of stepping alone."""
+    sweep = ds.load_sweep(SWEEP)
+    scene = sweep.scenes[0]
+    simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene), DT)
+    states, steps = np.tile(scene.initial_state, (JOBS // 10, 1)), scene.steps(DT)
     simulator.run(states, steps, threads=1)
     start = time.perf_counter()
     simulator.run(states, steps, threads=1)
     stepping = (time.perf_counter() - start) / len(states)
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        run_sweep(asked, f"{folder}/sweep")
+        ds.run_sweep(sweep, f"{folder}/sweep")
         job = (time.perf_counter() - start) / JOBS
     print(f"a job of {steps} steps in a sweep of {JOBS:,}: {1e6 * job:.0f} µs, of which {1e6 * stepping:.0f} µs are stepping")
 

@@ -1,8 +1,8 @@
-"""How fast the note's method runs beside MuJoCo and PyBullet: `make bench`.
+"""Speed of Wang's method (the engine `document`) compared with MuJoCo and PyBullet: `make bench`.
 
-All entries step the same box in one process, in turn, round after round; what is printed are ratios of the best and of the median
-times, because absolute times on a shared machine are noise. Not compared are the models: the engines solve four contact points with
-friction cones for articulated systems, the note one impulse.
+All entries step the same box in one process, in turn, round after round. Ratios of the best and of the median times are printed, because
+absolute times on a shared machine are noise. The models differ: MuJoCo and PyBullet solve four contact points with friction cones for
+articulated systems, Wang's method one impulse.
 """
 
 import json
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 ROUNDS = 15
 WINDOW = 0.02
-"""Seconds that each entry runs in a round, over and over: long beside what a processor takes to settle after the one before."""
+"""Seconds that each entry runs in a round, repeatedly: long compared with the time in which a processor settles after the previous one."""
 STEPS = 5000
 DT = 1e-3
 BODIES = 1024
@@ -64,19 +64,19 @@ def scene(name: str) -> scenarios.Scenario:
 
 @dataclass(frozen=True)
 class Run:
-    """Something to time: so many steps of so many bodies."""
+    """A run to time: a number of steps of a number of bodies."""
 
     go: Callable[[], object]
     body_steps: int = STEPS
     close: Callable[[], None] = lambda: None
 
 
-EngineEntry = Callable[[], Run]
-"""Builds a run anew; building is not timed."""
+Entry = Callable[[], Run]
+"""Builds a new run; building is not timed."""
 
 
-def alone(label: str, name: str, recording: bool) -> EngineEntry:
-    """An engine on one body, stepping alone or recording every step."""
+def alone(label: str, name: str, recording: bool) -> Entry:
+    """An engine with one body, stepping only or recording every step."""
     chosen = engine(label)
 
     def build() -> Run:
@@ -86,7 +86,7 @@ def alone(label: str, name: str, recording: bool) -> EngineEntry:
     return build
 
 
-def rollout(name: str) -> EngineEntry:
+def rollout(name: str) -> Entry:
     """MuJoCo's own loop that records every step."""
     import mujoco
     from mujoco.rollout import rollout as mujoco_rollout
@@ -102,20 +102,20 @@ def rollout(name: str) -> EngineEntry:
     return build
 
 
-def ensemble(name: str, bodies: int = BODIES, steps: int = STEPS, threads: int = 1) -> EngineEntry:
-    """The note for many bodies in one call, each with a start of its own (at rest: the same)."""
+def ensemble(name: str, bodies: int = BODIES, steps: int = STEPS, threads: int = 1) -> Entry:
+    """The reference implementation with many bodies in one call, each with its own start (at rest: the same)."""
     spread = np.random.default_rng(0).normal(size=(bodies, 7)) if name != "rest" else np.zeros((bodies, 7))
     starts = np.tile(scene(name).initial_state, (bodies, 1))
     starts[:, 3:7] += 0.3 * spread[:, :4]
     starts[:, 3:7] /= np.linalg.norm(starts[:, 3:7], axis=1, keepdims=True)
     starts[:, 10:13] += spread[:, 4:]
     simulator = reference_impl.Simulator(*body_and_world(name), DT)
-    simulator.run(starts, 1)  # compiled before anything is timed
+    simulator.run(starts, 1)  # compiles before anything is timed
     return lambda: Run(partial(simulator.run, starts, steps, steps, threads=threads), bodies * steps)
 
 
 def body_and_world(name: str) -> tuple[reference_impl.Body, reference_impl.World]:
-    """The box of the scenes, to the reference implementation."""
+    """The box of the scenes, as the reference implementation takes it."""
     half = np.array(BOX["half_extents"])
     corners = np.array(list(product((-1, 1), repeat=3))) * half
     floor = None if name == "flight" else reference_impl.Floor(0.5, np.inf)
@@ -123,15 +123,15 @@ def body_and_world(name: str) -> tuple[reference_impl.Body, reference_impl.World
     return body, reference_impl.World(np.array([0.0, -9.8, 0.0]), floor)
 
 
-def prepared(start: Array, body: reference_impl.Body, world: reference_impl.World, rotation: str = "note") -> EngineEntry:
-    """The reference implementation by itself."""
+def prepared(start: Array, body: reference_impl.Body, world: reference_impl.World, rotation: str = "note") -> Entry:
+    """The reference implementation without the adapter."""
     simulator = reference_impl.Simulator(body, world, DT, reference_impl.Methods(rotation=rotation))
     simulator.run(start, 1)
     return lambda: Run(partial(simulator.run, start, STEPS, STEPS))
 
 
-def timed(makers: dict[str, EngineEntry]) -> dict[str, list[float]]:
-    """Nanoseconds a step and body of each entry, once a round, in turn."""
+def timed(makers: dict[str, Entry]) -> dict[str, list[float]]:
+    """Nanoseconds per step and body of each entry, one value per round."""
     runs = {}
     for label, make in makers.items():
         first = make()
@@ -144,7 +144,7 @@ def timed(makers: dict[str, EngineEntry]) -> dict[str, list[float]]:
 
 
 def nanoseconds_a_step(runs: list[Run]) -> float:
-    """Of runs one after the other, a step and body."""
+    """Nanoseconds per step and body of runs one after the other."""
     start = time.perf_counter()
     for run in runs:
         run.go()
@@ -154,15 +154,15 @@ def nanoseconds_a_step(runs: list[Run]) -> float:
     return taken / sum(run.body_steps for run in runs) * 1e9
 
 
-def rotations() -> dict[str, EngineEntry]:
-    """Every rotation method on a free body."""
+def rotations() -> dict[str, Entry]:
+    """Every rotation method with a free body."""
     body = reference_impl.Body(1.0, np.diag([1.0, 2.0, 3.0]), np.full((1, 3), 0.1))
     start = np.array([0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0.3, 0.8, -0.5])
     return {name: prepared(start, body, reference_impl.World(), name) for name in ROTATIONS}
 
 
-def parts() -> dict[str, EngineEntry]:
-    """A ball in flight with everything modelled, and with one part after the other left out."""
+def parts() -> dict[str, Entry]:
+    """A ball in flight with everything modelled, and with one part after the other not modelled."""
     ball = reference_impl.Body(1.0, 0.004 * np.eye(3), np.zeros((1, 3)), 0.1)
     turning = np.array([0, 1e3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1e-3])
     still = np.array([0, 1e3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0])
@@ -176,18 +176,18 @@ def parts() -> dict[str, EngineEntry]:
     }
 
 
-def floors() -> dict[str, EngineEntry]:
-    """Each engine in flight, with no floor modelled and with one that it never meets."""
+def floors() -> dict[str, Entry]:
+    """Each engine in flight, without a floor and with one that the body does not reach."""
     names = {"flight": "no floor", "far": "a floor far below"}
     return {
-        f"{label}, {told}": alone(label, name, recording=False)
+        f"{label}, {floor}": alone(label, name, recording=False)
         for label in ("document", "mujoco", "pybullet")
-        for name, told in names.items()
+        for name, floor in names.items()
     }
 
 
 def first_call(cached: bool, width: str) -> float:
-    """Seconds of the first simulate in a fresh process, import of numba apart."""
+    """Duration of the first `simulate` in a new process [s], without the import of numba."""
     program = (
         "import time, numpy as np, reference_impl as r\n"
         "b = r.Body(1.0, np.eye(3), np.ones((8, 3))); w = r.World(np.array([0, -9.8, 0]), r.Floor(.5, np.inf))\n"
@@ -207,7 +207,7 @@ Table = dict[str, dict[str, float]]
 
 
 def report(title: str, nanoseconds: dict[str, list[float]], base: str) -> Table:
-    """Print one comparison: best and median, and how many times the base each takes."""
+    """Print one comparison: best and median times, and their ratios to those of the base."""
     print(f"\n{title} [ns a step; times {base}: best, median]")
     table = {}
     for label, values in nanoseconds.items():
@@ -219,14 +219,14 @@ def report(title: str, nanoseconds: dict[str, list[float]], base: str) -> Table:
 
 
 def lead(title: str, table: Table, ours: str, engines: Iterable[str]) -> dict[str, float]:
-    """How many times as fast as the faster of the engines one of ours is."""
+    """The speed of one of our entries relative to the fastest of some engines."""
     ratios = {kind: min(table[label][kind] for label in engines) / table[ours][kind] for kind in ("best", "median")}
     print(f"  {title}: {ratios['best']:.1f} times as many steps a second as the faster engine (by the medians {ratios['median']:.1f})")
     return ratios
 
 
 def plot(results: dict[str, Table], path: Path) -> None:
-    """The best times as points, a panel for each comparison, all on one logarithmic scale."""
+    """Plot the best times, a panel for each comparison, all on one logarithmic scale."""
     from matplotlib.figure import Figure
 
     rows = -(-len(results) // 3)
@@ -271,10 +271,10 @@ def main() -> None:
     cores = {f"threads: {threads}": ensemble("drop", threads=threads) for threads in sorted({1, 2, usable_cores()})}
     results["drop, ensembles, threads"] = report("drop, ensembles, threads", timed(cores), "threads: 1")
     results["rotation methods"] = report("rotation methods", timed(rotations()), "note")
-    results["what leaving out saves"] = report("what leaving out saves", timed(parts()), "everything")
-    results["what a floor costs that is not met"] = report("what a floor costs that is not met", timed(floors()), "document, no floor")
+    results["parts that are not modelled"] = report("parts that are not modelled", timed(parts()), "everything")
+    results["a floor that is not reached"] = report("a floor that is not reached", timed(floors()), "document, no floor")
     first = {f"{kind}, {width}": first_call(kind == "cached", width) for width in ("one body", "ensemble") for kind in ("cold", "cached")}
-    print("\nfirst call in a fresh process: " + "; ".join(f"{label} {seconds:.2f} s" for label, seconds in first.items()))
+    print("\nfirst call in a new process: " + "; ".join(f"{label} {seconds:.2f} s" for label, seconds in first.items()))
     stamp = {"versions": versions(), "cpu": processor(), "lanes": lanes.WIDTH}
     (OUT / "bench.json").write_text(json.dumps({"results": results, "leads": leads, "first_call": first} | stamp, indent=1))
     plot(results, OUT / "bench.svg")

@@ -1,4 +1,4 @@
-"""`dropspin sweep` in words: for each engine the verdicts of its jobs, and the worst values measured."""
+"""The summary of `dropspin sweep`: for each engine the verdicts of its jobs, and the worst values measured."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -10,12 +10,12 @@ from comparisons.judging.verdicts import BREAKDOWNS
 from comparisons.sweeps.running import read_parts
 from reports.views.numbers import formatted, word
 
-WORST = ("energy_drift", "energy_gain", "penetration")
+WORST_OF = ("energy_drift", "energy_gain", "penetration")
 
 
 @dataclass
 class Tally:
-    """One engine's jobs: their verdicts, the worst values, and the time they took [s]."""
+    """The jobs of one engine: their verdicts, the largest magnitudes of some metrics, and their total time [s]."""
 
     verdicts: Counter[str] = field(default_factory=Counter)
     worst: dict[str, float] = field(default_factory=dict)
@@ -23,44 +23,44 @@ class Tally:
 
 
 def tallies(where: str) -> dict[str, Tally]:
-    """The tallies by engine, counted part by part, as the table may be larger than memory."""
+    """The tally of each engine, read part by part, because the table may be larger than memory."""
     found: dict[str, Tally] = {}
-    for part in read_parts(where, ["engine", "verdict", "steps", "time_per_step", *WORST]):
+    for part in read_parts(where, ["engine", "verdict", "steps", "time_per_step", *WORST_OF]):
         frame = part.to_pandas()
         for engine, rows in frame.groupby("engine", sort=False):
             tally = found.setdefault(str(engine), Tally())
             tally.verdicts.update(rows["verdict"])
             tally.time += float((rows["steps"] * rows["time_per_step"]).sum())
-            for name in WORST:
-                sizes = rows[name].abs()
-                if sizes.notna().any():
-                    tally.worst[name] = max(tally.worst.get(name, 0.0), float(sizes.max()))
+            for name in WORST_OF:
+                magnitudes = rows[name].abs()
+                if magnitudes.notna().any():
+                    tally.worst[name] = max(tally.worst.get(name, 0.0), float(magnitudes.max()))
     return found
 
 
 def summary_rows(found: dict[str, Tally]) -> list[dict[str, Any]]:
-    """Rows of numbers; None where there is no value."""
+    """The tallies as numbers; None where there is no value."""
     return [
         {"engine": engine, "jobs": tally.verdicts.total(), "verdicts": dict(tally.verdicts)}
-        | {f"worst_{name}": tally.worst.get(name) for name in WORST}
+        | {f"worst_{name}": tally.worst.get(name) for name in WORST_OF}
         | {"time": tally.time}
         for engine, tally in found.items()
     ]
 
 
 def formatted_rows(found: dict[str, Tally]) -> list[dict[str, str]]:
-    """Rows of words."""
+    """The tallies as text for a table."""
     return [
         {
             "engine": engine,
             "jobs": f"{tally.verdicts.total():,}",
             "verdicts": ", ".join(f"{count:,} {word(verdict)}" for verdict, count in tally.verdicts.most_common()),
         }
-        | {f"worst {name.replace('_', ' ')}": formatted(tally.worst.get(name, np.nan)) for name in WORST}
+        | {f"worst {name.replace('_', ' ')}": formatted(tally.worst.get(name, np.nan)) for name in WORST_OF}
         for engine, tally in found.items()
     ]
 
 
 def exit_code(found: dict[str, Tally]) -> int:
-    """0: all jobs were run; 3: an engine broke down in one."""
+    """0 if all jobs were run, 3 if an engine broke down in any."""
     return 3 if any(tally.verdicts.keys() & BREAKDOWNS for tally in found.values()) else 0

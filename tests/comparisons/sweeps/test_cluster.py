@@ -1,32 +1,39 @@
-"""Sweeps on a Dask cluster: workers that are lost cost nothing but their jobs' retries."""
+"""Sweeps on a Dask cluster: a lost worker changes nothing in the table."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from comparisons.engines.base import EngineMissing
-from comparisons.sweeps import cluster, load_sweep, read, run_sweep
+from comparisons.running.processes import ResourceLimits
+from comparisons.sweeps import cluster
+from comparisons.sweeps.running import read_sweep, run_sweep
+from comparisons.sweeps.spec import load_sweep
+from comparisons.sweeps.work import Work
 from scenarios import DropspinError
 
 pytest.importorskip("distributed")
 
 SPEC = {
     "scenes": ["bounce-95"],
-    "engines": ["document", "mujoco"],
+    "engines": ["mujoco"],
     "dts": [4e-3],
-    "random": {"count": 40, "seed": 1, "floor.restitution": {"from": 0.5, "to": 1.0}},
+    "random": {"count": 12, "seed": 1, "floor.restitution": {"from": 0.5, "to": 1.0}},
 }
 CLUSTER = """
 import sys, dask
 from distributed import LocalCluster
 
 if __name__ == "__main__":
-    dask.config.set({"distributed.worker.daemon": sys.argv[2] == "daemonic"})
+    dask.config.set({"distributed.worker.daemon": False})
     with LocalCluster(n_workers=int(sys.argv[1]), threads_per_worker=1, dashboard_address=None) as here:
         print(here.scheduler_address, *(worker.pid for worker in here.workers.values()), flush=True)
         sys.stdin.read()
@@ -36,9 +43,8 @@ if __name__ == "__main__":
 @pytest.fixture
 def workers(tmp_path, request):
     """A cluster in processes of its own, as a user has it: its address, and the processes of its workers."""
-    count, kind = request.param
     (tmp_path / "cluster.py").write_text(CLUSTER)
-    words = [sys.executable, tmp_path / "cluster.py", str(count), kind]
+    words = [sys.executable, tmp_path / "cluster.py", str(request.param)]
     process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=tmp_path)
     address, *pids = process.stdout.readline().split()
     try:
@@ -48,44 +54,50 @@ def workers(tmp_path, request):
 
 
 def table(where):
-    return read(str(where)).drop(columns="time_per_step")
+    return read_sweep(str(where)).drop(columns="time_per_step")
 
 
-@pytest.mark.parametrize("workers", [(2, "free")], indirect=True)
-def test_a_worker_that_is_killed_is_not_missed(workers, tmp_path):
-    """Two workers, one killed when the first part is there: the table of a sweep on this machine, bit for bit."""
-    address, pids = workers
-    sweep = load_sweep(SPEC)
-    done = []
-
-    def told(jobs):
-        if jobs and len(done) == 1:
-            os.kill(pids[0], signal.SIGKILL)
-        done.extend([jobs] if jobs else [])
-
-    run_sweep(sweep, str(tmp_path / "cluster"), scheduler=address, told=told)
-    assert len(done) > 2
-    run_sweep(sweep, str(tmp_path / "here"))
-    pd.testing.assert_frame_equal(table(tmp_path / "cluster"), table(tmp_path / "here"), check_exact=True)
-    assert engines_of(pids[0]) == []
-
-
-def engines_of(worker):
-    """Processes that a worker has started and that are left."""
+def children_of(worker):
     stats = [path.read_text().rpartition(")")[2].split() for path in Path("/proc").glob("[0-9]*/stat")]
     return [stat for stat in stats if stat[1] == str(worker)]
 
 
-@pytest.mark.parametrize("workers", [(1, "daemonic")], indirect=True)
-def test_workers_that_cannot_keep_engines_apart(workers, tmp_path):
-    """One line that says what to set."""
-    with pytest.raises(DropspinError, match="set DASK_DISTRIBUTED__WORKER__DAEMON=False where workers are started"):
+@pytest.mark.parametrize("workers", [2], indirect=True)
+def test_table_is_the_same_after_a_worker_is_killed(workers, tmp_path):
+    """Two workers, one killed when the first part is there: the table of a sweep on this machine, bit for bit."""
+    address, pids = workers
+    sweep, completed = load_sweep(SPEC), []
+
+    def on_progress(jobs):
+        if jobs and len(completed) == 1:
+            os.kill(pids[0], signal.SIGKILL)
+        completed.extend([jobs] if jobs else [])
+
+    run_sweep(sweep, str(tmp_path / "cluster"), scheduler=address, on_progress=on_progress)
+    assert len(completed) > 2
+    run_sweep(sweep, str(tmp_path / "here"))
+    pd.testing.assert_frame_equal(table(tmp_path / "cluster"), table(tmp_path / "here"), check_exact=True)
+    assert children_of(pids[0]) == []
+
+
+@pytest.mark.parametrize("workers", [0], indirect=True)
+def test_scheduler_without_workers_is_reported(workers, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "WORKER_TIMEOUT", 0.5)
+    with pytest.raises(DropspinError, match=r"no worker has connected for 0.5 s; start one with: dask worker tcp://"):
         run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler=workers[0])
+    assert not (tmp_path / "out").exists()
 
 
-def test_what_a_cluster_lacks(tmp_path, monkeypatch):
-    """No scheduler, no Dask."""
-    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+def test_worker_that_may_not_start_processes_is_reported(tmp_path, monkeypatch):
+    """Dask's workers are daemonic processes by default; the message names the setting."""
+    work = Work.of(load_sweep(SPEC), ResourceLimits())
+    monkeypatch.setattr(multiprocessing, "current_process", lambda: SimpleNamespace(daemon=True))
+    with pytest.raises(DropspinError, match="set DASK_DISTRIBUTED__WORKER__DAEMON=False where workers are started"):
+        cluster._run_part(work, next(work.parts), str(tmp_path))
+
+
+def test_missing_scheduler_and_missing_dask_are_reported(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.5)
     with pytest.raises(DropspinError, match=r"--scheduler tcp://127.0.0.1:1: no scheduler answers .*; start one with: dask scheduler"):
         run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler="tcp://127.0.0.1:1")
     monkeypatch.setattr(cluster, "find_spec", lambda name: None)
@@ -93,42 +105,43 @@ def test_what_a_cluster_lacks(tmp_path, monkeypatch):
         run_sweep(load_sweep(SPEC), str(tmp_path / "other"), scheduler="tcp://127.0.0.1:1")
 
 
-def test_a_worker_of_other_versions_declines(tmp_path):
-    """Figures of two versions do not go into one table."""
-    from dataclasses import replace
-
-    from comparisons.running.processes import ResourceLimits
-    from comparisons.sweeps.work import Work
-
+def test_worker_with_other_versions_refuses_its_part(tmp_path):
+    """Results of two versions do not go into one table."""
     work = Work.of(load_sweep(SPEC), ResourceLimits())
     other = replace(work, versions=work.versions | {"mujoco": "3.1"})
-    with pytest.raises(DropspinError, match=r"a worker has mujoco \d.*, here it is 3.1; install the same on both"):
-        cluster._do(other, next(other.parts), str(tmp_path))
+    with pytest.raises(DropspinError, match=r"a worker has mujoco \d.*, this machine has 3.1; install the same on both"):
+        cluster._run_part(other, next(other.parts), str(tmp_path))
 
 
-@pytest.mark.parametrize("workers", [(0, "free")], indirect=True)
-def test_a_scheduler_without_workers(workers, tmp_path, monkeypatch):
-    """Says so, after a while, and makes nothing."""
-    monkeypatch.setattr(cluster, "PATIENCE_FOR_WORKERS", 0.5)
-    with pytest.raises(DropspinError, match=r"has had no worker for 0.5 s; start one with: dask worker tcp://"):
-        run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler=workers[0])
-    assert not (tmp_path / "out").exists()
+class ProcessesHere:
+    """Stands for `EngineProcesses`; engines run in this process."""
+
+    def __init__(self, resources, start_method):
+        self.closed = False
+
+    def call(self, entry, work, *given):
+        return work(entry, *given)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.closed = True
 
 
-def test_engines_of_one_sweep_are_none_of_the_next(tmp_path, monkeypatch):
-    """A worker that has served another sweep, or other limits, ends that one's engines first."""
-    from comparisons.running.processes import ResourceLimits
-    from comparisons.sweeps.work import Work
-
-    monkeypatch.setattr(cluster, "_go_on_unless_closing", lambda: None)
+def test_engine_processes_of_another_sweep_are_closed(tmp_path, monkeypatch):
+    """A worker that has served another sweep, or other resource limits, ends the engines of that one first."""
+    monkeypatch.setattr(cluster, "_reschedule_if_closing", lambda: None)
+    monkeypatch.setattr(cluster, "EngineProcesses", ProcessesHere)
     used = []
     for seconds in (5.0, 6.0):
         work = Work.of(load_sweep(SPEC | {"engines": ["document"]}), ResourceLimits(processor_time=seconds))
-        cluster._do(work, next(work.parts), str(tmp_path / str(seconds)))
-        [(stamp, [processes])] = cluster._idle.items()
+        cluster._run_part(work, next(work.parts), str(tmp_path / str(seconds)))
+        [(owner, [processes])] = cluster._idle.items()
         used.append(processes)
-        assert stamp == (work.identity, work.limits)
+        assert owner == (work.identity, work.resources)
     assert used[0] is not used[1]
-    assert used[0]._closed
-    cluster._leave()
-    assert used[1]._closed
+    assert (used[0].closed, used[1].closed) == (True, False)
+    cluster._close_idle_processes()
+    assert used[1].closed
+    assert not cluster._idle

@@ -280,4 +280,4 @@ def test_damaged_run_is_refused(folder, tmp_path, damage):
 )
 def test_damaged_study_is_refused(folder, tmp_path, content):
     (tmp_path / "section.json").write_text(content)
-    assert_refused(dropspin("report", folder, "--add", tmp_path, cwd=tmp_path), "holds no study, or a damaged one")
+    assert_refused(dropspin("report", folder, "--add", tmp_path, cwd=tmp_path), "has no study, or a damaged one")

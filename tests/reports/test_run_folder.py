@@ -123,7 +123,7 @@ def test_the_page_states_the_verdict_before_any_table(results, folder):
     assert f"All {passed} checks pass:" in text
     assert text.index("checks pass") < text.index("<table")
     assert len(re.findall(r'class="chip (passed|measured)"', text)) == 6
-    assert "stays as the step goes to 0" in text
+    assert "does not vanish as dt → 0" in text
 
 
 def test_failures_come_before_the_comparison():
@@ -135,7 +135,7 @@ def test_failures_come_before_the_comparison():
     found = run(load(harsh), "mujoco", 1e-2)
     text = html_report(found, plots={})
     assert "1 of 1 checks fail." in text
-    assert text.index("What failed") < text.index("Against the truth")
+    assert text.index("Failures") < text.index("<h3>Errors</h3>")
     assert "too much to ask" in text
     assert "± 1e-09" in text
 
@@ -371,6 +371,6 @@ def test_setting_errors_are_compared_with_the_calibrated_profile():
     height = next(row for row in comparison.rows if row["metric"] == "bounce_height_error")
     assert height["part"] > 0.95  # measured .965; the rest is discretisation error
     page = html_report(found, plots={})
-    assert "How much of the error is the setting" in page
+    assert "Setting errors of" in page
     assert comparison.sentence in finding_sentences(found)
     assert profile_comparisons(run("drop-ball", "pybullet[profile=default]", 1e-2)) == []

@@ -38,7 +38,7 @@ def test_a_wrong_adapter_gets_exit_code_1_and_a_diagnosis(tmp_path):
     (tmp_path / "my_module.py").write_text(wrong)
     done = dropspin("conform", "my_module:Flyer", cwd=tmp_path)
     assert done.returncode == 1
-    assert "angular velocity looks body-framed" in " ".join(done.stdout.split())
+    assert "angular velocity appears to be in the body frame" in " ".join(done.stdout.split())
 
 
 ENGINE = "from dropspin import Engine\nclass Mine(Engine):"
@@ -48,14 +48,14 @@ ENGINE = "from dropspin import Engine\nclass Mine(Engine):"
     ("text", "code", "message"),
     [
         ("", 2, "my_module's engine 'Mine' is unknown"),
-        ("Mine = 3", 2, "Mine is no engine"),
-        (f"{ENGINE} pass", 2, "Mine.name is what results call it"),
+        ("Mine = 3", 2, "Mine is not an engine; an engine is a class that inherits from dropspin.Engine"),
+        (f"{ENGINE} pass", 2, "Mine.name is ''; give it a name for results"),
         ("import no_such_engine", 3, "needs the module no_such_engine, which is not installed"),
         ("1 / 0", 2, "cannot be imported (ZeroDivisionError"),
         (f"{ENGINE}\n name='mine'\n def __init__(self): pass", 2, "could not be created"),
         (None, 2, "no module 'my_module' here"),
         ("import sys\nsys.exit(0)", 2, "cannot be imported (SystemExit"),
-        (f"{ENGINE}\n name='mujoco'", 2, "an engine of dropspin's own; results need another"),
+        (f"{ENGINE}\n name='mujoco'", 2, "which is a built-in engine; results need another name"),
     ],
 )
 def test_what_is_not_an_engine_is_refused_in_one_line(text, code, message, tmp_path):

@@ -65,7 +65,7 @@ def test_a_sweep_prints_the_worst_values_and_runs_nothing_twice(tmp_path):
         (["spec.toml"], SPEC.replace("drop-ball", "drop-bal"), 2, "Did you mean 'drop-ball'"),
         (["spec.toml"], SPEC.replace("floor.rest", "floor.flor_rest"), 2, "spec.toml: grid: floor.flor_restitution"),
         (["spec.toml"], SPEC.replace("to = 1.0", "to = 2.0"), 2, "got 2.0; must be less than or equal to 1"),
-        (["spec.toml", "-o", "precious"], SPEC, 2, "precious: is a file, or in one"),
+        (["spec.toml", "-o", "precious"], SPEC, 2, "precious: is a file, or inside one"),
         (["spec.toml", "-o", "s9://bucket"], SPEC, 2, "-o s9://bucket: Protocol not known"),
         (["spec.toml", "--scheduler", "nowhere"], SPEC, 2, "--scheduler nowhere: "),
         (["spec.toml", "--time-limit", "0"], SPEC, 2, "0.0 is not in the range"),

@@ -34,7 +34,7 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     rows = json.loads((tmp_path / "out" / "tradeoff.json").read_text())
     assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]"}
     assert all(row["cost_best"] <= row["cost"] for row in rows)
-    assert any(row["on_front"] for row in rows)
+    assert any(row["on_pareto_front"] for row in rows)
     assert all(row["side_by_side"] > 0.0 for row in rows)
 
 

@@ -151,9 +151,7 @@ def _assert_replaceable(given: str | Path, target: Path) -> None:
     if not target.is_dir():
         raise DropspinError(f"{given}: is a file; choose a folder.")
     if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
-        raise DropspinError(
-            f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it."
-        )
+        raise DropspinError(f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it.")
     known = _files_of_run(target)
     strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
     if strangers:

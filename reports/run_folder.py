@@ -156,7 +156,7 @@ def _assert_replaceable(given: str | Path, target: Path) -> None:
     strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
     if strangers:
         raise DropspinError(
-            f"{given}: has files that dropspin run did not write, such as {strangers[0]!r}; move them away, or choose an empty folder."
+            f"{given}: has files that dropspin run did not write, such as {strangers[0]!r}; move them, or choose an empty or new folder."
         )
 
 

@@ -105,7 +105,7 @@ def verify_expectations(scene: Scenario, truth: Truth | None, engines: Iterable[
 
 
 def _verify_engine(where: str, name: str, known: set[str]) -> None:
-    base = name.split("[", maxsplit=1)[0]
+    base = name.partition("[")[0]
     if base not in known and ":" not in base:
         raise SceneError(f"{where}; no such engine.{did_you_mean(base, known)} Known: {', '.join(sorted(known))}.")
     if base not in BUILT_IN or name == base:  # only options can be wrong, and an adapter need not be imported for a bare name

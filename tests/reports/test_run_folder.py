@@ -31,7 +31,7 @@ def results():
     """Two catalogue scenes and one with a hostile name and text, two engines, two time steps."""
     content = load("spin-principal").model_dump(exclude_none=True, exclude={"expect"})
     hostile = load(content | {"name": NASTY, "summary": "<img src=x onerror=alert(2)>", "source": "[bold]&"})
-    return run([load("drop-ball"), load("drop-box-corner"), hostile], ["mujoco", "pybullet"], [4e-3, 2e-3])
+    return run([load("drop-ball"), load("drop-box-corner"), hostile], ["mujoco", "pybullet"], [8e-3, 4e-3])
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +44,12 @@ def folder(results, tmp_path_factory):
 def small():
     """A run of one scene with one engine at one time step, for tests of writing."""
     return run("spin-principal", "mujoco", 1e-2)
+
+
+@pytest.fixture
+def without_plots(monkeypatch):
+    """Plots take most of the time of writing, and matter to few tests of it."""
+    monkeypatch.setattr(run_folder, "report_figures", lambda results: [])
 
 
 class Page(HTMLParser):
@@ -159,12 +165,13 @@ def test_run_json_holds_the_provenance(folder):
     """Versions, machine, what was asked, settings of every engine in every scene at every step."""
     content = json.loads((folder / "run.json").read_text())
     stamped = content["provenance"]
-    assert stamped["asked"]["dts"] == [4e-3, 2e-3]
+    assert stamped["asked"]["dts"] == [8e-3, 4e-3]
     assert stamped["versions"]["mujoco"]
     assert stamped["cpu"]
     assert stamped["settings"]["mujoco"]["drop-ball dt=0.004"]["solref"] == [0.0, -1.5 / 4e-3]
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_a_run_replaces_an_earlier_run_and_nothing_else(small, tmp_path):
     """A run replaces a run; a folder of something else, or a file, is refused and stays whole."""
     target = tmp_path / "run"
@@ -182,6 +189,7 @@ def test_a_run_replaces_an_earlier_run_and_nothing_else(small, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run", "thesis"]
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_a_write_that_fails_leaves_the_old_run(small, tmp_path, monkeypatch):
     """Killed half-way, the old folder stands and no temporary one is left."""
     target = tmp_path / "run"
@@ -198,6 +206,7 @@ def test_a_write_that_fails_leaves_the_old_run(small, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_files_that_no_run_wrote_are_never_deleted(small, tmp_path, monkeypatch):
     """A path that goes up again, a stranger's run.json, notes beside a run, the working directory: all stay whole."""
     keep = tmp_path / "precious" / "keep"
@@ -231,6 +240,7 @@ def test_files_that_no_run_wrote_are_never_deleted(small, tmp_path, monkeypatch)
     assert (tmp_path / "thesis.txt").read_text() == "x"
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_a_link_leads_to_the_folder_that_is_replaced(small, tmp_path):
     """Existing or dangling, the link stays a link."""
     for name in ("there", "not-yet"):
@@ -242,6 +252,7 @@ def test_a_link_leads_to_the_folder_that_is_replaced(small, tmp_path):
         assert (tmp_path / f"{name}-run" / "report.html").is_file()
 
 
+@pytest.mark.usefixtures("without_plots")
 @pytest.mark.parametrize("failing", [1, 2])
 def test_a_swap_that_fails_brings_the_old_run_back(small, tmp_path, monkeypatch, failing):
     """Whichever of the two renames does not work, the old run is there afterwards and nothing else is."""

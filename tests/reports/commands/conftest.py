@@ -27,7 +27,7 @@ class MyEngine(Engine):
         simulation.settings = dict(simulation.settings) | {"version": release}
         return simulation
 '''
-RUN = ("run", "spin-principal", "drop-ball", "-e", "my_engine:MyEngine")
+RUN = ("run", "spin-principal", "drop-ball", "-e", "my_engine:MyEngine", "--dt", "0.008", "--dt", "0.004", "--dt", "0.002")
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ from reports.views.check import BaselineFile, accepted_sentences, sentences
 from scenarios import load
 
 ENGINE, LABEL = "my_engine:MyEngine", "my-engine"
-RUN = ("run", "spin-principal", "drop-ball", "-e", ENGINE)
+RUN = ("run", "spin-principal", "drop-ball", "-e", ENGINE, "--dt", "0.008", "--dt", "0.004", "--dt", "0.002")
 BASELINE = ("--baseline", "dropspin-baseline.toml")
 
 
@@ -42,14 +42,14 @@ def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, 
         assert re.search(r"All \d+ accepted results hold\.$", output)
     if release == "failing":
         first = output.split("✗")[1]
-        assert first.startswith(" drop-ball · my-engine · 0.004 s: restitution error is 0.005, accepted -")
+        assert first.startswith(" drop-ball · my-engine · 0.008 s: restitution error is 0.005, accepted ")
         assert "first measured; worse by 1.67e+05 times its tolerance (and 2 other time steps). " in first
-        assert "Reproduce: dropspin run drop-ball -e my_engine:MyEngine --dt 0.004 --baseline dropspin-baseline.toml -o out/again" in first
+        assert "Reproduce: dropspin run drop-ball -e my_engine:MyEngine --dt 0.008 --baseline dropspin-baseline.toml -o out/again" in first
         assert "my-engine: accepted results fail in 1 of 2 scenes; the largest change is in restitution error (drop-ball)." in output
         assert "Changed since they were accepted: my-engine good → failing." in output
         assert f'If this change is intended: dropspin accept out/failing {" ".join(BASELINE)} --reason "…"' in output
     if release == "crashing":
-        assert f"drop-ball · {LABEL} · 0.004 s: crashed. its process was ended by SIGABRT" in output
+        assert f"drop-ball · {LABEL} · 0.008 s: crashed. its process was ended by SIGABRT" in output
         assert "If this change is intended" not in output
 
 

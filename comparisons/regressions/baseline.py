@@ -8,7 +8,7 @@ import datetime
 import math
 import os
 import tempfile
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -117,7 +117,12 @@ def load_baseline(path: str | Path) -> Baseline:
         )
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
-    lines = []
+    lines = [_read_line(where, key, content, acceptances) for key, content in _listed(where, written)]
+    return Baseline(acceptances, written.engines, written.scenes, _table(lines))
+
+
+def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, str], Any]]:
+    """The results of a file: scene, engine, time steps and name, and the content of the line."""
     for scene, engines in written.results.items():
         if scene not in written.scenes:
             raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
@@ -125,15 +130,20 @@ def load_baseline(path: str | Path) -> Baseline:
             for step, named in steps.items():
                 _assert_steps(f"{where}: results of {scene}, {engine}", step)
                 for name, content in named.items():
-                    here = f"{where}: results of {scene}, {engine}, {step}: {name}"
-                    metric, kind = _metric_and_kind(here, name)
-                    line = validated(_Line, here, content)
-                    if line.by not in acceptances:
-                        raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
-                    key = {"scene": scene, "engine": engine, "steps": step, "metric": metric, "kind": kind}
-                    unit = "1" if kind == "order" else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
-                    lines.append(key | line.model_dump() | {"unit": unit})
-    return Baseline(acceptances, written.engines, written.scenes, _table(lines))
+                    yield (scene, engine, step, name), content
+
+
+def _read_line(where: str, key: tuple[str, str, str, str], content: Any, acceptances: Mapping[str, Acceptance]) -> dict[str, Any]:
+    """A result of a file as a row."""
+    scene, engine, steps, name = key
+    here = f"{where}: results of {scene}, {engine}, {steps}: {name}"
+    metric, kind = _metric_and_kind(here, name)
+    line = validated(_Line, here, content)
+    if line.by not in acceptances:
+        raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
+    unit = "1" if kind == "order" else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
+    identity = {"scene": scene, "engine": engine, "steps": steps, "metric": metric, "kind": kind}
+    return identity | line.model_dump() | {"unit": unit}
 
 
 def _writer(content: Mapping[str, Any]) -> str:

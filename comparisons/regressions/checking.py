@@ -29,7 +29,7 @@ class NothingAccepted(DropspinError):
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """What came of a check.
+    """The outcome of a check.
 
     Attributes:
         results: The run, with a row of kind `baseline` for each accepted result, the largest changes first.
@@ -83,7 +83,7 @@ def _with_current_names(baseline: Baseline, results: Results) -> pd.DataFrame:
 
 
 def _judged(found: dict[Any, Any], baseline: Baseline) -> Measurement:
-    """An accepted result beside the run's."""
+    """The row of an accepted result that the run measured too."""
     by = baseline.acceptances[found["by"]]
     away = "" if found["change"] == "same" else f"; {found['change']} by {found['in_tolerances']:,.3g} times its tolerance"
     reason = f"accepted {found['before']:.6g} ± {found['tolerance']:.2g} on {by.date}, {by.reason}{away}"
@@ -92,7 +92,7 @@ def _judged(found: dict[Any, Any], baseline: Baseline) -> Measurement:
 
 
 def _row(found: dict[Any, Any]) -> Measurement:
-    """A row of kind `baseline` without a value, failed."""
+    """A failed row of kind `baseline`, without a value."""
     dt = np.nan if "," in found["steps"] else float(found["steps"])
     truth = ACCEPTED.get(found["kind"], "accepted")
     identity = {name: found[name] for name in ("scene", "engine", "metric", "unit")}
@@ -100,7 +100,7 @@ def _row(found: dict[Any, Any]) -> Measurement:
 
 
 def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
-    """Accepted results that the run should have and has not: one row for all of an engine that did not run a scene, else one each.
+    """Rows of accepted results that the run lacks: one row for all results of an engine that did not run a scene, else one for each result.
 
     An order or an asymptotic error that is undefined now follows from the errors, which are results of their own.
     """

@@ -38,12 +38,12 @@ def comparable_results(results: Results) -> pd.DataFrame:
 
 def step_names(results: Results) -> pd.Series:
     """For each row of a run its time step [s] as text, or all of them, coarsest first."""
-    return results.table["dt"].map(lambda dt: _every(results) if np.isnan(dt) else repr(dt))
+    return results.table["dt"].map(lambda dt: _all_steps(results) if np.isnan(dt) else repr(dt))
 
 
 def asked_for(held: pd.DataFrame, results: Results) -> pd.DataFrame:
     """The results that belong to scenes, engines and time steps that a run was asked for."""
-    steps = {_every(results), *map(repr, _dts(results))}
+    steps = {_all_steps(results), *map(repr, _dts(results))}
     return held[held["scene"].isin(list(results.scenes)) & held["engine"].isin(results.engines) & held["steps"].isin(steps)]
 
 
@@ -54,7 +54,8 @@ def broke_down(rows: pd.DataFrame, results: Results) -> "pd.Series[bool]":
     return pd.Series(pd.MultiIndex.from_frame(rows[pairs]).isin(pd.MultiIndex.from_frame(broken)), rows.index)
 
 
-def _every(results: Results) -> str:
+def _all_steps(results: Results) -> str:
+    """All time steps of a run, in the text that identifies what they give together."""
     return ", ".join(map(repr, _dts(results)))
 
 

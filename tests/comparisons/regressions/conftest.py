@@ -1,21 +1,42 @@
 """Runs of the engine under test and its faulty releases, made once for all tests and workers."""
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
-from support.releases import DTS, RELEASES, SCENES, TODAY, longer, part, relabelled
+from support.releases import DTS, RELEASES, SCENES, TODAY, Candidate, longer, part, relabelled
 
+from comparisons.engines.registry import engine
 from comparisons.regressions.baseline import Baseline, accept
 from comparisons.results.store import load_results, save
 from comparisons.running.run import run
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _compiled():
+    """Load the compiled kernels once; the engines' processes are forked and inherit them."""
+    for inner in {one.inner for one in RELEASES}:
+        for scene in SCENES:
+            with engine(inner).prepare(scene, DTS[0]) as simulation:
+                simulation.record(2)
+
+
 @pytest.fixture(scope="session")
-def all_releases(shared):
+def kept(shared):
+    """Call it with a name and the arguments of a run: its table and provenance, from one run for all workers."""
+
+    def load(name, *asked):
+        # Motions are not compared, and take longer to compress than to compute.
+        folder = shared(name, lambda folder: save(replace(run(*asked), trajectories={}, ensembles={}), folder))
+        return load_results(folder, arrays=False)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def all_releases(kept):
     """A run of all releases and MuJoCo."""
-    return load_results(
-        shared("releases", lambda folder: save(run(SCENES, [*(one() for one in RELEASES), "mujoco"], DTS), folder)), arrays=False
-    )
+    return kept("releases", SCENES, [*(one() for one in RELEASES), "mujoco"], DTS)
 
 
 @pytest.fixture(scope="session")
@@ -42,11 +63,7 @@ def accepted(before):
 
 
 @pytest.fixture(scope="session")
-def longer_fall(shared):
+def longer_fall(kept):
     """A run of fall-spin after the scene has changed."""
-
-    def make(folder):
-        [fall] = [scene for scene in SCENES if scene.name == "fall-spin"]
-        save(run(longer(fall), [RELEASES[0](), "mujoco"], DTS), folder)
-
-    return load_results(shared("longer-fall", make), arrays=False)
+    [fall] = [scene for scene in SCENES if scene.name == "fall-spin"]
+    return kept("longer-fall", longer(fall), [Candidate(), "mujoco"], DTS)

@@ -5,6 +5,7 @@ import re
 import subprocess
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -48,6 +49,15 @@ def test_baseline_is_read_as_it_was_written(accepted, text, tmp_path):
     assert (both["unit"] == both["unit_read"]).all()
     write_baseline(again, tmp_path / "again.toml")
     assert (tmp_path / "again.toml").read_text() == text
+
+
+def test_example_in_the_documentation_is_read(tmp_path):
+    page = Path(__file__).parents[3] / "docs" / "gate.md"
+    (tmp_path / "example.toml").write_text(page.read_text(encoding="utf-8").split("```toml\n")[1].split("```")[0])
+    example = load_baseline(tmp_path / "example.toml")
+    [result] = example.results.to_dict("records")
+    assert (result["scene"], result["engine"], result["steps"], result["metric"]) == ("drop-ball", "mujoco", "0.001", "restitution_error")
+    assert example.acceptances[result["by"]].reason == "first measured"
 
 
 def test_byte_order_mark_and_windows_line_ends_are_read(text, tmp_path):

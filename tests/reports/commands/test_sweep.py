@@ -44,7 +44,7 @@ def test_a_sweep_prints_the_worst_values_and_runs_nothing_twice(tmp_path):
     assert "Written: out/mine, 20 jobs; from Python: dropspin.read_sweep('out/mine')\n" in done.stdout
     again = dropspin("sweep", "spec.toml", "-o", "out/mine", cwd=tmp_path)
     assert again.returncode == 2
-    assert again.stderr.startswith("dropspin: out/mine: holds 20 of 20 jobs of this sweep; --resume ")
+    assert again.stderr.startswith("dropspin: out/mine: holds 20 of 20 jobs of this sweep; resume it with --resume, ")
     assert again.stderr.count("\n") == 1
     resumed = dropspin("sweep", "spec.toml", "-o", "out/mine", "--resume", "--json", cwd=tmp_path)
     rows = json.loads(resumed.stdout)

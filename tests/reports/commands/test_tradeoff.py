@@ -35,7 +35,7 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]"}
     assert all(row["cost_best"] <= row["cost"] for row in rows)
     assert any(row["on_pareto_front"] for row in rows)
-    assert all(row["side_by_side"] > 0.0 for row in rows)
+    assert all(row["cost_per_world"] > 0.0 for row in rows)
 
 
 def test_a_scene_without_an_exact_solution_is_refused(tmp_path):

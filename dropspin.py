@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from comparisons.running.run import measure as measure
     from comparisons.running.run import run as run
     from comparisons.sweeps.running import read_sweep as read_sweep
+    from comparisons.sweeps.running import read_sweep_parts as read_sweep_parts
     from comparisons.sweeps.running import run_sweep as run_sweep
     from comparisons.sweeps.spec import load_sweep as load_sweep
     from comparisons.tradeoff.points import TradeOff as TradeOff
@@ -94,7 +95,7 @@ _HOMES = {
     "comparisons.running.processes": ("ResourceLimits",),
     "comparisons.running.recording": ("simulate",),
     "comparisons.running.run": ("DEFAULT_DTS", "measure", "run"),
-    "comparisons.sweeps.running": ("read_sweep", "run_sweep"),
+    "comparisons.sweeps.running": ("read_sweep", "read_sweep_parts", "run_sweep"),
     "comparisons.sweeps.spec": ("load_sweep",),
     "comparisons.tradeoff.points": ("TradeOff",),
     "comparisons.tradeoff.study": ("tradeoff",),

@@ -71,10 +71,10 @@ def read_sweep(where: str) -> pd.DataFrame:
     Raises:
         DropspinError: The folder does not hold a sweep.
     """
-    return pa.concat_tables(read_parts(where)).to_pandas()
+    return pa.concat_tables(read_sweep_parts(where)).to_pandas()
 
 
-def read_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
+def read_sweep_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
     """The table of a sweep part by part, for tables that are larger than memory.
 
     Raises:

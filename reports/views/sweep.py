@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.judging.verdicts import BREAKDOWNS
-from comparisons.sweeps.running import read_parts
+from comparisons.sweeps.running import read_sweep_parts
 from reports.views.numbers import formatted, word
 
 WORST_OF = ("energy_drift", "energy_gain", "penetration")
@@ -25,7 +25,7 @@ class Tally:
 def tallies(where: str) -> dict[str, Tally]:
     """The tally of each engine, read part by part, because the table may be larger than memory."""
     found: dict[str, Tally] = {}
-    for part in read_parts(where, ["engine", "verdict", "steps", "time_per_step", *WORST_OF]):
+    for part in read_sweep_parts(where, ["engine", "verdict", "steps", "time_per_step", *WORST_OF]):
         frame = part.to_pandas()
         for engine, rows in frame.groupby("engine", sort=False):
             tally = found.setdefault(str(engine), Tally())

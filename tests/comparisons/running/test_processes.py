@@ -83,13 +83,13 @@ def test_processor_time_is_counted_per_piece_of_work():
 
 
 def test_runs_with_broken_engines_leave_no_process_and_no_file():
-    """Fourteen runs in an interpreter of its own, whose children and temporary files are counted."""
+    """Seven runs in an interpreter of its own, whose children and temporary files are counted."""
     script = textwrap.dedent("""
         import os, sys, tempfile
         import dropspin as ds
         from support import breaking as t
         kinds = (t.segfault, t.leave, t.allocate, t.loop, t.shout, t.fail, t.interrupt)
-        for number in range(14):
+        for number in range(7):
             ds.run([t.BALL, t.SPIN], [t.breaking(kinds[number % len(kinds)]), "document"], [4e-3], resources=t.TIGHT)
         parents = {p: open(f"/proc/{p}/stat").read().split(") ")[1].split()[1] for p in os.listdir("/proc") if p.isdigit()}
         print([p for p, parent in parents.items() if parent == str(os.getpid())], os.listdir(tempfile.gettempdir()))

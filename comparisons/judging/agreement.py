@@ -6,7 +6,8 @@ import numpy as np
 
 from comparisons.judging.verdicts import Judgement
 from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import METRICS, Metric
+from comparisons.measuring.metric import Metric
+from comparisons.measuring.metrics import METRICS
 from scenarios import Scenario, Trajectory, Truth
 
 NO_EVIDENCE = "no evidence"

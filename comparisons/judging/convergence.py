@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from comparisons.engines.base import KnownLimitation
 from comparisons.judging.error_budget import ErrorBudget, error_budget
 from comparisons.judging.verdicts import Cause, Judgement, Verdict, known_fault, with_limitations
-from comparisons.measuring.metrics import Average, Metric
+from comparisons.measuring.metric import Average, Metric
 from comparisons.measuring.tolerances import rounding
 from scenarios import Scenario
 

@@ -7,7 +7,8 @@ from typing import Literal, get_args
 
 from comparisons.engines.base import EngineMissing, KnownLimitation
 from comparisons.engines.registry import BUILT_IN, engine
-from comparisons.measuring.metrics import METRICS, Metric
+from comparisons.measuring.metric import Metric
+from comparisons.measuring.metrics import METRICS
 from scenarios import DropspinError, Scenario, SceneError, Truth
 from scenarios.errors import did_you_mean
 from scenarios.model import Expectation

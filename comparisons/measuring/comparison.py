@@ -1,9 +1,9 @@
-"""A motion beside the one it should have been: what every metric looks at.
+"""A motion compared with its reference: the input of every metric.
 
-Where the truth has impacts, velocities are compared in the inner half of each of the truth's flights: near an impact they
-differ for a step or two because the impact comes a little early or late, which is an error of time and is judged as one
-(`position_error`). A body that does not bounce at all still fails, because the truth's flights say where to look. After the second
-flight they end where the body is out of step with them: late flights of many would be compared with others than their own.
+If the exact solution has impacts, velocities are compared in the inner half of each of its flights. Near an impact they differ for a step or
+two because the impact comes slightly early or late, which is an error of time and is measured as one (`position_error`). A body that does
+not bounce at all still fails, because the flights are those of the exact solution. After the second flight they end where the body is
+desynchronised: it would be compared with another flight than its own.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from scenarios.rotations import rotate
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-SHORTEST_FLIGHT = 16  # steps; a flight of fewer is not resolved, and not judged
+SHORTEST_FLIGHT = 16  # steps; a shorter flight is not resolved, and not judged
 
 
 class Unresolved(Exception):
@@ -30,20 +30,19 @@ class Unresolved(Exception):
 
 
 def exactly(truth: Truth, times: Array) -> Trajectory:
-    """The truth at those of some times that it covers."""
+    """The exact solution at those of some times at which it is known."""
     return truth(times[truth.covers(times)])
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One motion beside another of the same scene.
+    """A motion and the reference that it is compared with.
 
     Attributes:
         scene: The scene that was run.
-        motion: What the engine did; at least two rows, equally far apart in time.
-        reference: What it is held against, at the same times as far as it goes: the truth, or another engine's motion.
-            None where there is neither.
-        impacts: When the body hits the floor, by the truth [s]; empty where that is not known.
+        motion: The engine's motion: at least two rows, equally spaced in time.
+        reference: The exact solution or another engine's motion, at the same times as far as it is known; None if there is neither.
+        impacts: Times of the exact impacts [s]; empty where they are not known.
     """
 
     scene: Scenario
@@ -53,33 +52,33 @@ class Comparison:
 
     @classmethod
     def with_truth(cls, scene: Scenario, motion: Trajectory, truth: Truth | None, exact: Trajectory | None = None) -> "Comparison":
-        """Hold a motion against the truth, as far as the truth goes; `exact` is what `exactly` gave for its times, if that is at hand."""
+        """Compare a motion with the exact solution, as far as it is known; `exact` is the result of `exactly` if it is available."""
         if truth is None:
             return cls(scene, motion)
         return cls(scene, motion, exactly(truth, motion.t) if exact is None else exact, tuple(event.time for event in truth.events))
 
     @classmethod
     def between(cls, one: "Comparison", other: "Comparison", until: int) -> "Comparison":
-        """Hold one engine's motion against another's, for so many rows; what both have computed beside the truth is not computed again."""
+        """Compare two engines' motions over `until` rows; energies computed for the comparison with the exact solution are reused."""
         case = cls(one.scene, one.motion, other.motion[:until], one.impacts)
         vars(case).update(energy=one.energy, exact_energy=other.energy[:until])
         return case
 
     @cached_property
     def exact(self) -> Trajectory:
-        """The reference; metrics that need one are asked only where there is one.
+        """The reference; metrics that need one apply only where there is one.
 
         Raises:
-            Unresolved: It ends after so few steps that they say nothing.
+            Unresolved: It ends after too few steps.
         """
         assert self.reference is not None
         if len(self.reference) < min(SHORTEST_FLIGHT, len(self.motion) - 1):
-            raise Unresolved(f"the truth is known for {len(self.reference) - 1} steps of {self.dt:g} s only")
+            raise Unresolved(f"the exact solution is known for {len(self.reference) - 1} steps of {self.dt:g} s only")
         return self.reference
 
     @property
     def ends_at_an_impact(self) -> bool:
-        """Whether the reference ends before the motion does, because what comes then is not known: something strikes the floor."""
+        """Whether the reference ends before the motion, at an impact whose outcome is not known."""
         return self.reference is not None and len(self.motion) - len(self.reference) > 1
 
     @cached_property
@@ -124,7 +123,7 @@ class Comparison:
 
     @property
     def has_impact_to_come(self) -> bool:
-        """Whether the first impact is after the first step, so that where in a step it falls matters."""
+        """Whether the first impact comes after the first step, so that its phase within a step matters."""
         return bool(self.impacts) and self.impacts[0] > self.dt
 
     @cached_property
@@ -141,7 +140,7 @@ class Comparison:
         edges = [0.0, *self.impacts, times[-1]]
         inner = []
         for number, (start, end) in enumerate(pairwise(edges)):
-            # The last flight may be cut short by the scene's end; its impact is as uncertain as the flight before is long.
+            # The scene's end may cut the last flight short; the uncertainty of its impact scales with the flight before.
             before = 0.0 if number == 0 else 0.25 * max(end - start, start - edges[number - 1])
             after = 0.0 if number == len(self.impacts) and not self.ends_at_an_impact else 0.25 * (end - start)
             held = rows[(times >= start + before) & (times <= end - after)]
@@ -153,7 +152,7 @@ class Comparison:
 
     @cached_property
     def desynchronised_from(self) -> float:
-        """When the flight begins in which the body is out of step with the reference [s]; infinite if it is in step to the end."""
+        """When the flight begins in which the body is desynchronised [s]; infinite if that never happens."""
         times = self.motion.t[: len(self.exact)]
         for start, end in pairwise([*self.impacts, times[-1]]):
             within = 0.25 * (end - start)
@@ -163,11 +162,11 @@ class Comparison:
         return np.inf
 
     def _is_desynchronised(self, rows: Rows, flight: NDArray[np.bool_]) -> bool:
-        """Whether a body's height is off by half of how high the flight is, so that it may be in another flight by then."""
+        """Whether the height is wrong by half the height of the flight, so that the body may be in another flight."""
         heights = self.exact.position[flight, 1]
         high = float(np.ptp(heights)) if len(heights) else 0.0
-        apart = np.abs(self.compared.position[rows, 1] - self.exact.position[rows, 1]).max(initial=0.0)
-        return high > TOUCHING * self.scene.body.size and bool(apart > 0.5 * high)
+        difference = np.abs(self.compared.position[rows, 1] - self.exact.position[rows, 1]).max(initial=0.0)
+        return high > TOUCHING * self.scene.body.size and bool(difference > 0.5 * high)
 
     @property
     def first_flight_end(self) -> int:
@@ -191,23 +190,23 @@ class Comparison:
 
     @cached_property
     def first_contact(self) -> tuple[int, int] | None:
-        """The rows just before and just after the floor first changes the velocity, or None."""
+        """The rows just before and just after the floor first changes the velocity; None without a contact."""
         before, after = self.motions.first_contact
         return None if before < 0 else (int(before), int(after))
 
     @property
     def touching(self) -> NDArray[np.bool_]:
-        """In which steps the floor changes the velocity, shape (n - 1,)."""
+        """The steps in which the floor changes the velocity, shape (n - 1,)."""
         return self.motions.states.touching
 
     def contact_point(self, row: int) -> Array:
-        """From the centre of mass to the point that is lowest at a row [m], shape (3,); the middle of several that are."""
+        """From the centre of mass to the lowest point at a row [m], shape (3,); the mean of several equally low points."""
         offsets = rotate(self.motion.orientation[row], self.scene.body.vertices)
         lowest = offsets[:, 1] <= offsets[:, 1].min() + 1e-6 * self.scene.body.size
         point: Array = offsets[lowest].mean(axis=0) - np.array([0.0, self.scene.body.rounding, 0.0])
         return point
 
     def normal_velocity_of_contact(self, row: int, contact_row: int) -> float:
-        """Vertical velocity [m/s] at one row of the point that is lowest at another."""
+        """Vertical velocity [m/s] at one row of the point that is lowest at another row."""
         arm = self.contact_point(contact_row)
         return float((self.motion.velocity[row] + np.cross(self.motion.angular_velocity[row], arm))[1])

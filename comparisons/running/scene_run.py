@@ -20,7 +20,8 @@ from comparisons.judging.convergence import (
 from comparisons.judging.error_budget import is_sufficient
 from comparisons.judging.verdicts import Judgement, judge, with_limitations
 from comparisons.measuring.comparison import Comparison, Unresolved, exactly
-from comparisons.measuring.metrics import METRICS, Average, Metric, metrics_for
+from comparisons.measuring.metric import Average, Metric
+from comparisons.measuring.metrics import METRICS, metrics_for
 from comparisons.measuring.tolerances import FEW_DRAWS, tolerance
 from comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from comparisons.results.measurement import Case, Measurement, as_table

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comparisons.measuring.metrics import Average
+from comparisons.measuring.metric import Average
 from comparisons.measuring.tolerances import tolerance
 from comparisons.regressions.values import KEY, changes, comparable_results
 from scenarios import load

@@ -266,7 +266,7 @@ def test_scenes_at_the_limits_of_what_can_be_measured():
     found = ds.run([scene], [made.Frozen()]).table
     judged = found[found["kind"] == "truth"]
     assert (judged["cause"] == "unresolved").all()
-    assert judged["reason"].str.contains("the truth is known for [01] steps of").all()
+    assert judged["reason"].str.contains("the exact solution is known for [01] steps of").all()
 
 
 def test_desynchronised_motion_is_no_model_error():

@@ -11,15 +11,15 @@ from comparisons.results.results import Results
 from reports.pages import page
 from reports.views import check, compare
 from reports.views.failures import Failure
-from reports.views.run import overview
+from reports.views.run import Overview
 
 MOST_FAILURES = 100
 """Failures that a summary lists; JUnit and JSON have all."""
 
 
-def run_markdown(results: Results) -> str:
+def run_markdown(results: Results, summary: Overview) -> str:
     """A short report of a run."""
-    return page("report.md", **overview(results))
+    return page("report.md", **vars(summary), engines=results.engines, provenance=results.provenance)
 
 
 def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Sequence[Failure]) -> str:

@@ -16,6 +16,7 @@ from reports.markdown import run_markdown
 from reports.plots.figures import FIGURES, report_figures
 from reports.plots.svg import save_png, svg
 from reports.sections import Section
+from reports.views.run import overview
 from scenarios import DropspinError
 
 OURS = frozenset(
@@ -45,6 +46,7 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Sectio
 
 def fill(results: Results, folder: Path, sections: Sequence[Section] = (), png: bool = False) -> None:
     """Write the data, the reports and the plots of a run into an empty folder."""
+    summary = overview(results)
     save(results, folder)
     results.table.to_csv(folder / "results.csv", index=False)
     (folder / "plots").mkdir()
@@ -54,8 +56,8 @@ def fill(results: Results, folder: Path, sections: Sequence[Section] = (), png: 
         (folder / "plots" / f"{name}.svg").write_text(plots[name], encoding="utf-8")
         if png:
             save_png(figure, folder / "plots" / f"{name}.png")
-    (folder / "report.html").write_text(html_report(results, plots, sections), encoding="utf-8")
-    (folder / "report.md").write_text(run_markdown(results), encoding="utf-8")
+    (folder / "report.html").write_text(html_report(results, summary, plots, sections), encoding="utf-8")
+    (folder / "report.md").write_text(run_markdown(results, summary), encoding="utf-8")
     (folder / "junit.xml").write_bytes(junit_xml(results))
 
 

@@ -176,7 +176,7 @@ def _extrapolate(h: Array, e: Array, noise: Array, claimed: float | None) -> tup
         return math.nan, math.nan, math.nan
     observed = float(brentq(excess, LOWEST_ORDER, HIGHEST_ORDER))
     nearest = min(MIXED_WITH, key=lambda p: abs(p - observed))
-    # A high order that nobody claims is more likely a coarsest step in trouble of its own.
+    # A high order without a claim is more likely an error of the coarsest step that is not asymptotic yet.
     could_hide_lower_powers = nearest != claimed and (nearest > HIGHEST_WITHOUT_CLAIM or (nearest > 1.0 and _is_a_plain_series(h, e)))
     if abs(nearest - observed) > NEAR_AN_ORDER or could_hide_lower_powers:
         return math.nan, math.nan, math.nan

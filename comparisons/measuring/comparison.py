@@ -1,9 +1,9 @@
 """A motion compared with its reference: the input of every metric.
 
-If the exact solution has impacts, velocities are compared in the inner half of each of its flights. Near an impact they differ for a step or
-two because the impact comes slightly early or late, which is an error of time and is measured as one (`position_error`). A body that does
-not bounce at all still fails, because the flights are those of the exact solution. After the second flight they end where the body is
-desynchronised: it would be compared with another flight than its own.
+If the exact solution has impacts, velocities are compared in the inner half of each of its flights. Near an impact they differ for a step
+or two because the impact comes slightly early or late, which is an error of time and is measured as one (`position_error`). A body that
+does not bounce at all still fails, because the flights are those of the exact solution. After the second flight they end where the body
+is desynchronised: it would be compared with another flight than its own.
 """
 
 from dataclasses import dataclass

@@ -20,42 +20,44 @@ from reports.replay import as_data, replay_of
 from reports.sections import Section
 from reports.views import numbers
 from reports.views.error_budget import error_budgets
-from reports.views.findings import counts, profile_comparisons, verdicts
+from reports.views.findings import Counts
 from reports.views.leading_errors import leading_errors, step_costs
-from reports.views.run import LASTING, overview
+from reports.views.run import LASTING, Overview
 from reports.views.scene import left_out, modelled
 from scenarios import truth_for
 
 
-def html_report(results: Results, plots: dict[str, str], sections: Sequence[Section] = ()) -> str:
+def html_report(results: Results, summary: Overview, plots: dict[str, str], sections: Sequence[Section] = ()) -> str:
     """The page.
 
     Args:
         results: The run.
+        summary: Its overview.
         plots: SVG elements, by the names of `report_figures`.
         sections: Sections of other studies.
     """
     styles, drawn = with_shared_styles(plots)
-    summary = overview(results)
-    found = verdicts(results)
+    chips, found = summary.chips, summary.verdicts
     kinds = {
         (scene, engine): {*mine, *found.get((scene, engine), ())} - {"measured"}
-        for scene, by_engine in summary["chips"].items()
+        for scene, by_engine in chips.items()
         for engine, mine in by_engine.items()
     }
     words = sorted({word for mine in kinds.values() for word in mine})
-    return page("report.html", **summary, **_details(results, drawn), kinds=kinds, words=words, sections=sections, styles=Markup(styles))
+    details = _details(results, summary.counts, drawn)
+    return page("report.html", **vars(summary), **details, kinds=kinds, words=words, sections=sections, styles=Markup(styles))
 
 
-def _details(results: Results, plots: dict[str, str]) -> dict[str, Any]:
+def _details(results: Results, tally: Counts, plots: dict[str, str]) -> dict[str, Any]:
     return {
-        "passed": counts(results).failed == 0 and counts(results).broken == 0,
+        "engines": results.engines,
+        "provenance": results.provenance,
+        "passed": tally.failed == 0 and tally.broken == 0,
         "colours": engine_colours(results.engines),
         "lasting": list(LASTING.values()),
         "negligible": NEGLIGIBLE,
         "leading": leading_errors(results),
         "costs": step_costs(results),
-        "profiles": profile_comparisons(results),
         "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,

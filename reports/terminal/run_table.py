@@ -11,9 +11,10 @@ from rich.text import Text
 from comparisons.judging.agreement import NO_EVIDENCE
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.results import Results
-from reports.views.failures import Failure, failures
-from reports.views.findings import finding_sentences, orders, verdict_sentence
+from reports.views.failures import Failure
+from reports.views.findings import orders
 from reports.views.numbers import MARKS, formatted, trend, word
+from reports.views.run import overview
 
 NUMBER_WIDTH = 9  # of -1.23e-04; a narrow terminal folds names and splits the table, but never cuts a number
 NAME_WIDTH, GAP = 20, 3
@@ -32,11 +33,12 @@ def print_table(results: Results, console: Console | None = None) -> None:
         _print_ensemble(results, name, out)
         _print_remarks(results, name, out)
         out.print()
-    found = [one for one in failures(results) if not one.broke_down]
+    summary = overview(results)
+    found = [one for one in summary.failures if not one.broke_down]
     print_failures(found, len(found), out)
-    for sentence in finding_sentences(results):
+    for sentence in summary.findings:
         out.print(Text(sentence))
-    out.print(Text(verdict_sentence(results), style="bold"))
+    out.print(Text(summary.verdict, style="bold"))
 
 
 def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:

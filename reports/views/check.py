@@ -41,7 +41,7 @@ def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
     """The outcome of a check, the verdict last."""
     own = _without_baseline(checked.results)
     known = int(own.table["reason"].str.startswith(KNOWN_FAILURE).sum())
-    verdict = "" if known and not own.table["verdict"].isin(JUDGED).any() else verdict_sentence(own)
+    verdict = "" if known and not own.table["verdict"].isin(JUDGED).any() else verdict_sentence(own, counts(own))
     if file is None:
         return [verdict]
     table = checked.results.table

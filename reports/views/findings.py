@@ -1,5 +1,6 @@
 """The findings of a run, counted and in words; terminal, HTML and Markdown share them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,9 +111,8 @@ def orders(results: Results, scene: str, engine: str) -> tuple[float, float] | N
     return (float(found.min()), float(found.max())) if len(found) else None
 
 
-def verdict_sentence(results: Results) -> str:
+def verdict_sentence(results: Results, tally: Counts) -> str:
     """The outcome of the checks in one sentence."""
-    tally = counts(results)
     judged = tally.passed + tally.failed
     if tally.broken:
         judgement = f"; {tally.failed} of {judged} checks fail" if judged else ""
@@ -128,11 +128,17 @@ def verdict_sentence(results: Results) -> str:
     return f"All {judged} checks pass: {both}."
 
 
-def finding_sentences(results: Results) -> list[str]:
-    """The main finding about each engine."""
+def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
+    """The main finding about each engine.
+
+    Args:
+        results: The run.
+        lasting: By cause and engine, the scenes with errors that do not vanish as dt → 0.
+        profiles: Engines with default settings compared with the calibrated ones.
+    """
     missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine")
     sentences = [f"{row.reason}" for row in missing.itertuples()]
-    models, settings = asymptotic_errors(results, "model"), asymptotic_errors(results, "setting")
+    models, settings = lasting["model"], lasting["setting"]
     limits = results.table[results.table["kind"] == "asymptotic_error"]
     studied = limits.groupby("engine")["scene"].nunique()
     for engine in results.engines:
@@ -149,4 +155,4 @@ def finding_sentences(results: Results) -> list[str]:
         if total and not stuck and not settings[engine]:
             where = f" in all {total} scenes" if total > 1 else ""
             sentences.append(f"{engine}: errors above {NEGLIGIBLE:g} vanish as dt → 0{where}.")
-    return sentences + [comparison.sentence for comparison in profile_comparisons(results)]
+    return sentences + [comparison.sentence for comparison in profiles]

@@ -19,8 +19,9 @@ from reports.plots.figures import report_figures
 from reports.plots.svg import svg
 from reports.run_folder import write_report
 from reports.terminal.run_table import print_table
-from reports.views.findings import finding_sentences, profile_comparisons
+from reports.views.findings import profile_comparisons
 from reports.views.numbers import formatted
+from reports.views.run import overview
 from scenarios import DropspinError, load
 
 NASTY = "<script>alert(1)</script>$x_{"
@@ -139,7 +140,7 @@ def test_failures_come_before_the_comparison():
         "expect": [{"metric": "bounce_height_error", "below": 1e-9, "reason": "too much to ask"}]
     }
     found = run(load(harsh), "mujoco", 1e-2)
-    text = html_report(found, plots={})
+    text = html_report(found, overview(found), plots={})
     assert "1 of 1 checks fail." in text
     assert text.index("Failures") < text.index("<h3>Errors</h3>")
     assert "too much to ask" in text
@@ -281,7 +282,7 @@ def test_markdown_cells_hold_anything():
         "expect": [{"metric": "energy_error", "within": [1.0, 2.0], "reason": "has | pipe and\nnewline"}],
     }
     found = run(load(scene), "mujoco", 1e-2)
-    markdown = run_markdown(found)
+    markdown = run_markdown(found, overview(found))
     tables = [line for line in markdown.splitlines() if line.startswith("|")]
     assert {len(re.findall(r"(?<!\\)\|", line)) for line in tables} == {3}
     [failed] = [line for line in markdown.splitlines() if line.startswith("- ✗")]
@@ -295,7 +296,7 @@ def test_markdown_cells_hold_anything():
 def studied():
     """A run at three time steps, with an engine that has a model error, and its page."""
     found = run("spin-asymmetric", ["document", "mujoco"], [8e-3, 4e-3, 2e-3])
-    return found, html_report(found, plots={})
+    return found, html_report(found, overview(found), plots={})
 
 
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
@@ -323,7 +324,7 @@ def test_the_terminal_shows_orders_and_asymptotic_errors(studied, capsys):
 def test_two_time_steps_give_no_asymptotic_errors():
     found = run("spin-asymmetric", "mujoco", [8e-3, 4e-3])
     assert not found.table["kind"].isin(["order", "asymptotic_error"]).any()
-    assert finding_sentences(found) == []
+    assert overview(found).findings == []
 
 
 def test_an_empty_folder_is_not_a_run(tmp_path):
@@ -381,7 +382,7 @@ def test_setting_errors_are_compared_with_the_calibrated_profile():
         assert row["part"] == max(0.0, 1 - abs(calibrated) / abs(default))
     height = next(row for row in comparison.rows if row["metric"] == "bounce_height_error")
     assert height["part"] > 0.95  # measured .965; the rest is discretisation error
-    page = html_report(found, plots={})
+    page = html_report(found, overview(found), plots={})
     assert "Setting errors of" in page
-    assert comparison.sentence in finding_sentences(found)
+    assert comparison.sentence in overview(found).findings
     assert profile_comparisons(run("drop-ball", "pybullet[profile=default]", 1e-2)) == []

@@ -122,7 +122,7 @@ class WrongStart(Exact):
 
 
 class TooLively(Exact):
-    """Bounces with 1 % more restitution than it was told."""
+    """Bounces with 1 % more restitution than the scene has."""
 
     name = "too-lively"
 

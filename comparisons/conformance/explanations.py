@@ -1,4 +1,7 @@
-"""Recognition of faults by their motion: the exact motion of the scene that a fault simulates, as the fault reports it, is the engine's.
+"""Recognition of faults by their motion.
+
+A fault model changes the scene that is simulated, the states that are reported, or both. It explains an engine's motion if that motion is
+the exact solution of the changed scene, reported in the changed way.
 
 Faults that give the same motion of a probe cannot be distinguished by it. Two faults at once are recognised as well.
 """
@@ -51,7 +54,7 @@ def explain_start(scene: Scenario, state: Array, allowed: float) -> FaultModel |
     for candidates in (FAULT_MODELS, _pairs()):
         for fault in candidates:
             start, close = fault.start(scene), allowed * np.abs(scene.initial_state).max()
-            # A fault in both setting and reading leaves the start unchanged, and explains nothing there.
+            # A fault made both when setting and when reading a state cancels at the start, which then is no evidence of it.
             if np.abs(start - state).max() <= close < np.abs(start - scene.initial_state).max():
                 return fault
     return None

@@ -67,7 +67,7 @@ IMPACT = (
     *faults_of(
         "size",
         *((f"the box's extents appear to be permuted to ({axis_names(order)})", _permuted_extents(order)) for order in ORDERS),
-        ("the body is half as large; a sphere has a radius, a box half extents", _scaled_size(0.5)),
-        ("the body is twice as large; a sphere has a radius, a box half extents", _scaled_size(2.0)),
+        ("the body is half as large as it should be: is a radius read as a diameter, or half extents as extents?", _scaled_size(0.5)),
+        ("the body is twice as large as it should be: is a diameter read as a radius, or extents as half extents?", _scaled_size(2.0)),
     ),
 )

@@ -14,7 +14,7 @@ from scenarios import mechanics
 from scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
 
 REACH = 1.0 + 1e-9
-"""Of the body's size: a body whose centre of mass is higher is out of the floor's reach."""
+"""In units of the body's size: while its centre of mass is higher than this, the body cannot touch the floor."""
 
 
 class _States(NamedTuple):

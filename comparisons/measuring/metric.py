@@ -63,7 +63,7 @@ class Metric:
         later = 2 if flights > 1 or self.first_flight or len(cases[0].impacts) < 2 else 0
         resolutions[later:] = phases[:, later:].std(axis=0)
         if len(cases) == 1 and cases[0].has_impact_to_come:
-            resolutions = np.abs(phases[0])  # one start may be sampling_noise altogether
+            resolutions = np.abs(phases[0])  # the whole value of a single start may be sampling noise
         return Average(phases.mean(axis=0), resolutions, np.ptp(phases, axis=0) / len(phases))
 
     def value_or_nan(self, cases: Sequence[Comparison]) -> float:

@@ -127,10 +127,13 @@ def contact_momentum_error(case: Comparison) -> float:
 
 @_metric("1", "truth", "an exact solution that comes to rest", requirements.comes_to_rest, signed=True)
 def rest_time_error(case: Comparison) -> float:
-    """Last time at which the speed exceeds twice g dt, minus the exact one, over the exact one."""
+    """Time at which the body comes to rest, minus the exact one, over the exact one.
+
+    It is in motion while its kinetic energy, that of the spin included, exceeds that of the speed 2 g dt and 1e-6 M g times its size.
+    """
     found, exact = (last_time_in_motion(case.scene, motion) for motion in (case.compared, case.exact))
     if exact == 0.0:
-        raise Unresolved(f"the speed never exceeds twice g dt, with dt = {case.dt:g} s")
+        raise Unresolved(f"the body is never faster than 2 g dt, with dt = {case.dt:g} s")
     return (found - exact) / exact
 
 

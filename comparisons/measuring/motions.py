@@ -115,8 +115,8 @@ class Setup:
         return np.sqrt(scalar_product((x, y, z), (x, y, z)))
 
     def damping_share(self, dt: Array) -> Array:
-        """Twice the share of its velocity that a body loses by damping in a step, shape (...)."""
-        return np.zeros_like(dt) if self.damping is None else 2.0 * dt * self.damping
+        """The share of its velocity that a body loses by damping in a step, shape (...)."""
+        return np.zeros_like(dt) if self.damping is None else dt * self.damping
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +209,7 @@ def is_touching(before: Components, after: Components, dt: float, gravity: Compo
     x = after[0] - before[0] - dt * gravity[0]
     y = after[1] - before[1] - dt * gravity[1]
     z = after[2] - before[2] - dt * gravity[2]
-    allowed = 1e-3 * dt * strength + (1e-6 + damping_share) * np.sqrt(scalar_product(before, before))
+    allowed = 1e-3 * dt * strength + (1e-6 + 2.0 * damping_share) * np.sqrt(scalar_product(before, before))
     return np.sqrt(scalar_product((x, y, z), (x, y, z))) > allowed
 
 

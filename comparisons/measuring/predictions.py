@@ -1,12 +1,13 @@
 """Predicted errors: what the error of an integration scheme must be, where theory gives it.
 
-Free flight: semi-implicit Euler has an exact discrete solution (`scenarios.discrete_flight`), whose metrics are measured.
-A body that falls flat, over the drop's height H, with u its impact speed, averaged over start phases:
+Free flight: semi-implicit Euler has an exact discrete solution (`scenarios.discrete_flight`); the prediction is its error.
+A body that falls flat from the height H and meets the floor at the speed u has, averaged over start phases, these relative errors:
 
     impact detected late, v⁺ = -e v⁻ - s g h     bounce height  -(1 - e)/2 u h/H,          restitution  -s g h/u
     gravity before the impact, as in the note    bounce height  (2e - 1)(1 + e)/2 u h/H,   restitution  e g h/u
 
-Source: expansion of one step about the impact, to first order in the step h.
+s is the share of a step's gravity by which an engine's rebound is slower. Source: expansion of one step about the impact, to first order in
+the step h.
 """
 
 import math

@@ -35,7 +35,7 @@ def lands(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def comes_to_rest(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body comes to rest within the first nine tenths, after an impact."""
+    """Whether the body comes to rest after an impact, within the first nine tenths of the scene's duration."""
     if truth is None or truth.horizon < scene.duration or not truth.events or truth.events[0].time == 0.0:
         return False
     return not truth([0.9 * scene.duration]).states[0, RATES].any()
@@ -57,7 +57,7 @@ def has_floor(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def keeps_energy(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether there is no damping, so that energy never rises."""
+    """Whether there is no damping, so that energy is lost at the floor only."""
     return scene.damping is None
 
 

@@ -1,7 +1,7 @@
 """Tolerances: how far a result may move between two runs before it counts as changed, derived from how it was measured.
 
-    metrics              rounding over the steps, and sampling noise: one of the start phases may fall into the neighbouring step; where the
-                         body starts on the floor, or there is one start only, the effect of perturbing the starts by some ulp
+    metrics              rounding over the steps, and sampling noise: one of the start phases may fall into the neighbouring step.
+                         With one start, or a body that starts on the floor: the effect of perturbing the starts by some ulp instead
     orders               the change when the errors that they were fitted to move by their tolerances
     asymptotic errors    the same, and at least their own uncertainty
     ensemble means       the confidence interval of the difference between two draws
@@ -28,7 +28,7 @@ _FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
 SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
 """The signs of the perturbations: two random sets and their opposites."""
 FEW_DRAWS = 10.0
-"""A few perturbations give the effect of others to an order of magnitude only."""
+"""Factor on the largest effect of a few perturbations: others may have ten times the effect."""
 TRUTH_ACCURACY = 1e-12
 """How far exact solutions may differ that are computed with other versions of libraries."""
 OF_TWO_DRAWS = math.sqrt(2.0)
@@ -51,8 +51,8 @@ def tolerance(scene: Scenario, unit: str, precision: type, steps: int, sampling_
 def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
     """A scene's starts perturbed by a few ulp, set by set; empty where there are many starts and none touches the floor.
 
-    A body that touches the floor is perturbed by ulps of double precision, as those of single precision would lift or sink it. Rounding
-    then decides whether it touches, for all starts alike; so each set has one of the opposite sign.
+    A body that touches the floor is perturbed by ulps of double precision, as those of single precision would lift or sink it. Its
+    sign then decides whether all of the starts touch or none; so each set of perturbations is followed by its opposite.
     """
     if len(starts) == 1:
         return [[_moved(scene, signs, precision)] for signs in SIGNS]

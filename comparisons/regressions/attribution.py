@@ -18,8 +18,8 @@ class Attribution:
 
     Attributes:
         origin: `absent` if one of the runs has no measurements; `engine` for its version, else `adapter` for the adapter's code, else
-            `settings`; `surroundings` for dropspin, its code, the libraries and the machine; `either` if both differ and the cause cannot
-            be isolated; `nothing` if the whole provenance is the same.
+            `settings`; `surroundings` for dropspin, its code, the libraries and the machine; `either` if the engine, its adapter or
+            its settings differ and the surroundings too: the cause cannot be isolated; `nothing` if the whole provenance is the same.
         message: The same in a sentence, without the engine's name.
     """
 

@@ -30,10 +30,10 @@ from scenarios.loading import read_toml
 from scenarios.validation import validated
 
 FORMAT = 3
-"""1 had its results in tables, whose headings a merge may separate from them; 2 called them figures."""
+"""Format 1 grouped results under headings, which a merge could separate from them; in format 2 the list of results had another name."""
 LARGEST_FILE = 50_000_000  # bytes
 EXTRA_DIGITS = 3
-"""A value is written with so many digits, and down to a two-hundredth of its tolerance."""
+"""A value is written with this many digits more than its tolerance needs: the error of writing it is at most 1/200 of the tolerance."""
 KEY_LENGTH = 7
 """Digits of the hash that names an acceptance."""
 HEADER = (
@@ -42,7 +42,7 @@ HEADER = (
     "`dropspin check RUN --baseline FILE` compares a run with them, `dropspin accept RUN` replaces them.",
 )
 SUFFIXES = {"_order": "order", "_asymptotic_error": "asymptotic_error"}
-"""How the names of results end that several time steps give together, and their kinds."""
+"""Endings of the names of results that are fitted to several time steps, and the kinds of such results."""
 
 
 class Acceptance(Table):
@@ -92,8 +92,8 @@ class Baseline:
         acceptances: By key.
         engines: The name to run an engine by, where that is not its label: `my_module:MyEngine`.
         scenes: The digest of what each scene simulates.
-        results: As `comparable_results` gives them, with `by`, the key of the acceptance, and `known_failure`: whether a check that
-            the result fails is not to fail the run, as long as the result is not worse.
+        results: As `comparable_results` gives them, with `by`, the key of the acceptance, and `known_failure`: if true, a
+            check that the result fails does not fail the run, as long as the result is no worse than accepted.
     """
 
     acceptances: Mapping[str, Acceptance] = field(default_factory=dict)

@@ -120,8 +120,9 @@ def record_batch(engine: Engine, starts: Sequence[Scenario], dt: float) -> list[
         lag = velocity_lag(simulation, dt)
     motions = []
     for start, states in zip(starts, engine.record_batch(starts, dt, steps), strict=True):
-        verify_start(engine, start, states[0], BATCH_ULPS)
-        motion = Trajectory.from_states(times, verified_record(states, steps + 1), lag)
+        verified = verified_record(states, steps + 1)
+        verify_start(engine, start, verified[0], BATCH_ULPS)
+        motion = Trajectory.from_states(times, verified, lag)
         if motion.first_bad_row is not None:
             raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
         motions.append(motion)

@@ -37,7 +37,7 @@ def turn(q, w, dt, body):
     if dot(torque, torque) <= PARALLEL * PARALLEL * dot(L, L) * dot(spin, spin):
         return normalise(product(product(q, _about(spin, dt)), conjugate(body.axes))), w
     a, b, c = _axes(I, spin)
-    sign = _parity(a, b, c)
+    sign = _parity(a, b)
     moments = Vec3(I[a], I[b], I[c])
     turned, after = _asymmetric_top(moments, Vec3(spin[a], spin[b], sign * spin[c]), dt)
     relative = Quat(_component(turned, a, b, 0, sign), _component(turned, a, b, 1, sign), _component(turned, a, b, 2, sign), turned.w)
@@ -75,8 +75,8 @@ def _axes(I, spin):
 
 
 @compiled
-def _parity(a, b, c):
-    """+1 where a, b, c is a cyclic order of the axes, else -1: then c changes its sense."""
+def _parity(a, b):
+    """+1 where b follows a in the cyclic order of the axes, else -1: then the third axis changes its sense."""
     return 1.0 if (b - a) % 3 == 1 else -1.0
 
 

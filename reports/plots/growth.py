@@ -1,4 +1,4 @@
-"""Errors over time."""
+"""The growth of an error over time, on a logarithmic scale."""
 
 from typing import TYPE_CHECKING
 
@@ -18,8 +18,8 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
     """Draw the absolute value of an error over time, logarithmic, for each engine at its finest step.
 
     The maximum of a line is the value of the metric for one start. Velocities are compared as in the metrics, in the inner half of each
-    flight: an impact one step late is an error in time and would be a spike in energy. Lines have gaps there, and end where the motion is
-    desynchronised from the exact solution.
+    flight: an impact one step late is an error in time and would be a spike in energy. Lines have gaps around impacts, and end where the
+    motion is desynchronised from the exact solution.
 
     Args:
         results: The run.

@@ -132,3 +132,17 @@ def test_members_must_start_where_they_were_placed():
     found = ds.run(FEW, [Copies()], [4e-3]).table
     assert list(found["verdict"]) == ["crashed"]
     assert "at the start" in found["reason"].iloc[0]
+
+
+def test_batch_of_wrong_shape_costs_the_engines_row():
+    """The message says what was returned and what was asked for."""
+
+    class Short(made.Exact):
+        name = "short"
+
+        def record_batch(self, drawn, dt, steps):
+            return engine("document").record_batch(drawn, dt, steps)[..., :12]
+
+    found = ds.run(FEW, [Short()], [4e-3]).table
+    assert list(found["verdict"]) == ["crashed"]
+    assert "states of 13 numbers were asked for" in found["reason"].iloc[0]

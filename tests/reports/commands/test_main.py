@@ -10,7 +10,12 @@ from pathlib import Path
 import pytest
 from support.cli import DROPSPIN, dropspin, spawn
 
+import dropspin as ds
+from comparisons.robustness import study
+from comparisons.running.processes import ResourceLimits
 from reports.commands import main as cli
+from reports.commands.limits import limits_command
+from reports.commands.run import run_command
 
 HARSH = """
 duration = 0.5
@@ -192,3 +197,12 @@ def test_an_interrupt_that_is_swallowed_still_stops_the_command(verb, tmp_path, 
     kept = "0 of 1 jobs are kept; --resume continues the sweep" if verb == "sweep" else "nothing was written"
     assert done.stderr.splitlines()[-1] == f"dropspin: interrupted; {kept}."
     assert os.listdir(tmp_path) == ["spec.toml"]
+
+
+def test_defaults_of_options_are_those_of_the_library():
+    """Options state their defaults as numbers, because `--help` imports no library."""
+    limits = {option.name: option.default for option in limits_command.params}
+    run = {option.name: option for option in run_command.params}
+    assert (limits["dt"], limits["within"], limits["time_limit"]) == (study.DT, study.WITHIN, study.RESOURCES.processor_time)
+    assert run["time_limit"].default == ResourceLimits().processor_time
+    assert run["dts"].help.endswith(f"[default: {', '.join(map(str, ds.DEFAULT_DTS))}]")

@@ -37,8 +37,11 @@ def test_history_finds_the_run_in_which_results_moved(repository, tmp_path):
     assert "![drop-ball](drop-ball.svg)" in (tmp_path / "history/history.md").read_text().splitlines()
 
 
-def test_the_python_of_the_documentation_runs():
+def test_the_python_of_the_documentation_runs(tmp_path, monkeypatch):
+    """In an empty folder: it writes a baseline into the working directory."""
+    monkeypatch.chdir(tmp_path)
     [block] = re.findall(r"^```python\n(.*?)^```", GATE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     names: dict[str, object] = {}
     exec(block, names)
     assert set(names["changes"].results["change"]) == {"same"}
+    assert (tmp_path / "dropspin-baseline.toml").exists()

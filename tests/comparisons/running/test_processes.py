@@ -30,7 +30,7 @@ def _compiled():
     ("what", "verdict", "reason"),
     [
         (breaking.segfault, "crashed", "its process was ended by SIGSEGV"),
-        (breaking.loop, "timed_out", "not done after 1 s of processor time"),
+        (breaking.loop, "timed_out", "not done after"),  # of processor time, or of wall time on a machine that is busy
         (breaking.allocate, "crashed", "MemoryError"),
         (breaking.leave, "crashed", "its process ended with exit code 7"),
         (breaking.leave_well, "crashed", "its process exited with code 0 before the work was done"),

@@ -74,7 +74,7 @@ def test_engine_that_breaks_costs_its_own_rows(tmp_path):
     reasons = [
         "SIGSEGV",
         "SIGSEGV",
-        "not done after 1 s",
+        "not done after",  # of processor time, or of wall time on a machine that is busy
         "",
         "RuntimeError: no",
         "step 3",

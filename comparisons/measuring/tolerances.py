@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 NEGLIGIBLE = 3e-8
 """Errors below this, relative to the metric's scale, are attributed to rounding and to the residuals of iterative solvers."""
+MATTERS = 1e-5
+"""Errors below this, relative to the metric's scale, do not matter to any use of an engine: contact solvers stop at such residuals."""
 ULPS_PER_STEP = 16.0
 PERTURBATION = 16.0
 """By how many ulp of the engine's precision each number of a start is perturbed, to see the effect of rounding."""
@@ -39,6 +41,11 @@ def rounding(scene: Scenario, unit: str, precision: type, steps: Array) -> Array
     """The largest error that rounding, solvers' residuals included, may cause in a number of steps, in a metric's unit."""
     rounded: Array = _scale(scene, unit) * (NEGLIGIBLE + ULPS_PER_STEP * float(np.finfo(precision).eps) * steps)
     return rounded
+
+
+def negligible(scene: Scenario, unit: str) -> float:
+    """The largest error that does not matter, in a metric's unit: the same share of the metric's scale for every engine."""
+    return MATTERS * _scale(scene, unit)
 
 
 def tolerance(scene: Scenario, unit: str, precision: type, steps: int, sampling_noise: float) -> float:

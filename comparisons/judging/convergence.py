@@ -27,6 +27,8 @@ ARTEFACTS = frozenset({"energy_error_raw"})
 """Metrics that show how a state is sampled rather than how wrong it is."""
 JUMPING = frozenset({"desync_rate"})
 """Metrics that change from flight to flight, not with a power of the step."""
+ADDED_STEPS = (2.0, 4.0)
+"""Steps that are added where those asked for leave open whether an error vanishes, relative to the coarsest: cheaper than finer ones."""
 STANDARD_DEVIATIONS = 0.5
 """Of a resolution, which is half of the range of four means over quarters of the phases: twice the standard deviation of their mean."""
 SATURATION = 0.9 * math.pi
@@ -60,6 +62,8 @@ class ConvergenceStudy:
     cause: Cause
     order: Judgement | None
     asymptotic_error: Judgement | None
+    is_open: bool = False
+    """Whether more time steps may decide the cause."""
 
 
 def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> ConvergenceStudy:
@@ -79,7 +83,8 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
         order = replace(order, tolerance=_order_tolerance(found, dts, errors, np.array([point.tolerance for point in series])))
     if limit is not None:
         limit = with_limitations(replace(limit, tolerance=found.upper - found.lower), metric.name, claim.limitations)
-    return ConvergenceStudy(found.cause, order, limit)
+    is_open = found.cause == "unresolved" and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
+    return ConvergenceStudy(found.cause, order, limit, is_open)
 
 
 def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:

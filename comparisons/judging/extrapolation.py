@@ -38,6 +38,8 @@ DISCREPANCIES = {0.003: 0.5, 0.03: 0.35, 0.3: 0.15}
 """ρ and its probability."""
 SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2
 """Standard deviations of m: from a thousandth of the change of the errors to ten times the largest error."""
+HIDDEN = 0.5
+"""A norm, or the largest of several errors, does not show one of them that is smaller than this share of it."""
 NEGLIGIBLE_WEIGHT = 1e-3
 """The least likely forms, with this much weight together, are left out of the quantiles."""
 CREDIBLE = 0.97
@@ -78,7 +80,7 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
     if not signed:
         squares = _fit(forms, h, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
         parts.append(squares._replace(log_weights=squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), noise)))))
-    return _summary(parts, forms)
+    return _summary(parts, forms, abs(float(errors[np.argmin(dts)])))
 
 
 class _Forms(NamedTuple):
@@ -153,10 +155,11 @@ def _fit(forms: _Forms, h: Array, e: Array, noise: Array) -> _Fit:
     return _Fit(log_weights, scale * shrunk * along, scale * np.sqrt(shrunk * residuals / len(h)), len(h))
 
 
-def _summary(parts: list[_Fit], forms: _Forms) -> Posterior:
+def _summary(parts: list[_Fit], forms: _Forms, hidden_by: float) -> Posterior:
     """Probabilities and quantiles over all forms; parts are the fits of e and, of a metric without a sign, of e²."""
     from scipy.special import stdtr
 
+    freedom = parts[0].freedom
     top = max(float(np.max(part.log_weights)) for part in parts)
     weights = [np.exp(part.log_weights - top) for part in parts]
     # A claim is what the order is judged by, so it does not count for the order's own interval.
@@ -167,25 +170,28 @@ def _summary(parts: list[_Fit], forms: _Forms) -> Posterior:
     kept = kept[: 1 + np.searchsorted(np.cumsum(weight[kept]), (1.0 - NEGLIGIBLE_WEIGHT) * weight.sum())]
     weight, centre, width, of_square = weight[kept] / weight[kept].sum(), centre[kept], width[kept], of_square[kept]
 
-    def below(x: Array) -> Array:
-        """Probability of an asymptotic error below each x; of a norm, all that is below 0 is 0."""
+    def below(x: Array, of_size: Array) -> Array:
+        """Probability of an asymptotic error below each x, or of one that is smaller in size."""
         points = np.where(of_square, np.abs(x[:, None]) * x[:, None], x[:, None])
-        found: Array = stdtr(parts[0].freedom, (points - centre) / width) @ weight
-        return found
+        found: Array = stdtr(freedom, (points - centre) / width) @ weight
+        return np.where(of_size, found - stdtr(freedom, (-points - centre) / width) @ weight, found)
 
-    wanted = np.array([0.5 * (1.0 - CREDIBLE), 0.5, 0.5 * (1.0 + CREDIBLE)])
+    outside = 0.5 * (1.0 - CREDIBLE)
+    wanted = np.array([outside, 0.5, 1.0 - outside, CREDIBLE, 1.0 - outside])
+    of_size = np.array([False, False, False, True, True])
     reach = np.abs(centre) + 1e4 * width
     unit = float(np.min(np.where(of_square, np.sqrt(width), width)))
     # Bisection in asinh(x / unit): quantiles span many powers of ten.
-    high = np.full(3, math.asinh(float(np.max(np.where(of_square, np.sqrt(reach), reach))) / unit))
-    low = -high if len(parts) == 1 else np.zeros(3)
+    high = np.full(5, math.asinh(float(np.max(np.where(of_square, np.sqrt(reach), reach))) / unit))
+    low = -high
     for _ in range(30):
         middle = 0.5 * (low + high)
-        under = below(unit * np.sinh(middle)) < wanted
+        under = below(unit * np.sinh(middle), of_size) < wanted
         low, high = np.where(under, middle, low), np.where(under, high, middle)
-    lower, median, upper = (float(value) for value in unit * np.sinh(0.5 * (low + high)))
-    if len(parts) == 2 and below(np.zeros(1))[0] >= wanted[0]:
-        lower = 0.0
+    lower, median, upper, size, largest_size = (float(value) for value in unit * np.sinh(0.5 * (low + high)))
+    if len(parts) == 2:  # a norm that extrapolates below 0 has a limit above 0, after a minimum at finer steps
+        lower, median = max(lower, -upper, 0.0), abs(median)
+        upper = max(size if lower == 0.0 else largest_size, HIDDEN * hidden_by)
     return Posterior(median, lower, upper, *_order_interval(by_form, forms.orders))
 
 

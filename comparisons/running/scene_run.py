@@ -10,6 +10,7 @@ import numpy as np
 from comparisons.engines.base import calibrated_label
 from comparisons.judging.agreement import judge_agreement
 from comparisons.judging.convergence import (
+    ADDED_STEPS,
     ARTEFACTS,
     Claim,
     ConvergenceStudy,
@@ -35,6 +36,10 @@ from comparisons.running.start_phases import StartPhase, start_phases
 from scenarios import Scenario, Trajectory
 
 
+FEWEST_STEPS = 8
+"""A run of fewer steps is no motion to measure."""
+
+
 class Measured(NamedTuple):
     """A measurement, and the average over start phases that its value is the largest part of; None for a remark."""
 
@@ -47,6 +52,7 @@ class _Collected:
     """What a scene's run has gathered so far, engine by engine."""
 
     measured: dict[str, list[Measured]]
+    added: dict[str, list[Measured]]
     rows: list[Measurement] = field(default_factory=list)
     claims: dict[str, Claim] = field(default_factory=dict)
     trajectories: dict[TrajectoryKey, Trajectory] = field(default_factory=dict)
@@ -74,7 +80,7 @@ def run_scene(
     """
     scene = own.scene
     labels = tuple(entry.label for entry in entries)
-    found = _Collected({label: [] for label in labels})
+    found = _Collected({label: [] for label in labels}, {label: [] for label in labels})
     for dt in dts:
         phases = start_phases(scene, own.truth, dt)
         times = dt * np.arange(1 + scene.steps(dt), dtype=float)
@@ -89,6 +95,9 @@ def run_scene(
             on_progress(scene.name, entry.label, dt)
         for first, second in combinations(compared, 2):
             found.rows += _agreement(own, dt, phases, first, second)
+    if is_sufficient(sorted(dts)):
+        for entry in entries:
+            _add_steps(found, own, entry, dts, processes)
     rows = found.rows + _with_convergence(scene, found, labels, dts)
     provenance = {**stamp, "settings": found.settings}
     return Results(as_table(rows), {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance)
@@ -154,6 +163,24 @@ def _judge_metric(scene: Scenario, dt: float, label: str, metric: Metric, cases:
     return average, replace(judgement, verdict=verdict, reason=reason, cause="unresolved" if unresolved else "")
 
 
+def _add_steps(found: _Collected, own: StartPhase, entry: EngineEntry, dts: Sequence[float], processes: EngineProcesses) -> None:
+    """Measure an engine at coarser steps too, the cheapest ones, if those asked for leave open whether an error vanishes."""
+    label = entry.label
+    if label not in found.claims or not any(study.is_open for study in _studies(own.scene, found, label).values()):
+        return
+    for factor in ADDED_STEPS:
+        dt = factor * max(dts)
+        if own.scene.steps(dt) < FEWEST_STEPS:
+            return
+        phases = start_phases(own.scene, own.truth, dt)
+        times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
+        exact = [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+        engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases])
+        if _breakdown(engine_run):
+            return
+        found.added[label] += _measure(own, dt, engine_run, phases, exact, _compare(engine_run.phases, phases, exact))
+
+
 def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRun) -> None:
     """Keep what one engine gave at one time step, apart from its metrics."""
     scene, label = own.scene, engine_run.label
@@ -195,8 +222,7 @@ def _agreement(
 
 def _with_convergence(scene: Scenario, found: _Collected, labels: Sequence[str], dts: Sequence[float]) -> list[Measurement]:
     """All engines' measurements, each with its cause, followed by their orders and asymptotic errors."""
-    sufficient = is_sufficient(sorted(dts))
-    studies = {label: _studies(scene, claim, found.measured[label]) if sufficient else {} for label, claim in found.claims.items()}
+    studies = {label: _studies(scene, found, label) if is_sufficient(sorted(dts)) else {} for label in found.claims}
     rows: list[Measurement] = []
     for label in labels:
         own, twin = studies.get(label, {}), studies.get(calibrated_label(label) or "")
@@ -208,13 +234,24 @@ def _with_convergence(scene: Scenario, found: _Collected, labels: Sequence[str],
     return rows
 
 
-def _studies(scene: Scenario, claim: Claim, measured: Sequence[Measured]) -> dict[str, ConvergenceStudy]:
-    """The convergence of each metric of one engine, by metric."""
+def _studies(scene: Scenario, found: _Collected, label: str) -> dict[str, ConvergenceStudy]:
+    """The convergence of each metric of one engine, by metric; with the added steps where those asked for leave it open."""
+    claim, asked, added = found.claims[label], _series(found.measured[label]), _series(found.added[label])
+    studies = {}
+    for name, points in asked.items():
+        studies[name] = study_convergence(scene, claim, METRICS[name], points)
+        if studies[name].is_open and name in added:
+            studies[name] = study_convergence(scene, claim, METRICS[name], [*added[name], *points])
+    return studies
+
+
+def _series(measured: Sequence[Measured]) -> dict[str, list[SeriesPoint]]:
+    """The errors at each time step, by metric."""
     series: dict[str, list[SeriesPoint]] = {}
     for row, average in measured:
         if average is not None and row.metric not in ARTEFACTS:
             series.setdefault(row.metric, []).append(SeriesPoint(row.dt, row.steps, average, row.tolerance))
-    return {name: study_convergence(scene, claim, METRICS[name], points) for name, points in series.items()}
+    return series
 
 
 def _with_cause(row: Measurement, studies: Mapping[str, ConvergenceStudy]) -> Measurement:

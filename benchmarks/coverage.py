@@ -1,0 +1,228 @@
+"""How often the interval of an asymptotic error is right: `make coverage`, which writes docs/coverage.md.
+
+Synthetic series have an asymptotic error m by construction. Engines have one by a planted fault: they simulate another restitution, gravity,
+inertia or friction than the scene's, so that their error as dt → 0 is the difference between two exact solutions.
+"""
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.judging.error_budget import error_budget
+
+Array = NDArray[np.float64]
+
+ROOT = Path(__file__).parents[1]
+ONLY = sys.argv[1:]
+SERIES = 300
+LARGE = 0.5
+"""An asymptotic error larger than this share of the coarsest step's error is large."""
+
+
+class Series(NamedTuple):
+    """Errors at steps that halve, coarsest first; their noise, whether they have a sign, and the asymptotic error."""
+
+    errors: Array
+    noise: float
+    signed: bool
+    asymptotic: float
+
+
+Draw = Callable[[np.random.Generator, Array], Series]
+
+
+class Outcome(NamedTuple):
+    """One series: its asymptotic error, whether the interval contains it, the cause, and sizes relative to the finest error."""
+
+    asymptotic: float
+    is_covered: bool
+    cause: str
+    width: float
+    is_large: bool
+
+
+def limit(rng: np.random.Generator) -> float:
+    """0 in half of the cases; else of either sign and of any size from a thousandth to three times that of the leading term."""
+    return 0.0 if rng.random() < 0.5 else float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3.0, math.log10(3.0)))
+
+
+def coefficient(rng: np.random.Generator, least: float, most: float) -> float:
+    """Of either sign, its size log-uniform between two values."""
+    return float(rng.choice([-1.0, 1.0]) * math.exp(rng.uniform(math.log(least), math.log(most))))
+
+
+def powers(first: float, apart: float = 1.0, most: float = 1.0) -> Callable[[np.random.Generator, Array], Array]:
+    """Three powers of the step; the second and third have coefficients of up to `most`, the first of .3 to 3."""
+
+    def vanishing(rng: np.random.Generator, h: Array) -> Array:
+        leading = coefficient(rng, 0.3, 3.0) * h**first
+        return leading + coefficient(rng, 0.03, most) * h ** (first + apart) + coefficient(rng, 0.03, most) * h ** (first + 2.0 * apart)
+
+    return vanishing
+
+
+def logarithm(rng: np.random.Generator, h: Array) -> Array:
+    """h log h, the unit of the step unknown."""
+    return coefficient(rng, 0.3, 3.0) * h * np.log(h * math.exp(rng.uniform(-6.0, -1.0)))
+
+
+def exponential(rng: np.random.Generator, h: Array) -> Array:
+    """All powers, as of a method that gains or loses energy at each step."""
+    return np.expm1(rng.uniform(-3.0, 3.0) * h)
+
+
+def fraction(rng: np.random.Generator, h: Array) -> Array:
+    """A first-order error that saturates at coarse steps."""
+    return h / (1.0 + math.exp(rng.uniform(-2.0, 2.0)) * h)
+
+
+def sine(rng: np.random.Generator, h: Array) -> Array:
+    """A component of a vector that turns by up to 6 rad too far."""
+    return np.sin(math.exp(rng.uniform(math.log(0.1), math.log(6.0))) * h ** rng.choice([1.0, 2.0]))
+
+
+def jitter(rng: np.random.Generator, h: Array) -> Array:
+    """A first-order error whose coefficient depends on where an impact falls between two steps."""
+    return h * rng.uniform(0.5, 1.0, len(h))
+
+
+def plain(vanishing: Callable[[np.random.Generator, Array], Array]) -> Draw:
+    """m and an error that vanishes."""
+
+    def draw(rng: np.random.Generator, h: Array) -> Series:
+        m = limit(rng)
+        return Series(m + vanishing(rng, h), 0.0, True, m)
+
+    return draw
+
+
+def noisy(times: float) -> Draw:
+    """A first-order error with sampling noise of 1 to 10 % of its leading coefficient; `times` as large as stated."""
+
+    def draw(rng: np.random.Generator, h: Array) -> Series:
+        m, noise = limit(rng), 10.0 ** rng.uniform(-2.0, -1.0)
+        return Series(m + powers(1.0)(rng, h) + times * noise * rng.normal(size=len(h)), noise, True, m)
+
+    return draw
+
+
+def absolute(rng: np.random.Generator, h: Array) -> Series:
+    """The size of an error with a sign."""
+    m = limit(rng)
+    return Series(np.abs(m + powers(float(rng.choice([1.0, 2.0])))(rng, h)), 0.0, False, abs(m))
+
+
+def norm(rng: np.random.Generator, h: Array) -> Series:
+    """The length of a vector with three components."""
+    limits, share = rng.normal(size=3), limit(rng)
+    m = share * limits / np.linalg.norm(limits)
+    return Series(np.linalg.norm([part + powers(1.0)(rng, h) for part in m], axis=0), 0.0, False, abs(share))
+
+
+def maximum(rng: np.random.Generator, h: Array) -> Series:
+    """The largest of three errors, each with a limit and an order of its own."""
+    limits = [limit(rng) if rng.random() < 0.5 else 0.0 for _ in range(3)]
+    errors = [np.abs(m + powers(float(rng.choice([1.0, 2.0])))(rng, h)) for m in limits]
+    return Series(np.max(errors, axis=0), 0.0, False, float(np.max(np.abs(limits))))
+
+
+def angle(rng: np.random.Generator, h: Array) -> Series:
+    """The angle of a rotation by m + C hᵖ, which cannot exceed π; angles near π are not usable."""
+    m, order = abs(limit(rng)), float(rng.choice([1.0, 2.0]))
+    turned = m + math.exp(rng.uniform(math.log(0.1), math.log(12.0))) * h**order
+    found = np.abs((turned + math.pi) % (2.0 * math.pi) - math.pi)
+    return Series(np.where(found > 0.9 * math.pi, math.nan, found), 0.0, False, m)
+
+
+FAMILIES: dict[str, Draw] = {
+    **{f"order {p}": plain(powers(float(p))) for p in (1, 2, 3, 4)},
+    "orders 1, 2 and 3 mixed": plain(powers(1.0, most=3.0)),
+    "orders 2 and 4": plain(powers(2.0, 2.0)),
+    "order 1.5": plain(powers(1.5)),
+    "h log h": plain(logarithm),
+    "angles that saturate at π": angle,
+    "sampling noise": noisy(1.0),
+    "absolute values": absolute,
+    "norms of vectors": norm,
+    "maxima": maximum,
+}
+OTHERS: dict[str, Draw] = {
+    "order 1/2": plain(powers(0.5, 0.5)),
+    "exponentials": plain(exponential),
+    "h / (1 + c h)": plain(fraction),
+    "sines of up to 6 rad": plain(sine),
+    "order 1 with jitter of a half": plain(jitter),
+    "noise twice as large as stated": noisy(2.0),
+}
+
+
+def outcome(series: Series, dts: Array) -> Outcome:
+    """What the error budget says about a series."""
+    found = error_budget(dts, series.errors, resolution=series.noise, signed=series.signed)
+    usable = series.errors[np.isfinite(series.errors)]
+    coarsest, finest = (abs(float(usable[end])) for end in (0, -1)) if len(usable) else (math.nan, math.nan)
+    slack = 1e-9 * float(np.nanmax(np.abs(series.errors), initial=0.0))
+    is_covered = found.lower - slack <= series.asymptotic <= found.upper + slack
+    width = (found.upper - found.lower) / finest if finest else math.nan
+    return Outcome(series.asymptotic, is_covered, found.cause, width, abs(series.asymptotic) > LARGE * coarsest)
+
+
+def outcomes(name: str, count: int, steps: int) -> list[Outcome]:
+    """What the error budget says about many series of a family; those that give no interval are left out."""
+    rng, h = np.random.default_rng([steps, *name.encode()]), 0.5 ** np.arange(steps)
+    found = [outcome({**FAMILIES, **OTHERS}[name](rng, h), 4e-3 * h) for _ in range(count)]
+    return [one for one in found if not math.isnan(one.width)]
+
+
+def row(name: str, steps: int, found: list[Outcome]) -> list[str]:
+    """A row of the table."""
+    decided = [one for one in found if one.cause != "unresolved"]
+    zeros, large = [one for one in found if one.asymptotic == 0.0], [one for one in found if one.is_large]
+    false, missed = (one.cause == "model" for one in zeros), (one.cause == "discretisation" for one in large)
+    shares = [
+        _share(one.is_covered for one in found),
+        _share(one.is_covered for one in decided),
+        _share(one.cause == "unresolved" for one in found),
+        _share(false),
+        _share(missed),
+    ]
+    return [name, str(steps), str(len(found)), *shares, f"{np.median([one.width for one in found]):.2g}"]
+
+
+def _share(hits: "Iterator[bool]") -> str:
+    counted = list(hits)
+    return f"{100.0 * np.mean(counted):.1f} %" if counted else "–"
+
+
+HEAD = ["family", "time steps", "series", "covered", "of those decided", "unresolved", "false model", "large missed", "median width"]
+
+
+def main() -> None:
+    """Print the table and write it to docs/coverage.md."""
+    jobs = [(name, steps) for name in (ONLY or (*FAMILIES, *OTHERS)) for steps in (3, 5)]
+    with ProcessPoolExecutor() as pool:
+        tables = list(pool.map(_row_of, jobs))
+    lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
+    for number, cells in enumerate(tables):
+        if number == 2 * len(FAMILIES):
+            lines += ["", "Families that the forms do not contain:", "", *lines[:2]]
+        lines.append("| " + " | ".join(cells) + " |")
+    sys.stdout.write("\n".join(lines) + "\n")
+    page = ROOT / "docs/coverage.md"
+    text = page.read_text(encoding="utf-8")
+    start, end = text.index("<!-- table -->"), text.index("<!-- end -->")
+    page.write_text(text[:start] + "<!-- table -->\n" + "\n".join(lines) + "\n" + text[end:], encoding="utf-8")
+
+
+def _row_of(job: tuple[str, int]) -> list[str]:
+    return row(*job, outcomes(job[0], SERIES, job[1]))
+
+
+if __name__ == "__main__":
+    main()

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from comparisons.engines.base import Simulation as Simulation
     from comparisons.engines.registry import engine as engine
     from comparisons.engines.registry import engine_names as engine_names
+    from comparisons.judging.error_budget import ErrorBudget as ErrorBudget
+    from comparisons.judging.error_budget import error_budget as error_budget
     from comparisons.measuring.metrics import METRICS as METRICS
     from comparisons.regressions.baseline import Baseline as Baseline
     from comparisons.regressions.baseline import accept as accept
@@ -82,6 +84,7 @@ _HOMES = {
         "Simulation",
     ),
     "comparisons.engines.registry": ("engine", "engine_names"),
+    "comparisons.judging.error_budget": ("ErrorBudget", "error_budget"),
     "comparisons.measuring.metrics": ("METRICS",),
     "comparisons.regressions.baseline": ("Baseline", "accept", "load_baseline", "write_baseline"),
     "comparisons.regressions.checking": ("check",),

@@ -1,7 +1,7 @@
 """Convergence over several time steps: of each error the observed order, the asymptotic error as dt → 0, and the cause.
 
 Every engine must meet this, whatever a scene expects besides: the interval of its asymptotic error contains 0, and that of its order
-reaches the order that it claims. A known fault, expected of this engine by name, passes as long as the asymptotic error is the expected one.
+reaches the order that it claims. A known fault, expected of this engine by name, passes while the asymptotic error is the expected one.
 """
 
 import math

@@ -4,8 +4,8 @@ An error that vanishes as dt → 0 is a discretisation error; one that does not 
 interval that contains it in at least 95 % of cases (docs/coverage.md), and the cause follows from the interval alone:
 
     model            the interval excludes 0
-    discretisation   the interval contains 0 and nothing larger than is allowed: the error at the finest step, or a sixteenth of that at
-                     the coarsest, but at most half of that at the coarsest; and the likeliest value is at most half of what is allowed
+    discretisation   the interval contains 0 and nothing larger than is allowed: the error at the finest step, or a 64th of that at
+                     the coarsest of the three finest, but at most half of it; and the likeliest value is at most half of what is allowed
     rounding         no error is larger than rounding
     unresolved       everything else: the time steps do not decide it
 """
@@ -28,7 +28,7 @@ MOST_TIME_STEPS = 5
 """Coarser ones say less and less about dt → 0."""
 SMALLEST_RATIO = 3.99
 """Extrapolation needs three time steps that span a factor of four."""
-SHARE_OF_COARSEST = 1.0 / 16.0
+SHARE_OF_COARSEST = 1.0 / 64.0
 LARGEST_SHARE_OF_COARSEST = 0.5
 ABOVE_NOISE = 3.0
 """Errors that are larger than this many times their noise have a size that an order can be fitted to."""
@@ -125,7 +125,7 @@ def _cause(e: Array, found: Posterior, floor: float) -> Cause:
     """The cause that the posterior of the asymptotic error implies; errors coarsest first."""
     if found.lower > floor or found.upper < -floor:
         return "model"
-    coarsest, finest = abs(float(e[0])), abs(float(e[-1]))
+    coarsest, finest = float(np.min(np.abs(e[[0, -FEWEST_TIME_STEPS]]))), abs(float(e[-1]))
     allowed = max(min(max(finest, SHARE_OF_COARSEST * coarsest), LARGEST_SHARE_OF_COARSEST * coarsest), floor)
     reach = max(-found.lower, found.upper, 2.0 * abs(found.median))
     return "discretisation" if reach <= allowed else "unresolved"

@@ -7,15 +7,16 @@ order p, the latter a discrepancy that no smooth series has, such as a kink of a
 not known is averaged over: p, r, d and ρ over the values below, s with the density 1/s, and m, which is normal with a standard deviation of
 s times a value on a logarithmic grid. Given these, everything is Student-t, with closed forms.
 
-The error of a signed metric is e itself. One that cannot be negative is a norm, |m + …|, whose square is a smooth function of the step where
-the norm itself has a kink; then e and e² have even odds of being the series above.
+The error of a signed metric is e itself. One that cannot be negative is a norm, |m + …|, whose square is a smooth function of the step
+where the norm itself has a kink; then e and e² have even odds of being the series above.
 
 Source: the model average is in the manner of C. J. Oates et al., Probabilistic Richardson Extrapolation, J. R. Stat. Soc. B (2024), and of
-    L. Eça & M. Hoekstra, J. Comput. Phys. 262 (2014), who take the spread between forms for the effect of the form. The weights of the forms
-    and the credible level are dropspin's own; docs/coverage.md shows how often the interval is right.
+    L. Eça & M. Hoekstra, J. Comput. Phys. 262 (2014), who take the spread between forms for the effect of the form. The weights of the
+    forms and the credible level are dropspin's own; docs/coverage.md shows how often the interval is right.
 """
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -28,7 +29,7 @@ ORDERS = np.arange(0.5, 6.01, 0.5)
 """Orders that an error may start with. Half of the weight is on the integers up to 4, the orders that methods have."""
 EACH_ORDER_FURTHER = 0.5
 """Weight of an order relative to the one that is nearer to 1 by 1: what looks like a high order may be lower powers that cancel."""
-TERM_RATIOS = (0.3,1.0,3.0)
+TERM_RATIOS = (0.3, 1.0, 3.0)
 """r: the next power's coefficient relative to the one before, at the coarsest step."""
 TERM_DISTANCES = {1.0: 0.6, 2.0: 0.15, 0.5: 0.15}
 """d, from one power to the next, and its probability: all powers, even powers only, half powers too."""
@@ -42,6 +43,7 @@ HIDDEN = 0.5
 """A norm, or the largest of several errors, does not show one of them that is smaller than this share of it."""
 NEGLIGIBLE_WEIGHT = 1e-3
 """The least likely forms, with this much weight together, are left out of the quantiles."""
+HALVINGS = 30
 CREDIBLE = 0.97
 """Probability of the interval within the model: more than the 95 % that are stated, for series that no form describes."""
 
@@ -156,43 +158,60 @@ def _fit(forms: _Forms, h: Array, e: Array, noise: Array) -> _Fit:
 
 
 def _summary(parts: list[_Fit], forms: _Forms, hidden_by: float) -> Posterior:
-    """Probabilities and quantiles over all forms; parts are the fits of e and, of a metric without a sign, of e²."""
-    from scipy.special import stdtr
-
-    freedom = parts[0].freedom
+    """Quantiles over all forms; parts are the fits of e and, of a metric without a sign, of e²."""
     top = max(float(np.max(part.log_weights)) for part in parts)
     weights = [np.exp(part.log_weights - top) for part in parts]
-    # A claim is what the order is judged by, so it does not count for the order's own interval.
-    by_form = np.exp(forms.without_claim) * np.sum([np.sum(one, axis=1) for one in weights], axis=0)
-    weight, centre, width = (np.concatenate([np.ravel(one) for one in ones]) for ones in zip(*[(w, *part[1:3]) for w, part in zip(weights, parts, strict=True)], strict=True))
-    of_square = np.repeat(np.arange(len(parts)) == 1, [one.size for one in weights])
-    kept = np.argsort(weight)[::-1]
-    kept = kept[: 1 + np.searchsorted(np.cumsum(weight[kept]), (1.0 - NEGLIGIBLE_WEIGHT) * weight.sum())]
-    weight, centre, width, of_square = weight[kept] / weight[kept].sum(), centre[kept], width[kept], of_square[kept]
+    weight, centre, width = (np.concatenate([one.ravel() for one in ones]) for ones in (weights, *_columns(parts)))
+    is_square = np.repeat(np.arange(len(parts)) == 1, [one.size for one in weights])
+    likeliest = np.argsort(weight)[::-1]
+    kept = likeliest[: 1 + np.searchsorted(np.cumsum(weight[likeliest]), (1.0 - NEGLIGIBLE_WEIGHT) * weight.sum())]
+    weight, centre, width, is_square = weight[kept] / weight[kept].sum(), centre[kept], width[kept], is_square[kept]
 
-    def below(x: Array, of_size: Array) -> Array:
-        """Probability of an asymptotic error below each x, or of one that is smaller in size."""
-        points = np.where(of_square, np.abs(x[:, None]) * x[:, None], x[:, None])
-        found: Array = stdtr(freedom, (points - centre) / width) @ weight
-        return np.where(of_size, found - stdtr(freedom, (-points - centre) / width) @ weight, found)
+    def below(x: Array) -> Array:
+        """Probability of an asymptotic error below each x."""
+        points = np.where(is_square, np.abs(x[:, None]) * x[:, None], x[:, None])
+        found: Array = student_t(parts[0].freedom, (points - centre) / width) @ weight
+        return found
 
+    reach = np.where(is_square, np.sqrt(np.abs(centre) + 1e4 * width), np.abs(centre) + 1e4 * width)
+    unit = float(np.min(np.where(is_square, np.sqrt(width), width)))
     outside = 0.5 * (1.0 - CREDIBLE)
-    wanted = np.array([outside, 0.5, 1.0 - outside, CREDIBLE, 1.0 - outside])
-    of_size = np.array([False, False, False, True, True])
-    reach = np.abs(centre) + 1e4 * width
-    unit = float(np.min(np.where(of_square, np.sqrt(width), width)))
-    # Bisection in asinh(x / unit): quantiles span many powers of ten.
-    high = np.full(5, math.asinh(float(np.max(np.where(of_square, np.sqrt(reach), reach))) / unit))
-    low = -high
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        under = below(unit * np.sinh(middle), of_size) < wanted
-        low, high = np.where(under, middle, low), np.where(under, high, middle)
-    lower, median, upper, size, largest_size = (float(value) for value in unit * np.sinh(0.5 * (low + high)))
+    lower, median, upper = _quantiles(below, (outside, 0.5, 1.0 - outside), unit, float(np.max(reach)))
     if len(parts) == 2:  # a norm that extrapolates below 0 has a limit above 0, after a minimum at finer steps
         lower, median = max(lower, -upper, 0.0), abs(median)
-        upper = max(size if lower == 0.0 else largest_size, HIDDEN * hidden_by)
+        [size] = _quantiles(lambda x: below(x) - below(-x), (CREDIBLE if lower == 0.0 else 1.0 - outside,), unit, float(np.max(reach)))
+        upper = max(size, HIDDEN * hidden_by)
+    # A claim is what the order is judged by, so it does not count for the order's own interval.
+    by_form = np.exp(forms.without_claim) * np.sum([np.sum(one, axis=1) for one in weights], axis=0)
     return Posterior(median, lower, upper, *_order_interval(by_form, forms.orders))
+
+
+def _columns(parts: list[_Fit]) -> tuple[list[Array], list[Array]]:
+    return [part.centres for part in parts], [part.widths for part in parts]
+
+
+def student_t(freedom: int, x: Array) -> Array:
+    """The distribution function of Student's t with 3, 4 or 5 degrees of freedom: closed forms, twenty times faster than the general one.
+
+    Source: M. Abramowitz & I. A. Stegun, Handbook of Mathematical Functions (1964), 26.7.3 and 26.7.4.
+    """
+    tangent = x / math.sqrt(freedom)
+    cosine2 = 1.0 / (1.0 + tangent**2)
+    if freedom == 4:
+        return 0.5 + 0.5 * tangent * np.sqrt(cosine2) * (1.0 + 0.5 * cosine2)
+    more = 1.0 + (0.0 if freedom == 3 else 2.0 / 3.0) * cosine2
+    return 0.5 + (np.arctan(tangent) + tangent * cosine2 * more) / math.pi
+
+
+def _quantiles(below: Callable[[Array], Array], wanted: tuple[float, ...], unit: float, reach: float) -> list[float]:
+    """Quantiles of a distribution between ± reach, by bisection in asinh(x / unit), as they may span many powers of ten."""
+    high = np.full(len(wanted), math.asinh(reach / unit))
+    low = -high
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        under = below(unit * np.sinh(middle)) < np.array(wanted)
+        low, high = np.where(under, middle, low), np.where(under, high, middle)
+    return [float(x) for x in unit * np.sinh(0.5 * (low + high))]
 
 
 def _order_interval(weights: Array, orders: Array) -> tuple[float, float]:

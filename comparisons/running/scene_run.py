@@ -35,9 +35,8 @@ from comparisons.running.recording import Breakdown, divergence
 from comparisons.running.start_phases import StartPhase, start_phases
 from scenarios import Scenario, Trajectory
 
-
 FEWEST_STEPS = 8
-"""A run of fewer steps is no motion to measure."""
+"""A run of fewer steps is not worth adding."""
 
 
 class Measured(NamedTuple):
@@ -52,7 +51,7 @@ class _Collected:
     """What a scene's run has gathered so far, engine by engine."""
 
     measured: dict[str, list[Measured]]
-    added: dict[str, list[Measured]]
+    studies: dict[str, dict[str, ConvergenceStudy]] = field(default_factory=dict)
     rows: list[Measurement] = field(default_factory=list)
     claims: dict[str, Claim] = field(default_factory=dict)
     trajectories: dict[TrajectoryKey, Trajectory] = field(default_factory=dict)
@@ -80,7 +79,7 @@ def run_scene(
     """
     scene = own.scene
     labels = tuple(entry.label for entry in entries)
-    found = _Collected({label: [] for label in labels}, {label: [] for label in labels})
+    found = _Collected({label: [] for label in labels})
     for dt in dts:
         phases = start_phases(scene, own.truth, dt)
         times = dt * np.arange(1 + scene.steps(dt), dtype=float)
@@ -97,8 +96,9 @@ def run_scene(
             found.rows += _agreement(own, dt, phases, first, second)
     if is_sufficient(sorted(dts)):
         for entry in entries:
-            _add_steps(found, own, entry, dts, processes)
-    rows = found.rows + _with_convergence(scene, found, labels, dts)
+            if entry.label in found.claims:
+                found.studies[entry.label] = _study(found, own, entry, max(dts), processes)
+    rows = found.rows + _with_convergence(found, labels)
     provenance = {**stamp, "settings": found.settings}
     return Results(as_table(rows), {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance)
 
@@ -163,22 +163,29 @@ def _judge_metric(scene: Scenario, dt: float, label: str, metric: Metric, cases:
     return average, replace(judgement, verdict=verdict, reason=reason, cause="unresolved" if unresolved else "")
 
 
-def _add_steps(found: _Collected, own: StartPhase, entry: EngineEntry, dts: Sequence[float], processes: EngineProcesses) -> None:
-    """Measure an engine at coarser steps too, the cheapest ones, if those asked for leave open whether an error vanishes."""
-    label = entry.label
-    if label not in found.claims or not any(study.is_open for study in _studies(own.scene, found, label).values()):
-        return
-    for factor in ADDED_STEPS:
-        dt = factor * max(dts)
-        if own.scene.steps(dt) < FEWEST_STEPS:
-            return
-        phases = start_phases(own.scene, own.truth, dt)
-        times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
-        exact = [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
-        engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases])
-        if _breakdown(engine_run):
-            return
-        found.added[label] += _measure(own, dt, engine_run, phases, exact, _compare(engine_run.phases, phases, exact))
+def _study(
+    found: _Collected, own: StartPhase, entry: EngineEntry, coarsest: float, processes: EngineProcesses
+) -> dict[str, ConvergenceStudy]:
+    """The convergence of each metric of one engine, by metric; with coarser steps where those asked for leave it open."""
+    claim, series = found.claims[entry.label], _series(found.measured[entry.label])
+    studies = {name: study_convergence(own.scene, claim, METRICS[name], points) for name, points in series.items()}
+    if any(study.is_open for study in studies.values()):
+        coarser = _series([one for factor in ADDED_STEPS for one in _measured_at(own, entry, factor * coarsest, processes)])
+        for name in coarser:
+            if name in studies and studies[name].is_open:
+                studies[name] = study_convergence(own.scene, claim, METRICS[name], [*coarser[name], *series[name]])
+    return studies
+
+
+def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: EngineProcesses) -> list[Measured]:
+    """Every metric of one engine at a step that was not asked for; nothing if it breaks down there."""
+    if own.scene.steps(dt) < FEWEST_STEPS:
+        return []
+    phases = start_phases(own.scene, own.truth, dt)
+    times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
+    exact = [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases])
+    return [] if _breakdown(engine_run) else _measure(own, dt, engine_run, phases, exact, _compare(engine_run.phases, phases, exact))
 
 
 def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRun) -> None:
@@ -220,29 +227,17 @@ def _agreement(
             yield case.measurement("agreement", name, ENSEMBLE_METRICS[name].unit, judgement, other.label)
 
 
-def _with_convergence(scene: Scenario, found: _Collected, labels: Sequence[str], dts: Sequence[float]) -> list[Measurement]:
+def _with_convergence(found: _Collected, labels: Sequence[str]) -> list[Measurement]:
     """All engines' measurements, each with its cause, followed by their orders and asymptotic errors."""
-    studies = {label: _studies(scene, found, label) if is_sufficient(sorted(dts)) else {} for label in found.claims}
     rows: list[Measurement] = []
     for label in labels:
-        own, twin = studies.get(label, {}), studies.get(calibrated_label(label) or "")
+        own, twin = found.studies.get(label, {}), found.studies.get(calibrated_label(label) or "")
         if twin is not None:
             own = {name: attributed_to_setting(study, twin.get(name)) for name, study in own.items()}
         measurements = [one.measurement for one in found.measured[label]]
         rows += [_with_cause(one, own) for one in measurements]
         rows += _study_rows(measurements, own)
     return rows
-
-
-def _studies(scene: Scenario, found: _Collected, label: str) -> dict[str, ConvergenceStudy]:
-    """The convergence of each metric of one engine, by metric; with the added steps where those asked for leave it open."""
-    claim, asked, added = found.claims[label], _series(found.measured[label]), _series(found.added[label])
-    studies = {}
-    for name, points in asked.items():
-        studies[name] = study_convergence(scene, claim, METRICS[name], points)
-        if studies[name].is_open and name in added:
-            studies[name] = study_convergence(scene, claim, METRICS[name], [*added[name], *points])
-    return studies
 
 
 def _series(measured: Sequence[Measured]) -> dict[str, list[SeriesPoint]]:

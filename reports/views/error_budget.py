@@ -56,9 +56,10 @@ def error_budgets(results: Results, scene_name: str) -> list[BudgetRow]:
 
 
 def _row(row: Mapping[Hashable, Any]) -> BudgetRow:
-    limit = tuple(float(row[f"{name}_of_limit"]) for name in ("value", "lower", "upper"))
-    cause = "unresolved" if math.isnan(limit[0]) else str(row["cause_of_limit"])
-    return BudgetRow(row["engine"], row["metric"], row["unit"], row["dt"], float(row["value"]), *limit, cause, _sentence(row, cause))
+    limit, lower, upper = (float(row[f"{name}_of_limit"]) for name in ("value", "lower", "upper"))
+    cause = "unresolved" if math.isnan(limit) else str(row["cause_of_limit"])
+    sentence = _sentence(row, cause)
+    return BudgetRow(row["engine"], row["metric"], row["unit"], row["dt"], float(row["value"]), limit, lower, upper, cause, sentence)
 
 
 def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:

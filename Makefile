@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: report test test-browser test-all faults bench examples docs lint clean
+.PHONY: report test test-browser test-all faults coverage bench examples docs lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
@@ -19,6 +19,9 @@ test-all: lint test test-browser docs ## everything, and the studies that take m
 
 faults: $(VENV)/.installed-dev        ## engines with one planted fault each against the core catalogue: docs/faults.md
 	$(BIN)/python tests/support/fault_suite.py
+
+coverage: $(VENV)/.installed-dev      ## how often the intervals of asymptotic errors are right: docs/coverage.md
+	$(BIN)/python tests/support/interval_coverage.py
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py

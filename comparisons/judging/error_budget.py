@@ -33,6 +33,9 @@ LARGEST_SHARE_OF_COARSEST = 0.5
 ABOVE_NOISE = 3.0
 """Errors that are larger than this many times their noise have a size that an order can be fitted to."""
 
+SAME_SLOPE = 0.5
+"""Slopes between neighbouring steps that differ by less belong to one power of the step."""
+
 
 @dataclass(frozen=True)
 class ErrorBudget:
@@ -132,9 +135,15 @@ def _cause(e: Array, found: Posterior, floor: float) -> Cause:
 
 
 def _fitted_order(h: Array, e: Array, limit: float, small: Array) -> tuple[float, tuple[float, ...]]:
-    """The slope of the error, without its limit, over the three finest steps at which it is not noise; and these steps."""
+    """The slope of the error, without its limit, over the three finest steps at which it is not noise; and these steps.
+
+    Errors that noise or rounding could have caused are no noise if they follow one power of the step.
+    """
     rest = e - limit
     clear = np.flatnonzero(np.abs(rest) > ABOVE_NOISE * small)[-FEWEST_TIME_STEPS:]
+    if len(clear) < 2 and (rest != 0.0).all():
+        slopes = np.diff(np.log(np.abs(rest))) / np.diff(np.log(h))
+        clear = np.arange(len(h) - FEWEST_TIME_STEPS, len(h)) if np.ptp(slopes) < SAME_SLOPE and np.min(slopes) > 0.0 else clear
     if len(clear) < 2 or abs(np.sign(rest[clear]).sum()) < len(clear):
         return math.nan, ()
     slope = float(np.polyfit(np.log(h[clear]), np.log(np.abs(rest[clear])), 1)[0])

@@ -181,8 +181,8 @@ def _summary(parts: list[_Fit], forms: _Forms, hidden_by: float) -> Posterior:
         lower, median = max(lower, -upper, 0.0), abs(median)
         [size] = _quantiles(lambda x: below(x) - below(-x), (CREDIBLE if lower == 0.0 else 1.0 - outside,), unit, float(np.max(reach)))
         upper = max(size, HIDDEN * hidden_by)
-    # A claim is what the order is judged by, so it does not count for the order's own interval.
-    by_form = np.exp(forms.without_claim) * np.sum([np.sum(one, axis=1) for one in weights], axis=0)
+    # A claim is what the order is judged by, so it does not count for the order's own interval; nor does e², which has another order.
+    by_form = np.exp(forms.without_claim) * np.sum(weights[0], axis=1)
     return Posterior(median, lower, upper, *_order_interval(by_form, forms.orders))
 
 

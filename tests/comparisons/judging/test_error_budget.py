@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import coverage
+from support import interval_coverage
 
 import dropspin as ds
 from comparisons.judging.error_budget import error_budget
@@ -199,7 +199,7 @@ def test_budget_does_not_depend_on_units(decades, sign):
 )
 def test_intervals_contain_the_asymptotic_error(family, steps):
     """In at least 95 % of series; 60 series may fall short of that by chance, to 88 %. No false model error, no large error missed."""
-    found = coverage.outcomes(family, 60, steps)
+    found = interval_coverage.outcomes(family, 60, steps)
     assert sum(one.is_covered for one in found) >= 0.88 * len(found)
     assert not any(one.cause == "model" for one in found if one.asymptotic == 0.0)
     assert not any(one.cause == "discretisation" for one in found if one.is_large)

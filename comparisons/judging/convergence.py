@@ -82,22 +82,23 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
     if order is not None:
         order = replace(order, tolerance=_order_tolerance(found, dts, errors, np.array([point.tolerance for point in series])))
     if limit is not None:
-        limit = with_limitations(replace(limit, tolerance=found.upper - found.lower), metric.name, claim.limitations)
+        # What the steps leave open is not compared with another run's.
+        tolerance = math.nan if found.cause == "unresolved" else found.upper - found.lower
+        limit = with_limitations(replace(limit, tolerance=tolerance), metric.name, claim.limitations)
     is_open = found.cause == "unresolved" and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
     return ConvergenceStudy(found.cause, order, limit, is_open)
 
 
 def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:
-    """A study of an engine with default settings; a model error that the calibrated engine does not have becomes a setting error."""
-    if study.cause != "model" or calibrated is None or calibrated.asymptotic_error is None:
+    """A study of an engine with default settings; a model error that the interval of the calibrated engine excludes becomes a setting error."""
+    if study.cause != "model" or study.asymptotic_error is None or calibrated is None or calibrated.asymptotic_error is None:
         return study
-    if calibrated.asymptotic_error.cause not in ("discretisation", "rounding"):
+    own, other = study.asymptotic_error, calibrated.asymptotic_error
+    if max(-other.lower, other.upper) >= max(own.lower, -own.upper):
         return study
-    order, limit = study.order, study.asymptotic_error
-    if limit is not None:
-        cured = ", but the calibrated profile does: it is a setting" if limit.verdict == "failed" else ""
-        limit = replace(limit, cause="setting", reason=limit.reason + cured)
-    return ConvergenceStudy("setting", None if order is None else replace(order, cause="setting"), limit)
+    cured = ", but the calibrated profile does: it is a setting" if own.verdict == "failed" else ""
+    order = None if study.order is None else replace(study.order, cause="setting")
+    return ConvergenceStudy("setting", order, replace(own, cause="setting", reason=own.reason + cured))
 
 
 def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> tuple[Array, Array, Array, Array]:

@@ -90,7 +90,7 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
 
 
 def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:
-    """A study of an engine with default settings; a model error that the interval of the calibrated engine excludes becomes a setting error."""
+    """A study of default settings; a model error that the interval of the calibrated engine excludes becomes a setting error."""
     if study.cause != "model" or study.asymptotic_error is None or calibrated is None or calibrated.asymptotic_error is None:
         return study
     own, other = study.asymptotic_error, calibrated.asymptotic_error

@@ -28,8 +28,8 @@ class Judgement:
     Attributes:
         value: The value; NaN where there is none.
         verdict: The verdict.
-        lower: Least value allowed; NaN where there is none.
-        upper: Largest value allowed; NaN where there is none.
+        lower: Least value allowed, or the lower end of the 95 % interval of an order or an asymptotic error; NaN where there is none.
+        upper: Largest value allowed, or the upper end of that interval; NaN where there is none.
         cause: What the error is attributed to.
         reason: Why, in words.
         tolerance: How far the value may move between two runs before it counts as changed; NaN where it is not compared.

@@ -3,7 +3,7 @@
     metrics              rounding over the steps, and sampling noise: one of the start phases may fall into the neighbouring step.
                          With one start, or a body that starts on the floor: the effect of perturbing the starts by some ulp instead
     orders               the change when the errors that they were fitted to move by their tolerances
-    asymptotic errors    the same, and at least their own uncertainty
+    asymptotic errors    the width of their interval; those that the time steps leave open are not compared
     ensemble means       the confidence interval of the difference between two draws
 
 No tolerance is a share of the value: an engine that is exact to 1e-12 is compared to 1e-12.

@@ -27,8 +27,8 @@ class Measurement:
         unit: SI unit; '1' for a ratio.
         kind: What the value is compared with.
         truth: Name of the exact solution; for an agreement the other engine's label.
-        lower: Least value allowed; NaN where there is none.
-        upper: Largest value allowed; NaN where there is none.
+        lower: Least value allowed, or the lower end of the 95 % interval of an order or an asymptotic error; NaN where there is none.
+        upper: Largest value allowed, or the upper end of that interval; NaN where there is none.
         tolerance: How far the value may move between two runs before it counts as changed, in `unit`; NaN where it is not compared.
         verdict: The verdict.
         cause: What the error is attributed to.

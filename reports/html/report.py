@@ -103,9 +103,7 @@ def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
         order, asymptotic = (rows[rows["kind"] == kind] for kind in STUDIES)
         p, m = (float(part["value"].iloc[0]) if len(part) else float("nan") for part in (order, asymptotic))
         reasons = [f"order {p:.3f}, {reason}" for reason in order["reason"]]
-        reasons += [
-            f"{m:.3g} ± {upper:.1g} as dt → 0, {reason}" for upper, reason in zip(asymptotic["upper"], asymptotic["reason"], strict=True)
-        ]
+        reasons += [f"{m:.3g} ({row.lower:.3g} … {row.upper:.3g}) as dt → 0, {row.reason}" for row in asymptotic.itertuples()]
         cause = str(rows["cause"].iloc[0])
         verdict = "failed" if (rows["verdict"] == "failed").any() else str(rows["verdict"].iloc[-1])
         trends[str(metric), str(engine)] = {

@@ -78,14 +78,14 @@ def _failure(results: Results, group: list[Row], baseline: str | None) -> Failur
 
 
 def what_fails(row: Row) -> str:
-    """Value, bound and reason of a failed row."""
+    """Value, bound or interval, and reason of a failed row."""
     if not row["metric"]:
         return str(row["reason"]) if row["verdict"] in FAILURES else f"{word(row['verdict'])}. {row['reason']}"
     what = subject(row["metric"], row["kind"], row["truth"])
     if row["kind"] == "baseline":  # with more digits than elsewhere: tolerances are small
         return f"{what} is {row['value']:.6g}, {row['reason']}"
-    allowed = bound(row["lower"], row["upper"])
-    expected = f", expected {allowed}" if allowed else ""
+    limits = bound(row["lower"], row["upper"])
+    expected = f", {'95 % interval' if row['kind'] in STUDIES else 'expected'} {limits}" if limits else ""
     value = "undefined" if math.isnan(row["value"]) else formatted(row["value"])
     return f"{what} is {value}{expected}: {row['reason']}"
 

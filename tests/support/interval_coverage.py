@@ -18,7 +18,7 @@ from comparisons.judging.error_budget import error_budget
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).parents[2]
-SERIES = 1000
+SERIES = 400
 LARGE = 0.5
 """An asymptotic error larger than this share of the coarsest step's error is large."""
 

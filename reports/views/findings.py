@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import pandas as pd
+
 from comparisons.engines.base import calibrated_label
 from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
@@ -128,6 +130,12 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
     return f"All {judged} checks pass: {both}."
 
 
+def _undecided(limits: pd.DataFrame) -> list[str]:
+    """The metrics, once for each scene, whose interval contains 0 and values that are not negligible, so that no cause is stated."""
+    reach = limits[["lower", "upper"]].abs().max(axis=1)
+    return [metric.replace("_", " ") for metric in limits.loc[(limits["cause"] == "unresolved") & (reach > NEGLIGIBLE), "metric"]]
+
+
 def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
     """The main finding about each engine.
 
@@ -152,7 +160,11 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
                 f"{engine}: setting error in {len(settings[engine])} of {total} scenes ({', '.join(settings[engine])}): "
                 "an error that does not vanish as dt → 0, but that the calibrated profile does not have."
             )
-        if total and not stuck and not settings[engine]:
+        opened = _undecided(limits[limits["engine"] == engine])
+        if total and not stuck and not settings[engine] and not opened:
             where = f" in all {total} scenes" if total > 1 else ""
             sentences.append(f"{engine}: errors above {NEGLIGIBLE:g} vanish as dt → 0{where}.")
+        elif opened:
+            none = "" if stuck or settings[engine] else "no model error; "
+            sentences.append(f"{engine}: {none}undecided by these time steps: {', '.join(dict.fromkeys(opened))}.")
     return sentences + [comparison.sentence for comparison in profiles]

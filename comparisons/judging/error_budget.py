@@ -29,10 +29,10 @@ MOST_TIME_STEPS = 5
 SMALLEST_RATIO = 3.99
 """Extrapolation needs three time steps that span a factor of four."""
 SHARE_OF_COARSEST = 1.0 / 64.0
+"""By this an error of third order falls over three steps that halve; of higher orders the interval is wider than the finest error."""
 LARGEST_SHARE_OF_COARSEST = 0.5
 ABOVE_NOISE = 3.0
 """Errors that are larger than this many times their noise have a size that an order can be fitted to."""
-
 SAME_SLOPE = 0.5
 """Slopes between neighbouring steps that differ by less belong to one power of the step."""
 

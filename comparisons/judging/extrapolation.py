@@ -161,7 +161,8 @@ def _summary(parts: list[_Fit], forms: _Forms, hidden_by: float) -> Posterior:
     """Quantiles over all forms; parts are the fits of e and, of a metric without a sign, of e²."""
     top = max(float(np.max(part.log_weights)) for part in parts)
     weights = [np.exp(part.log_weights - top) for part in parts]
-    weight, centre, width = (np.concatenate([one.ravel() for one in ones]) for ones in (weights, *_columns(parts)))
+    columns = (weights, [part.centres for part in parts], [part.widths for part in parts])
+    weight, centre, width = (np.concatenate([one.ravel() for one in column]) for column in columns)
     is_square = np.repeat(np.arange(len(parts)) == 1, [one.size for one in weights])
     likeliest = np.argsort(weight)[::-1]
     kept = likeliest[: 1 + np.searchsorted(np.cumsum(weight[likeliest]), (1.0 - NEGLIGIBLE_WEIGHT) * weight.sum())]
@@ -184,10 +185,6 @@ def _summary(parts: list[_Fit], forms: _Forms, hidden_by: float) -> Posterior:
     # A claim is what the order is judged by, so it does not count for the order's own interval; nor does e², which has another order.
     by_form = np.exp(forms.without_claim) * np.sum(weights[0], axis=1)
     return Posterior(median, lower, upper, *_order_interval(by_form, forms.orders))
-
-
-def _columns(parts: list[_Fit]) -> tuple[list[Array], list[Array]]:
-    return [part.centres for part in parts], [part.widths for part in parts]
 
 
 def student_t(freedom: int, x: Array) -> Array:

@@ -81,9 +81,7 @@ def run_scene(
     labels = tuple(entry.label for entry in entries)
     found = _Collected({label: [] for label in labels})
     for dt in dts:
-        phases = start_phases(scene, own.truth, dt)
-        times = dt * np.arange(1 + scene.steps(dt), dtype=float)
-        exact = [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+        phases, exact = _phases_at(own, dt)
         compared: list[tuple[EngineRun, list[Comparison]]] = []
         for entry in entries:
             engine_run = processes.run_engine(entry, scene, dt, [phase.scene for phase in phases])
@@ -101,6 +99,13 @@ def run_scene(
     rows = found.rows + _with_convergence(found, labels)
     provenance = {**stamp, "settings": found.settings}
     return Results(as_table(rows), {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance)
+
+
+def _phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[Trajectory | None]]:
+    """The start phases at a time step [s], and the exact motion from each at every step, as far as there is an exact solution."""
+    phases = start_phases(own.scene, own.truth, dt)
+    times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
+    return phases, [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
 
 
 def _compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[Trajectory | None]) -> list[Comparison]:
@@ -181,9 +186,7 @@ def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: Engi
     """Every metric of one engine at a step that was not asked for; nothing if it breaks down there."""
     if own.scene.steps(dt) < FEWEST_STEPS:
         return []
-    phases = start_phases(own.scene, own.truth, dt)
-    times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
-    exact = [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+    phases, exact = _phases_at(own, dt)
     engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases])
     return [] if _breakdown(engine_run) else _measure(own, dt, engine_run, phases, exact, _compare(engine_run.phases, phases, exact))
 

@@ -174,7 +174,8 @@ def outcome(series: Series, dts: Array) -> Outcome:
 def outcomes(name: str, count: int, steps: int) -> list[Outcome]:
     """What the error budget says about many series of a family; those that give no interval are left out."""
     rng, h = np.random.default_rng([steps, *name.encode()]), 0.5 ** np.arange(steps)
-    found = [outcome({**FAMILIES, **OTHERS}[name](rng, h), 4e-3 * h) for _ in range(count)]
+    draw = {**FAMILIES, **OTHERS}[name]
+    found = [outcome(draw(rng, h), 4e-3 * h) for _ in range(count)]
     return [one for one in found if not math.isnan(one.width)]
 
 
@@ -182,18 +183,17 @@ def row(name: str, steps: int, found: list[Outcome]) -> list[str]:
     """A row of the table."""
     decided = [one for one in found if one.cause != "unresolved"]
     zeros, large = [one for one in found if one.asymptotic == 0.0], [one for one in found if one.is_large]
-    false, missed = (one.cause == "model" for one in zeros), (one.cause == "discretisation" for one in large)
     shares = [
         _share(one.is_covered for one in found),
         _share(one.is_covered for one in decided),
         _share(one.cause == "unresolved" for one in found),
-        _share(false),
-        _share(missed),
+        _share(one.cause == "model" for one in zeros),
+        _share(one.cause == "discretisation" for one in large),
     ]
     return [name, str(steps), str(len(found)), *shares, f"{np.median([one.width for one in found]):.2g}"]
 
 
-def _share(hits: "Iterator[bool]") -> str:
+def _share(hits: Iterator[bool]) -> str:
     counted = list(hits)
     return f"{100.0 * np.mean(counted):.1f} %" if counted else "–"
 

@@ -133,12 +133,12 @@ def _order_tolerance(found: ErrorBudget, dts: Array, errors: Array, tolerances: 
 
 def _judge_order(claim: Claim, metric: Metric, found: ErrorBudget) -> Judgement | None:
     claimed = claim.order if found.cause == "discretisation" else None
-    if math.isnan(found.order) or metric.name in JUMPING:
+    if metric.name in JUMPING or (math.isnan(found.order) and claimed != math.inf):
         return None
     verdict: Verdict = "measured" if claimed is None else "passed" if found.order_upper >= claimed else "failed"
     steps = ", ".join(f"{dt:g}" for dt in found.dts)
     claim_text = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
-    reason = f"fitted at {steps} s{claim_text}"
+    reason = f"fitted at {steps} s{claim_text}" if steps else f"{found.reason}{claim_text}"
     return Judgement(found.order, verdict, found.order_lower, found.order_upper, found.cause, reason)
 
 

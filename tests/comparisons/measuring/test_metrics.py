@@ -200,6 +200,19 @@ def test_planted_motion_after_rest_is_measured():
     assert found["rest_time_error"] == pytest.approx((scene.duration - still) / still, rel=1e-9)
 
 
+@pytest.mark.parametrize("name", ["drop-ball", "drop-box-anyhow", "drop-ball-lively", "rock-block"])
+def test_same_flights_are_compared_at_every_default_time_step(name):
+    """Finer steps would resolve further flights, in which the errors of the impacts before have grown: an error that grows as dt → 0."""
+    scene = scenarios.load(name)
+    truth = truth_for(scene)
+    counts = []
+    for dt in (4e-3, 2e-3, 1e-3, 2.5e-4):
+        times = dt * np.arange(1 + scene.steps(dt))
+        counts.append(len(Comparison.with_truth(scene, truth(np.minimum(times, truth.horizon)), truth).flights))
+    assert len(set(counts)) == 1
+    assert counts[0] >= 3
+
+
 def test_flights_end_where_the_body_is_desynchronised():
     """A body whose flights are 4 % longer is compared with the exact flights only while both are in the same flight."""
     scene, motion = exact_motion("drop-ball-lively")

@@ -49,7 +49,7 @@ def kinetic_energy_of(mass: float, inertia: Components, orientation: Components,
 def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Array:
     """Kinetic plus potential energy [J], shape (n,). Potential energy is 0 at rest on the floor, or at the start without a floor.
 
-    The synchronised energy takes a staggered engine's velocity at the time of its position, to first order: E* = E + lag M g·v.
+    The synchronised energy takes the velocity at the time of the position, to first order: E* = E + lag M g·v.
     Semi-implicit Euler conserves E* exactly in free fall, and E only to first order in dt.
     """
     position, velocity, origin, gravity = map(_components, (motion.position, motion.velocity, energy_origin(scene), scene.acceleration))

@@ -24,8 +24,7 @@ class Trajectory:
         orientation: Unit quaternions [x, y, z, w], body to world, shape (n, 4).
         velocity: Of the centre of mass [m/s], shape (n, 3).
         angular_velocity: World frame [rad/s], shape (n, 3).
-        velocity_lag: Time by which velocities lag positions [s]: half a step for a staggered engine (semi-implicit Euler is
-            leapfrog), else 0.
+        velocity_lag: Time by which velocities lag positions [s]: half a step under semi-implicit Euler, which is leapfrog.
     """
 
     t: Array

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import cast
 
-from comparisons.conformance.clock import check_staggered, check_time
+from comparisons.conformance.clock import check_time, check_velocity_lag
 from comparisons.conformance.isolation import check_files, check_repeats
 from comparisons.conformance.motion import check_motion
 from comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckResult, Declined
@@ -21,7 +21,7 @@ CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
     "builds what is meant": check_builds,
     "record and advance": check_record,
     "time": check_time,
-    "staggered": check_staggered,
+    "velocity lag": check_velocity_lag,
     "repeats": check_repeats,
     "states": check_states,
     "settings": check_settings,

@@ -85,7 +85,7 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
             verify_start(engine, scene, state)
         except BuildMismatch as error:
             raise CheckFailed(_start_explained(engine, scene, state) or str(error)) from None
-        verify_build(engine, scene, simulation)
+        verify_build(engine, scene, simulation, DT)
         verified_record(simulation.record(A_FEW_STEPS), 1 + A_FEW_STEPS)
         return simulation.as_built() is not None
 

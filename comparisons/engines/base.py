@@ -1,7 +1,7 @@
 """The engine protocol: subclass `Engine` and `Simulation` to bring an engine of your own."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import metadata
 from types import TracebackType
@@ -62,13 +62,13 @@ class Simulation:
     """One scene at one time step, built and ready to step; a context manager.
 
     Attributes:
-        staggered: Whether velocity lags position by half a step, as under semi-implicit Euler.
+        velocity_lag: Time by which velocity lags position [s]: half a step under semi-implicit Euler, 0 where both have the same time.
         settings: The settings in force, versions included, stored with the results; values that JSON can hold.
         known_limitations: Known limitations of the engine that the simulation met: a sentence, which is reported, or a `KnownLimitation`,
             which also explains errors.
     """
 
-    staggered: bool = False
+    velocity_lag: float = 0.0
     settings: Mapping[str, Any] = {}
     known_limitations: Sequence[str | KnownLimitation] = ()
 
@@ -123,6 +123,8 @@ class NumericOption(NamedTuple):
     most: float
 
 
+FEWEST_VALUES = 3
+"""Values of an option that sets the accuracy: extrapolation needs as many."""
 PROFILES = ("calibrated", "default")
 """Settings that reproduce the scene as closely as the engine can; and the engine's defaults, with only the obvious settings made."""
 
@@ -149,6 +151,10 @@ def calibrated_label(label: str) -> str | None:
     return f"{name}[{left}]" if left else name
 
 
+def _spelled(value: float | str) -> str:
+    return value if isinstance(value, str) else repr(value)
+
+
 @dataclass(frozen=True)
 class Engine:
     """An engine with its options.
@@ -166,6 +172,11 @@ class Engine:
     """Each option's values, the default first."""
     numbers: ClassVar[Mapping[str, NumericOption]] = {}
     """Each numeric option's default and range."""
+    accuracy: ClassVar[Mapping[str, tuple[float | str, ...]]] = {}
+    """Options besides the time step that set the accuracy, each with three values or more, coarsest first: {"rtol": (1e-4, 1e-6, 1e-8)}.
+
+    Where an error does not vanish as dt → 0, `run` refines these options together with the time step.
+    """
     reasons: ClassVar[Mapping[str, str]] = {}
     """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
 
@@ -182,6 +193,13 @@ class Engine:
             if canonical != self._default(option):
                 chosen[option] = canonical
         object.__setattr__(self, "options", chosen)
+        for option, values in self.accuracy.items():
+            if option not in self.choices and option not in self.numbers:
+                raise UnknownName(f"{self.name}'s accuracy option", option, [*self.choices, *self.numbers])
+            if len(set(values)) < FEWEST_VALUES:
+                raise DropspinError(
+                    f"{self.name}.accuracy[{option!r}]: got {values!r}; give at least {FEWEST_VALUES} values, coarsest first."
+                )
 
     def _default(self, option: str) -> str:
         return f"{self.numbers[option].default:g}" if option in self.numbers else self.choices[option][0]
@@ -200,6 +218,15 @@ class Engine:
     def option(self, name: str) -> str:
         """An option's value, given or default."""
         return self.options.get(name, self._default(name))
+
+    def refined(self, dts: Sequence[float]) -> list[tuple[float, Self]]:
+        """The finest of some time steps [s] and the engine at each, its accuracy options refined together with the time step."""
+        count = min(len(dts), *map(len, self.accuracy.values()))
+        path = []
+        for number, dt in enumerate(sorted(dts)[:count]):
+            options = {option: _spelled(values[-1 - number]) for option, values in self.accuracy.items()}
+            path.append((dt, replace(self, options={**self.options, **options})))
+        return path[::-1]
 
     @property
     def label(self) -> str:

@@ -48,9 +48,8 @@ class Dart(Engine):
 class DartSimulation(Simulation):
     """A DART world with the body's skeleton and, if the scene has a floor, the floor's."""
 
-    staggered = True
-
     def __init__(self, scene: Scenario, dt: float) -> None:
+        self.velocity_lag = 0.5 * dt
         self._scene, self._world, skeleton, mounting = scene, dart.simulation.World(), dart.dynamics.Skeleton("body"), dart.math.Isometry3()
         self._world.setTimeStep(dt)
         self._world.setGravity(scene.acceleration)

@@ -77,9 +77,8 @@ class Document(Engine):
 class DocumentSimulation(Simulation):
     """A simulation of one scene by the reference implementation."""
 
-    staggered = True
-
     def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
+        self.velocity_lag = 0.5 * dt
         self._body = reference_body(scene.body)
         self._world = reference_world(scene)
         self._simulator = reference_impl.Simulator(self._body, self._world, dt, methods)

@@ -58,9 +58,8 @@ class Drake(Engine):
 class DrakeSimulation(Simulation):
     """A plant in a simulator, with a scene graph if the scene has a floor."""
 
-    staggered = True
-
     def __init__(self, scene: Scenario, dt: float) -> None:
+        self.velocity_lag = 0.5 * dt
         builder: Any = DiagramBuilder()
         inertia, self._dt, self._steps = scene.body.inertia_tensor, dt, 0
         self._plant = builder.AddSystem(MultibodyPlant(dt)) if scene.floor is None else AddMultibodyPlantSceneGraph(builder, dt)[0]

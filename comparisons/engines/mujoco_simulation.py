@@ -27,7 +27,7 @@ class MuJoCoSimulation(Simulation):
     def __init__(self, scene: Scenario, specification: Any, settings: Mapping[str, Any]) -> None:
         self._scene = scene
         self._model = specification.compile()
-        self.staggered = settings["integrator"] != "rk4"
+        self.velocity_lag = 0.0 if settings["integrator"] == "rk4" else 0.5 * self._model.opt.timestep
         self.settings = {"version": mujoco.__version__, **settings}
         if scene.damping is not None:
             rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)

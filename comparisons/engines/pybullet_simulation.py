@@ -31,11 +31,9 @@ LARGEST_TURN = np.pi / 4  # rad a step; beyond it Bullet's rotation is too small
 class PyBulletSimulation(Simulation):
     """A connection to the physics server in this process, which no other simulation uses until it is closed."""
 
-    staggered = True
-
     def __init__(self, scene: Scenario, dt: float, *, default: bool, multibody: bool, unclamped: bool) -> None:
         self._bullet = _import_quietly()
-        self._dt, self._fall = dt, dt * scene.acceleration
+        self._dt, self._fall, self.velocity_lag = dt, dt * scene.acceleration, 0.5 * dt
         self._grips = scene.floor is not None and scene.floor.friction == "infinite"
         self._idle = _idle.setdefault(default, [])
         self._client = self._idle.pop() if self._idle else self._bullet.connect(self._bullet.DIRECT)

@@ -74,9 +74,8 @@ class Rapier(Engine):
 class RapierSimulation(Simulation):
     """A Rapier world."""
 
-    staggered = True
-
     def __init__(self, scene: Scenario, dt: float) -> None:
+        self.velocity_lag = 0.5 * dt
         body, floor = scene.body, scene.floor
         self._world = rapier3d.PhysicsWorld(gravity=scene.acceleration)
         if FIRST_PROCESS() != os.getpid():  # a forked process has none of those threads and would wait for them forever

@@ -103,6 +103,32 @@ def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy 
     return ConvergenceStudy("setting", order, replace(own, cause="setting", reason=own.reason + cured))
 
 
+def attributed_to_accuracy(study: ConvergenceStudy, refined: ConvergenceStudy | None, options: str, path: str) -> ConvergenceStudy:
+    """A study of time steps alone; an error that only vanishes where the engine's accuracy options are refined too is attributed to these.
+
+    Args:
+        study: Over time steps alone.
+        refined: Over time steps that were refined together with the options.
+        options: Names of the options.
+        path: Their values and the time steps.
+    """
+    if study.cause not in ("model", "unresolved") or study.asymptotic_error is None:
+        return study
+    limit = None if refined is None else refined.asymptotic_error
+    if limit is None:
+        limit, cause, reason = study.asymptotic_error, "unresolved", f"too few usable time steps with finer {options}"
+    elif limit.cause in ("model", "unresolved"):
+        cause, reason = limit.cause, limit.reason
+    else:
+        cause, reason = options, f"vanishes with finer {options}"
+    if cause == "model":
+        return study
+    verdict: Verdict = "measured" if cause == "unresolved" else "passed"
+    return replace(
+        study, cause=cause, order=None, asymptotic_error=replace(limit, verdict=verdict, cause=cause, reason=f"{reason} ({path})")
+    )
+
+
 def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> tuple[Array, Array, Array, Array]:
     """Time steps, errors, their resolution and what rounding may do, of the part that is largest at the finest step."""
     dts, steps = np.array([point.dt for point in series]), np.array([point.steps for point in series], dtype=float)

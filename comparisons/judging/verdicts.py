@@ -17,8 +17,9 @@ Verdict = Literal["passed", "failed", "measured", "limited", "diverged", "crashe
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 FAILURES = frozenset({"failed"})
 BREAKDOWNS = frozenset({"diverged", "crashed", "timed_out"})
-Cause = Literal["", "discretisation", "model", "setting", "rounding", "chaotic", "unresolved"]
-"""What an error is attributed to; empty where nothing was attributed."""
+Cause = str
+"""What an error is attributed to: discretisation, model, setting, rounding, chaotic, unresolved, or an option of the engine that sets its
+accuracy; empty where nothing was attributed."""
 
 
 @dataclass(frozen=True)

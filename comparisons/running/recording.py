@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Diverged, Engine, KnownLimitation, Simulation
+from comparisons.engines.base import Diverged, Engine, KnownLimitation
 from comparisons.judging.verdicts import Verdict
 from comparisons.running.inputs import as_scene, installed_engine, verify_time_step
 from comparisons.running.verification import BATCH_ULPS, verified_limitations, verified_record, verify_build, verify_start
@@ -91,12 +91,12 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
     steps = scene.steps(dt)
     with engine.prepare(scene, dt) as simulation:
         if verify:
-            verify_build(engine, scene, simulation)
+            verify_build(engine, scene, simulation, dt)
         settings = dict(simulation.settings)
         start = time.perf_counter()
         states = verified_record(simulation.record(steps, every), 1 + steps // every)
         seconds = time.perf_counter() - start
-        lag = velocity_lag(simulation, dt)
+        lag = simulation.velocity_lag
         limitations = verified_limitations(simulation.known_limitations)
         more = states[:0]
         if extra_steps and np.isfinite(states[-1]).all():
@@ -117,7 +117,7 @@ def record_batch(engine: Engine, starts: Sequence[Scenario], dt: float) -> list[
     steps = starts[0].steps(dt)
     times = dt * np.arange(steps + 1, dtype=float)
     with engine.prepare(starts[0], dt) as simulation:
-        lag = velocity_lag(simulation, dt)
+        lag = simulation.velocity_lag
     motions = []
     for start, states in zip(starts, engine.record_batch(starts, dt, steps), strict=True):
         verified = verified_record(states, steps + 1)
@@ -164,8 +164,3 @@ def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> tuple[
         simulation.advance(steps)
         seconds = time.perf_counter() - start
         return seconds, simulation.state()
-
-
-def velocity_lag(simulation: Simulation, dt: float) -> float:
-    """How far a simulation's velocities lag its positions [s]."""
-    return 0.5 * dt if simulation.staggered else 0.0

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import chain, combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.engines.base import calibrated_label
+from comparisons.engines.base import Engine, calibrated_label
 from comparisons.judging.agreement import judge_agreement
 from comparisons.judging.convergence import (
     ADDED_STEPS,
@@ -15,6 +15,7 @@ from comparisons.judging.convergence import (
     Claim,
     ConvergenceStudy,
     SeriesPoint,
+    attributed_to_accuracy,
     attributed_to_setting,
     study_convergence,
 )
@@ -179,7 +180,34 @@ def _study(
         for name in coarser:
             if name in studies and studies[name].is_open:
                 studies[name] = study_convergence(own.scene, claim, METRICS[name], [*coarser[name], *series[name]])
+    if entry.engine is not None and entry.engine.accuracy and any(study.cause in ("model", "unresolved") for study in studies.values()):
+        return _with_accuracy_options(studies, own, claim, entry.engine, sorted({point.dt for point in chain(*series.values())}), processes)
     return studies
+
+
+def _with_accuracy_options(
+    studies: Mapping[str, ConvergenceStudy], own: StartPhase, claim: Claim, engine: Engine, dts: Sequence[float], processes: EngineProcesses
+) -> dict[str, ConvergenceStudy]:
+    """Studies by metric; those in which the time step alone does not make the error vanish again with the accuracy options refined too."""
+    refined = engine.refined(dts)
+    series = _series([one for dt, finer in refined for one in _measured_at(own, EngineEntry(finer.label, finer), dt, processes)])
+    options = " and ".join(engine.accuracy)
+    values = [", ".join(_short(finer.option(option)) for _, finer in refined) for option in engine.accuracy]
+    path = f"{'; '.join(values)}, with dt = {', '.join(f'{dt:g}' for dt, _ in refined)} s"
+    again = {
+        name: study_convergence(own.scene, claim._replace(order=None), METRICS[name], points)
+        for name, points in series.items()
+        if len(points) == len(refined)
+    }
+    return {name: attributed_to_accuracy(study, again.get(name), options, path) for name, study in studies.items()}
+
+
+def _short(value: str) -> str:
+    """An option's value; numbers with six digits."""
+    try:
+        return f"{float(value):g}"
+    except ValueError:
+        return value
 
 
 def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: EngineProcesses) -> list[Measured]:

@@ -22,10 +22,11 @@ class BuildMismatch(Exception):
     """An engine simulates something else than the scene; the text says what."""
 
 
-def verify_build(engine: Engine, scene: Scenario, simulation: Simulation) -> None:
+def verify_build(engine: Engine, scene: Scenario, simulation: Simulation, dt: float) -> None:
     """Raise `BuildMismatch` unless state, mass, inertia and gravity equal the scene's to 8 ulp of the engine's precision."""
-    if simulation.staggered not in (True, False):
-        raise BuildMismatch(f"staggered is {simulation.staggered!r}; it must be True or False")
+    lag = simulation.velocity_lag
+    if isinstance(lag, bool) or not isinstance(lag, int | float | np.floating) or not abs(lag) <= dt:
+        raise BuildMismatch(f"velocity_lag is {lag!r}; it is a time in seconds of at most one step, {dt:g} s")
     state = simulation.state()
     if state.shape != (13,):
         raise BuildMismatch(f"the state has shape {state.shape}, not (13,)")

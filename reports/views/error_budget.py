@@ -74,6 +74,8 @@ def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:
             return f"Discretisation error down to {formatted(reach)}; the time steps do not resolve smaller ones."
         halved = "" if math.isnan(order) else f" of order {order:.2f}: halving dt gives about {formatted(value * 0.5**order)}"
         return f"Discretisation error{halved}."
+    if cause not in ("model", "setting"):
+        return f"Set by {cause}, which is the engine's own: it {row['reason_of_limit']}."
     kind = "setting error, which the calibrated profile does not have" if cause == "setting" else "model error, which no time step removes"
     rest = value - limit
     if abs(rest) <= 0.5 * (float(row["upper_of_limit"]) - float(row["lower_of_limit"])):

@@ -57,11 +57,11 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     if refusal is not None:
         return [{"what": chosen.label, "is": f"declines {scene.name}: {refusal}"}]
     with chosen.prepare(scene, dt) as simulation:
-        verify_build(chosen, scene, simulation)
+        verify_build(chosen, scene, simulation, dt)
         built = simulation.as_built()
         rows = [
             {"what": "engine", "is": chosen.label, "why": ""},
-            {"what": "staggered", "is": str(simulation.staggered), "why": "velocity lags position by half a step" * simulation.staggered},
+            {"what": "velocity lag", "is": f"{simulation.velocity_lag:g} s", "why": "time by which velocity lags position"},
         ]
         if built is not None:
             rows += [

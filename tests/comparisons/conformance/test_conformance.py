@@ -133,7 +133,7 @@ def record(first, given):
         ([(STEP, STEP.replace("dt", "dt / 2"))], "time", "0.005, 0.00125, 0.000125 s long"),
         ([(MOMENTS, f"{MOMENTS}[[0, 2, 1]]")], "tumbling", "the moments of inertia appear to be permuted to (x, z, y)"),
         ([(MOMENTS, "scene.body.mass, np.full(3, 0.1)")], "tumbling", "or with the inertia of a ball"),
-        ([("staggered = True", "staggered = False")], "staggered", "set staggered = True"),
+        ([("0.5 * dt  #", "0.0  #")], "velocity lag", "set self.velocity_lag = 0.5 * dt"),
         ([("self.data.qvel = [*v, ", "self.data.qvel = [0, 0, 0, ")], "builds what is meant", "the velocity at the start is not set"),
         ([(RETURN, f"{SINGLE}\n        {RETURN}")], "builds what is meant", "declare precision = numpy.float32"),
         ([("self.data.qvel[:3], R", "-self.data.qvel[:3], R")], "builds what is meant", "velocity has the opposite sign"),
@@ -274,12 +274,12 @@ def test_record_that_differs_from_advance_by_rounding_is_noted():
 @pytest.mark.usefixtures("without_explanations")
 def test_nan_fails_with_a_message():
     found = not_passed(
-        documented((RETURN, RETURN.replace("np.", "(np.nan if self.data.time else 1.0) * np."))), "time", "staggered", "falling"
+        documented((RETURN, RETURN.replace("np.", "(np.nan if self.data.time else 1.0) * np."))), "time", "velocity lag", "falling"
     )
     assert len(found) == 3
     assert "crashed" not in {outcome for outcome, _ in found.values()}
     assert "not finite" in found["time"][1]
-    assert "not finite" in found["staggered"][1]
+    assert "not finite" in found["velocity lag"][1]
 
 
 def test_start_that_is_off_by_1e_12_is_not_a_fault_of_convention():

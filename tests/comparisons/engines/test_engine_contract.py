@@ -40,7 +40,7 @@ def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
         return
     dt = 2e-3
     with chosen.prepare(scene, dt) as simulation:
-        verify_build(chosen, scene, simulation)
+        verify_build(chosen, scene, simulation, dt)
         assert simulation.as_built() is not None
         rows = simulation.record(60, every=3)
         assert rows.shape == (21, 13)

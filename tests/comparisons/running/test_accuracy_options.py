@@ -1,0 +1,99 @@
+"""Engines whose accuracy is not set by the time step alone raise no alarm, and their faults do."""
+
+import math
+
+import pytest
+from support.accuracy_options import Adaptive, InnerStep, Substeps
+
+from comparisons.conformance.checks import conform
+from comparisons.engines.base import Engine, NumericOption
+from comparisons.engines.document import Document
+from comparisons.running.run import run
+from scenarios import load
+from scenarios.errors import DropspinError, UnknownName
+
+SOUND = (Adaptive, InnerStep, Substeps)
+SPIN = load(
+    {
+        "name": "fast-spin",
+        "duration": 0.4,
+        "body": {"shape": "box", "half_extents": [0.1, 0.15, 0.25], "mass": 1.0},
+        "start": {"angular_velocity": [0.0, 40.0, 0.0]},
+    }
+)
+
+
+def failures(table):
+    return table[table["verdict"].isin(["failed", "crashed", "diverged", "timed_out"])]
+
+
+@pytest.mark.parametrize("engine", SOUND)
+def test_sound_engine_raises_no_alarm(engine):
+    table = run(["drop-ball", SPIN], engine()).table
+    assert failures(table).empty
+
+
+@pytest.mark.parametrize("engine", SOUND)
+def test_restitution_fault_is_detected_in_an_engine_with_an_accuracy_option(engine):
+    faulty = type("Faulty", (engine,), {"restitution_factor": 1.01})()
+    found = failures(run("drop-ball", faulty).table)
+    assert "asymptotic_error" in set(found["kind"])
+
+
+def test_cause_is_the_accuracy_option():
+    """With an inner step of a fixed length the error does not change with the time step; it vanishes with the inner step."""
+    table = run("fall-spin", InnerStep()).table
+    [row] = table[(table["kind"] == "asymptotic_error") & (table["metric"] == "position_error")].to_dict("records")
+    assert (row["cause"], row["verdict"]) == ("inner_step", "passed")
+    assert row["reason"] == "vanishes with finer inner_step (0.00416667, 0.00208333, 0.00104167, with dt = 0.004, 0.002, 0.001 s)"
+    assert row["lower"] <= 0.0 <= row["upper"]
+
+
+def test_refinement_too_coarse_to_be_compared_leaves_the_cause_open():
+    """At inner steps of 4 ms and 500 rad/s the attitude saturates."""
+    table = run("spin-principal-500", InnerStep()).table
+    [row] = table[(table["kind"] == "asymptotic_error") & (table["metric"] == "orientation_error")].to_dict("records")
+    assert (row["cause"], row["verdict"]) == ("unresolved", "measured")
+
+
+def test_options_are_refined_together_with_the_finest_time_steps():
+    path = Adaptive().refined([1e-3, 8e-3, 4e-3, 2e-3])
+    assert [(dt, engine.option("rtol")) for dt, engine in path] == [(4e-3, "0.0001"), (2e-3, "1e-06"), (1e-3, "1e-08")]
+
+
+@pytest.mark.parametrize(("accuracy", "error", "text"), [
+    ({"rtl": (1e-4, 1e-6, 1e-8)}, UnknownName, "rtl"),
+    ({"rtol": (1e-4, 1e-8)}, DropspinError, "give at least 3 values, coarsest first"),
+])  # fmt: skip
+def test_accuracy_is_checked(accuracy, error, text):
+    engine = type("Wrong", (Engine,), {"name": "wrong", "numbers": {"rtol": NumericOption(1e-6, 1e-12, 1e-2)}, "accuracy": accuracy})
+    with pytest.raises(error, match=text):
+        engine()
+
+
+def test_substeps_conform_with_the_lag_of_a_substep():
+    """Half of a sub-step of an eighth; without it the check says what to set."""
+    assert {result.check: result.outcome for result in conform(Substeps())}["velocity lag"] == "passed"
+
+    class Unstated(Substeps):
+        def prepare(self, scene, dt):
+            simulation = super().prepare(scene, dt)
+            simulation.velocity_lag = 0.0
+            return simulation
+
+    results = {result.check: result for result in conform(Unstated())}
+    assert results["velocity lag"].outcome == "failed"
+    assert results["velocity lag"].message.endswith("set self.velocity_lag = 0.5 * dt / 8")
+
+
+@pytest.mark.parametrize("lag", [True, "half", math.nan, 1.0])
+def test_lag_that_is_no_time_of_at_most_a_step_is_refused(lag):
+    class Wrong(Document):
+        def prepare(self, scene, dt):
+            simulation = super().prepare(scene, dt)
+            simulation.velocity_lag = lag
+            return simulation
+
+    [row] = run("spin-principal", Wrong(), 1e-3).table.to_dict("records")
+    assert row["verdict"] == "crashed"
+    assert "it is a time in seconds of at most one step, 0.001 s" in row["reason"]

@@ -179,12 +179,13 @@ class Runs:
         __tracebackhide__ = True
         fails = FAILING | {"missing"} if self.named else FAILING
         judged = [row | {"fails": row["verdict"] in fails, "message": _message(row), "share": _share(row)} for row in rows]
-        node.stash.setdefault(JUDGED, []).extend(row for row in judged if row["fails"] or row["verdict"] in STOPPED | {"passed"})
+        node.stash.setdefault(JUDGED, []).extend(row for row in judged if row["fails"] or row["verdict"] in STOPPED | {"passed", "known"})
         failing = [row for row in judged if row["fails"]]
         if failing:
             pytest.fail(self._failure(result, failing), pytrace=pytrace)
         if not any(row["verdict"] == "passed" for row in judged):
-            reasons = [f"{row['engine']} {row['verdict']}: {row['reason']}" for row in judged if row["verdict"] in STOPPED | {"limited"}]
+            unjudged = [row for row in judged if row["verdict"] in STOPPED | {"known", "limited"}]
+            reasons = [f"{row['engine']} {row['verdict']}: {row['reason']}" for row in unjudged]
             pytest.skip(reasons[0] if reasons else "the scene has no expectation at these time steps")
 
     def _failure(self, result: Result, failing: Sequence[Row]) -> str:
@@ -389,16 +390,16 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
             judged.setdefault((row["engine"], row["scene"]), {})[key] = row
     if not judged:
         return
-    lines = [("engine", "scene", "passed", "failed", "worst")]
+    lines = [("engine", "scene", "passed", "failed", "known", "worst")]
     for (engine, scene), found in judged.items():
         rows = found.values()
         worst = max(rows, key=lambda row: (row["fails"], row["share"]))
-        passed, failed = (sum(row[key] == value for row in rows) for key, value in (("verdict", "passed"), ("fails", True)))
-        lines.append((engine, scene, str(passed), str(failed), worst["message"]))
-    widths = [max(len(line[column]) for line in lines) for column in range(4)]
+        tally = (sum(row[key] == value for row in rows) for key, value in (("verdict", "passed"), ("fails", True), ("verdict", "known")))
+        lines.append((engine, scene, *map(str, tally), worst["message"]))
+    widths = [max(len(line[column]) for line in lines) for column in range(5)]
     terminalreporter.section(NAME)
-    for engine, scene, passed, failed, message in lines:
-        ends = f"{passed:>{widths[2]}}  {failed:>{widths[3]}}  {message}"
+    for engine, scene, passed, failed, known, message in lines:
+        ends = f"{passed:>{widths[2]}}  {failed:>{widths[3]}}  {known:>{widths[4]}}  {message}"
         terminalreporter.write_line(f"{engine:<{widths[0]}}  {scene:<{widths[1]}}  {ends}")
     runs = config.stash[RUNS]
     if runs.baseline and not any(row["kind"] == "baseline" for found in judged.values() for row in found.values()):

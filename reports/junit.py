@@ -13,7 +13,7 @@ from comparisons.results.results import Results
 from reports.views.failures import reproduce, what_fails
 from reports.views.numbers import step, subject, word
 
-JUDGED = FAILURES | BREAKDOWNS | {"passed", "limited", "declined", "missing"}
+JUDGED = FAILURES | BREAKDOWNS | {"passed", "known", "limited", "declined", "missing"}
 
 
 def junit_xml(results: Results, baseline: str | None = None) -> bytes:

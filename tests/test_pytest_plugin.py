@@ -56,12 +56,12 @@ def test_marked_test_is_called_for_each_engine(repository):
             "E *    Reproduce: dropspin run spin-principal -e engines:Faulty --dt 0.004 -o out/again",
             "E *    If this change is intended: dropspin accept .pytest_cache/d/dropspin/spin-principal-* "
             '--baseline dropspin-baseline.toml --known-failures --reason "…"; then use --dropspin-baseline dropspin-baseline.toml',
-            "engine * scene * passed  failed  worst",
-            "mine * spin-principal * 2 * 0  energy_error at 0.004 s is 0, expected ± 1e-06: 0 times its bound",
-            "faulty * spin-principal * 0 * 2  energy_error at 0.004 s is 0.002, *",
-            "dying * spin-principal * 0 * 1  crashed: *",
-            "absent:Engine * spin-principal * 0 * 1  missing: *",
-            "shy * spin-principal * 0 * 0  declined: I do not spin",
+            "engine * scene * passed  failed  known  worst",
+            "mine * spin-principal * 2 * 0 * 0  energy_error at 0.004 s is 0, expected ± 1e-06: 0 times its bound",
+            "faulty * spin-principal * 0 * 2 * 0  energy_error at 0.004 s is 0.002, *",
+            "dying * spin-principal * 0 * 1 * 0  crashed: *",
+            "absent:Engine * spin-principal * 0 * 1 * 0  missing: *",
+            "shy * spin-principal * 0 * 0 * 0  declined: I do not spin",
             "Reports: .pytest_cache/d/dropspin/[*]",
             "SKIPPED * shy declined: I do not spin",
         ],
@@ -203,9 +203,9 @@ def test_result_worse_than_accepted_fails(repository):
             "E * Reproduce: dropspin run spin-principal -e engines:Faulty --dt 0.004 --baseline base.toml -o out/again",
             "E * If this change is intended: dropspin accept .pytest_cache/d/dropspin/spin-principal-* "
             '--baseline base.toml --known-failures --reason "…"',
-            "mine * spin-principal * 3 * 0  *",
-            "faulty * spin-principal * 0 * 3  *",
-            "absent:Engine * spin-principal * 0 * 0  missing: *",
+            "mine * spin-principal * 3 * 0 * 0  *",
+            "faulty * spin-principal * 0 * 3 * 0  *",
+            "absent:Engine * spin-principal * 0 * 0 * 0  missing: *",
         ]
     )
 

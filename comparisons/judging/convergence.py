@@ -1,7 +1,7 @@
 """Convergence over several time steps: of each error the observed order, the asymptotic error as dt → 0, and the cause.
 
 Every engine must meet this, whatever a scene expects besides: the interval of its asymptotic error contains 0, and that of its order
-reaches the order that it claims. A known fault, expected of this engine by name, passes while the asymptotic error is the expected one.
+reaches the order that it claims. A fault that is expected of this engine by name is `known` while the asymptotic error is the expected one.
 """
 
 import math
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from comparisons.engines.base import KnownLimitation
 from comparisons.judging.error_budget import ErrorBudget, error_budget
-from comparisons.judging.verdicts import Cause, Judgement, Verdict, known_fault, with_limitations
+from comparisons.judging.verdicts import Cause, Judgement, Verdict, judge_asymptotic_error, with_limitations
 from comparisons.measuring.metric import Average, Metric
 from comparisons.measuring.tolerances import negligible, rounding
 from scenarios import Scenario
@@ -80,13 +80,15 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
         resolutions = np.maximum(resolutions, np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
     floor = negligible(scene, metric.unit)
     found = error_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, rounded, signed=metric.signed, negligible=floor)
-    order, limit = _judge_order(claim, metric, found), _judge_asymptotic_error(scene, claim, metric, found, float(np.min(dts)))
+    order, limit = _judge_order(claim, metric, found), None
     if order is not None:
         order = replace(order, tolerance=_order_tolerance(found, dts, errors, np.array([point.tolerance for point in series])))
-    if limit is not None:
+    if not math.isnan(found.asymptotic_error):
         # What the steps leave open is not compared with another run's.
         tolerance = math.nan if found.cause == "unresolved" else found.upper - found.lower
-        limit = with_limitations(replace(limit, tolerance=tolerance), metric.name, claim.limitations)
+        limit = Judgement(found.asymptotic_error, "measured", found.lower, found.upper, found.cause, found.reason, tolerance)
+        limit = judge_asymptotic_error(scene, claim.label, float(np.min(dts)), metric, limit)
+        limit = with_limitations(limit, metric.name, claim.limitations)
     is_open = found.cause == "unresolved" and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
     return ConvergenceStudy(found.cause, order, limit, is_open)
 
@@ -166,15 +168,3 @@ def _judge_order(claim: Claim, metric: Metric, found: ErrorBudget) -> Judgement 
     claim_text = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
     reason = f"fitted at {steps} s{claim_text}" if steps else f"{found.reason}{claim_text}"
     return Judgement(found.order, verdict, found.order_lower, found.order_upper, found.cause, reason)
-
-
-def _judge_asymptotic_error(scene: Scenario, claim: Claim, metric: Metric, found: ErrorBudget, finest: float) -> Judgement | None:
-    if math.isnan(found.asymptotic_error):
-        return None
-    reason: str = found.reason
-    verdict: Verdict = "measured" if found.cause == "unresolved" else "passed"
-    if found.cause == "model":
-        uncertainty = 0.5 * (found.upper - found.lower)
-        fault = known_fault(scene, claim.label, finest, metric, found.asymptotic_error, uncertainty)
-        verdict, reason = ("failed", f"{reason}; no step cures it") if fault is None else ("passed", fault)
-    return Judgement(found.asymptotic_error, verdict, found.lower, found.upper, found.cause, reason)

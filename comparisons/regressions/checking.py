@@ -46,7 +46,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     """Compare a run with accepted results; its own expectations are judged already and stay unchanged.
 
     A result that is worse than accepted by more than its tolerance, or gone, fails. One that is better passes. A check of the run that
-    fails and was accepted as a known failure is `limited` as long as its result is not worse.
+    fails and was accepted as a known failure is `known` as long as its result is not worse.
 
     Raises:
         NothingAccepted: No accepted result is covered by the run, so that the check would be empty. If engines broke down, that is
@@ -129,11 +129,11 @@ def _scene_changed(scene: str, engine: str) -> Measurement:
 
 
 def _with_known_failures(results: Results, found: pd.DataFrame) -> pd.DataFrame:
-    """The run's table; failures that were accepted as known and are not worse are `limited`."""
+    """The run's table; failures that were accepted as known and are not worse are `known`."""
     known = found[found["known_failure"].fillna(value=False).astype(bool) & (found["change"].map(VERDICTS) == "passed")]
     keys = pd.MultiIndex.from_frame(results.table.assign(steps=step_names(results))[KEY])
     rows = keys.isin(pd.MultiIndex.from_frame(known[KEY])) & results.table["verdict"].isin(FAILURES).to_numpy()
     table = results.table.copy()
     table.loc[rows, "reason"] = f"{KNOWN_FAILURE}; " + table.loc[rows, "reason"]
-    table.loc[rows, "verdict"] = "limited"
+    table.loc[rows, "verdict"] = "known"
     return table

@@ -51,7 +51,7 @@ class Results:
         parts = [f"{passed} checks passed, {failed} failed"]
         parts += [
             f"{count} {verdict}"
-            for verdict in ("diverged", "crashed", "timed_out", "declined")
+            for verdict in ("known", "diverged", "crashed", "timed_out", "declined")
             if (count := int((verdicts == verdict).sum()))
         ]
         errors = self.asymptotic_errors("model")

@@ -281,8 +281,13 @@ def _series(measured: Sequence[Measured]) -> dict[str, list[SeriesPoint]]:
 
 
 def _with_cause(row: Measurement, studies: Mapping[str, ConvergenceStudy]) -> Measurement:
-    """A measurement with the cause that its metric's convergence gives, if it has none yet."""
-    return row if row.cause or row.metric not in studies else replace(row, cause=studies[row.metric].cause)
+    """A measurement with the cause that its metric's convergence gives, if it has none yet; `known` if it passes as a known model error."""
+    if row.cause or row.metric not in studies:
+        return row
+    study = studies[row.metric]
+    is_known = study.asymptotic_error is not None and study.asymptotic_error.verdict == "known"
+    shows = is_known and row.verdict == "passed" and (row.lower > 0.0 or row.upper < 0.0)
+    return replace(row, cause=study.cause, verdict="known" if shows else row.verdict)
 
 
 def _study_rows(measurements: Sequence[Measurement], studies: Mapping[str, ConvergenceStudy]) -> Iterator[Measurement]:

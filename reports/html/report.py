@@ -22,7 +22,7 @@ from reports.views import numbers
 from reports.views.error_budget import error_budgets
 from reports.views.findings import Counts
 from reports.views.leading_errors import leading_errors, step_costs
-from reports.views.run import LASTING, Overview
+from reports.views.run import Overview
 from reports.views.scene import left_out, modelled
 from scenarios import truth_for
 
@@ -37,15 +37,9 @@ def html_report(results: Results, summary: Overview, plots: dict[str, str], sect
         sections: Sections of other studies.
     """
     styles, drawn = with_shared_styles(plots)
-    chips, found = summary.chips, summary.verdicts
-    kinds = {
-        (scene, engine): {*mine, *found.get((scene, engine), ())} - {"measured"}
-        for scene, by_engine in chips.items()
-        for engine, mine in by_engine.items()
-    }
-    words = sorted({word for mine in kinds.values() for word in mine})
+    words = sorted({status.words for by_engine in summary.statuses.values() for status in by_engine.values()})
     details = _details(results, summary.counts, drawn)
-    return page("report.html", **vars(summary), **details, kinds=kinds, words=words, sections=sections, styles=Markup(styles))
+    return page("report.html", **vars(summary), **details, words=words, sections=sections, styles=Markup(styles))
 
 
 def _details(results: Results, tally: Counts, plots: dict[str, str]) -> dict[str, Any]:
@@ -54,7 +48,6 @@ def _details(results: Results, tally: Counts, plots: dict[str, str]) -> dict[str
         "provenance": results.provenance,
         "passed": tally.failed == 0 and tally.broken == 0,
         "colours": engine_colours(results.engines),
-        "lasting": list(LASTING.values()),
         "negligible": NEGLIGIBLE,
         "leading": leading_errors(results),
         "costs": step_costs(results),

@@ -2,26 +2,40 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from comparisons.engines.base import calibrated_label
 from comparisons.judging.convergence import STUDIES
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, VERDICTS
 from comparisons.results.results import NEGLIGIBLE, Results
+from reports.views.numbers import word
 
-# Worst first: the verdict that represents a scene and an engine in the matrix.
-SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "limited", "no_truth", "passed", "measured")
+STATUS_WORDS = {"limited": "outside the documented range"}
+
+SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "known", "limited", "no_truth", "passed", "measured")
+"""Worst first: the verdict that represents a scene and an engine."""
 assert set(SEVERITY) == set(VERDICTS)
 
 
 @dataclass(frozen=True)
 class Counts:
-    """How many checks passed and failed, how many of them are on orders and asymptotic errors, and how many rows broke down."""
+    """The checks of a run.
+
+    Attributes:
+        passed: How many passed.
+        failed: How many failed.
+        known: How many show a fault that is expected by name.
+        fixed: How many passed although such a fault is expected.
+        of_studies: How many of those that passed or failed are on orders and asymptotic errors.
+        broken: How many rows are of engines that broke down.
+    """
 
     passed: int
     failed: int
+    known: int
+    fixed: int
     of_studies: int
     broken: int
 
@@ -29,16 +43,35 @@ class Counts:
 def counts(results: Results) -> Counts:
     """The verdicts of a run, counted."""
     verdicts = results.table["verdict"]
-    passed, failed = verdicts == "passed", verdicts.isin(FAILURES)
+    passed, failed, known = verdicts == "passed", verdicts.isin(FAILURES), verdicts == "known"
+    fixed = passed & results.table["reason"].str.startswith(HOLDS_AGAIN)
     of_studies = (passed | failed) & results.table["kind"].isin(STUDIES)
-    return Counts(int(passed.sum()), int(failed.sum()), int(of_studies.sum()), int(verdicts.isin(BREAKDOWNS).sum()))
+    broken = verdicts.isin(BREAKDOWNS)
+    return Counts(*(int(rows.sum()) for rows in (passed, failed, known, fixed, of_studies, broken)))
 
 
-def verdicts(results: Results) -> dict[tuple[str, str], list[str]]:
-    """For each scene and engine its verdicts, the worst first."""
-    own = results.table.loc[results.table["kind"] != "agreement", ["scene", "engine", "verdict"]].drop_duplicates()
-    by_engine = own.groupby(["scene", "engine"])["verdict"]
-    return {(str(scene), str(engine)): sorted(mine, key=SEVERITY.index) for (scene, engine), mine in by_engine}
+class Status(NamedTuple):
+    """What became of an engine in a scene: its worst verdict, and the status in words."""
+
+    verdict: str
+    words: str
+
+
+def statuses(results: Results) -> dict[str, dict[str, Status]]:
+    """The status of each engine in each scene."""
+    own = results.table[results.table["kind"] != "agreement"]
+    by_pair = {(str(scene), str(engine)): rows for (scene, engine), rows in own.groupby(["scene", "engine"])}
+    return {scene: {engine: _status(by_pair.get((scene, engine))) for engine in results.engines} for scene in results.scenes}
+
+
+def _status(rows: pd.DataFrame | None) -> Status:
+    if rows is None:
+        return Status("missing", word("missing"))
+    worst = min(rows["verdict"], key=SEVERITY.index)
+    of_model = bool((rows.loc[rows["verdict"] == "known", "cause"] == "model").any())
+    studied = worst in ("passed", "measured") and bool((rows["kind"] == "asymptotic_error").any())
+    words = "known model error" if of_model and worst == "known" else "converges" if studied else STATUS_WORDS.get(worst, word(worst))
+    return Status(worst, words)
 
 
 def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
@@ -118,22 +151,36 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
     judged = tally.passed + tally.failed
     if tally.broken:
         judgement = f"; {tally.failed} of {judged} checks fail" if judged else ""
-        return f"{tally.broken} engine {'run' if tally.broken == 1 else 'runs'} broke down{judgement}."
+        return f"{tally.broken} engine {'run' if tally.broken == 1 else 'runs'} broke down{judgement}{_known(tally)}."
     if tally.failed:
-        return f"{tally.failed} of {judged} checks fail."
+        return f"{tally.failed} of {judged} checks fail{_known(tally)}."
+    if judged == 0 and tally.known:
+        return f"No check passes or fails{_known(tally)}."
     if judged == 0:
         set_at_all = any(scene.expect for scene in results.scenes.values())
         none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
         return f"{none}; {len(results.measurements):,} values were measured."
     kinds = [f"{judged - tally.of_studies} expectations of the scenes", f"{tally.of_studies} orders and asymptotic errors"]
     both = " and ".join(kind for kind in kinds if not kind.startswith("0 "))
-    return f"All {judged} checks pass: {both}."
+    return f"All {judged} checks pass: {both}{_known(tally)}."
+
+
+def _known(tally: Counts) -> str:
+    """The results that show known faults, and those that do no longer, as the end of a sentence."""
+    known = f"; {tally.known} {'result shows' if tally.known == 1 else 'results show'} known faults" if tally.known else ""
+    return known + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not show" if tally.fixed else "")
 
 
 def _undecided(limits: pd.DataFrame) -> list[str]:
     """The metrics, once for each scene, whose interval contains 0 and values that are not negligible, so that no cause is stated."""
     reach = limits[["lower", "upper"]].abs().max(axis=1)
     return [metric.replace("_", " ") for metric in limits.loc[(limits["cause"] == "unresolved") & (reach > NEGLIGIBLE), "metric"]]
+
+
+def _known_scenes(results: Results, engine: str) -> list[str]:
+    """The scenes in which results of an engine show a fault that is expected by name."""
+    rows = results.table[(results.table["engine"] == engine) & (results.table["verdict"] == "known")]
+    return list(rows["scene"].unique())
 
 
 def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
@@ -155,13 +202,16 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
             sentences.append(
                 f"{engine}: model error in {len(stuck)} of {total} scenes ({', '.join(stuck)}): an error that does not vanish as dt → 0."
             )
+        known = [scene for scene in _known_scenes(results, engine) if scene not in stuck]
+        if known:
+            sentences.append(f"{engine}: known {'fault' if len(known) == 1 else 'faults'} at these time steps in {', '.join(known)}.")
         if settings[engine]:
             sentences.append(
                 f"{engine}: setting error in {len(settings[engine])} of {total} scenes ({', '.join(settings[engine])}): "
                 "an error that does not vanish as dt → 0, but that the calibrated profile does not have."
             )
         opened = _undecided(limits[limits["engine"] == engine])
-        if total and not stuck and not settings[engine] and not opened:
+        if total and not stuck and not settings[engine] and not opened and not known:
             where = f" in all {total} scenes" if total > 1 else ""
             sentences.append(f"{engine}: errors above {NEGLIGIBLE:g} vanish as dt → 0{where}.")
         elif opened:

@@ -6,6 +6,7 @@ from functools import cache
 MARKS = {
     "passed": "✓",
     "failed": "✗",
+    "known": "≠",
     "measured": "·",
     "limited": "!",
     "diverged": "∞",
@@ -15,7 +16,7 @@ MARKS = {
     "missing": "?",
     "no_truth": "·",
 }
-WORDS = {"timed_out": "timed out", "no_truth": "no exact solution"}
+WORDS = {"known": "known fault", "timed_out": "timed out", "no_truth": "no exact solution"}
 
 
 def formatted(value: float) -> str:

@@ -6,7 +6,7 @@ import pytest
 
 import scenarios
 from comparisons.engines.base import KnownLimitation
-from comparisons.judging.verdicts import Judgement, judge, verify_expectations, with_limitations
+from comparisons.judging.verdicts import HOLDS_AGAIN, Judgement, judge, judge_asymptotic_error, verify_expectations, with_limitations
 from comparisons.measuring.metrics import METRICS
 
 
@@ -54,6 +54,60 @@ def test_narrowest_expectation_binds(engine, dt, limit):
         {"metric": "energy_error", "below": 1, "engine": "known", "dt": [1e-3, 5e-4]},
     )
     assert judge(scene, engine, dt, METRICS["energy_error"], 0.0).upper == limit
+
+
+FAULT = {"metric": "energy_error", "within": [0.2, 0.3], "engine": "faulty"}
+FOR_ALL = {"metric": "energy_error", "below": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("value", "engine", "expected"),
+    [
+        (0.25, "faulty", "known"),
+        (0.25, "mine", "failed"),
+        (0.31, "faulty", "failed"),
+        (0.1, "faulty", "failed"),
+        (0.001, "faulty", "passed"),
+        (-0.25, "faulty", "failed"),
+        (math.nan, "faulty", "failed"),
+    ],
+)
+def test_fault_that_is_expected_by_name_is_known_and_never_passes(value, engine, expected):
+    """It loosens nothing for other engines; a value that meets what all must meet passes, as the fault is gone."""
+    assert verdict(scene_that_expects(FAULT, FOR_ALL), value, engine=engine) == expected
+
+
+def test_known_fault_that_does_not_show_is_reported():
+    judgement = judge(scene_that_expects(FAULT, FOR_ALL), "faulty", 1e-3, METRICS["energy_error"], 0.001)
+    assert judgement.reason == f"{HOLDS_AGAIN}: why"
+    alone = judge(scene_that_expects(FAULT), "faulty", 1e-3, METRICS["energy_error"], 1e-9)
+    assert (alone.verdict, alone.reason) == ("passed", f"{HOLDS_AGAIN}: why")
+
+
+@pytest.mark.parametrize("named", [{"below": 1e-6}, {"within": [0.001, 0.002]}])
+def test_stricter_expectation_of_one_engine_is_a_check_and_no_fault(named):
+    scene = scene_that_expects({"metric": "energy_error", "engine": "exact"} | named, FOR_ALL)
+    assert verdict(scene, 0.005, engine="exact") == "failed"
+    inside = 1e-7 if "below" in named else 0.0015
+    assert verdict(scene, inside, engine="exact") == "passed"
+
+
+@pytest.mark.parametrize(
+    ("cause", "interval", "expected"),
+    [
+        ("model", (0.29, 0.35), "known"),
+        ("model", (0.31, 0.35), "failed"),
+        ("model", (-0.3, -0.2), "failed"),
+        ("unresolved", (-0.1, 0.3), "measured"),
+        ("discretisation", (-0.001, 0.001), "passed"),
+    ],
+)
+def test_model_error_is_known_if_its_interval_meets_the_expected_one(cause, interval, expected):
+    limit = Judgement(sum(interval) / 2, "measured", *interval, cause, "extrapolated")
+    found = judge_asymptotic_error(scene_that_expects(FAULT, FOR_ALL), "faulty", 1e-3, METRICS["energy_error"], limit)
+    assert found.verdict == expected
+    assert found.reason.startswith(HOLDS_AGAIN) == (expected == "passed")
+    assert judge_asymptotic_error(scene_that_expects(FAULT), "mine", 1e-3, METRICS["energy_error"], limit).verdict != "known"
 
 
 def test_equally_narrow_expectations_both_bind():

@@ -1,11 +1,13 @@
-"""The errors of an engine over a ladder of time steps, from the coarsest to the one at which its error stops falling.
+"""The errors of an engine over a ladder of time steps, from the coarsest to those at which its error stops falling.
 
 Errors are of states at a fixed output interval, the same for every time step, so that all steps are compared at the same times.
 """
 
 import math
+import os
 import time
 from collections.abc import Sequence
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from comparisons.running.inputs import MOST_STEPS, EngineEntry
 from comparisons.running.processes import EngineProcesses, Failed
 from comparisons.running.recording import record
 from comparisons.running.start_phases import StartPhase, start_phases
+from comparisons.tradeoff.ladder import Ending, Ladder
 from scenarios import Scenario, truth_for
 
 DIVISIONS = (1, *(k * 2**j for j in range(22) for k in (2, 3)))
@@ -23,7 +26,8 @@ DIVISIONS = (1, *(k * 2**j for j in range(22) for k in (2, 3)))
 FEWEST_OUTPUTS = 8
 LARGEST_TURN = 1.0
 """Rotation in the coarsest step [rad]."""
-BUDGET_IN_FLIGHT, BUDGET_ON_A_FLOOR = 0.25, 0.05  # s of one run; errors with a floor are means over 32 runs
+BUDGET = 10.0
+"""Processor time of all steps of a configuration together, unless asked otherwise [s]; errors with a floor are means over 32 runs."""
 MOST_RECORDED = 200_000  # steps of one run with a floor, all of which are recorded
 NO_BETTER = 0.8
 """A step whose error is above this share of the step's before does not improve on it."""
@@ -46,72 +50,90 @@ def output_interval(scene: Scenario) -> float:
     return min(intervals)
 
 
-def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str], processes: EngineProcesses) -> list[tuple[float, float]]:
-    """Time steps and errors by the first metric, from the coarsest step to the smallest error, or as far as the budget allows.
+def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str], budget: float, processes: EngineProcesses) -> Ladder:
+    """The errors by the first metric, from the coarsest time step to where they stop falling, or as far as the budget allows.
 
-    By the second metric, that of the motion, the engine must converge. Else it simulates another motion, and a small error by the first
-    metric is worthless: Wang's method keeps the energy of a spin that it gets wrong.
+    By the second metric, that of the motion, the errors must fall too. Else the engine is left out, because it may simulate another motion,
+    of which a small error by the first metric is worthless: Wang's method keeps the energy of a spin that it gets wrong.
 
-    Raises:
-        Failed: The engine is missing, declines the scene, diverges at all steps, or does not converge.
+    Args:
+        entry: The engine.
+        scene: The scene.
+        metrics: The metric of the error, and that of the motion.
+        budget: Processor time of all steps together [s]; the step at which it is exceeded is the last.
+        processes: The engine's process.
     """
-    if entry.engine is None:
-        raise Failed("missing", entry.missing)
-    refusal = entry.engine.declines(scene)
-    if refusal is not None:
-        raise Failed("declined", refusal)
+    refusal = entry.missing if entry.engine is None else entry.engine.declines(scene)
+    if refusal:
+        return Ladder(entry.label, (), "not_run", refusal, refusal)
     interval = output_interval(scene)
-    budget = BUDGET_IN_FLIGHT if scene.floor is None else BUDGET_ON_A_FLOOR
-    found: list[tuple[float, float, float]] = []
-    not_better = 0
-    processes.call(entry, _error, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
-    for division in DIVISIONS:
-        dt = interval / division
-        if scene.duration / dt > (MOST_STEPS if scene.floor is None else MOST_RECORDED):
-            break
-        try:
-            errors, taken = processes.call(entry, _error, scene, dt, division, metrics)
-        except Failed:
-            if found:
-                break  # the coarser steps count
-            raise
-        if np.isfinite(errors).all():
-            not_better = not_better + 1 if found and errors[0] > NO_BETTER * found[-1][1] else 0
-            found.append((dt, *errors))
-        patience = PATIENCE if found and found[-1][1] < SMALL else PATIENCE_WHILE_LARGE
-        if (not_better >= patience and len(found) > FEWEST_POINTS) or taken > budget:
-            break
-    if not found:
-        raise Failed("diverged", "no step gives a finite error")
-    _verify_convergence([error for _, _, error in found], metrics[1])
-    return [(dt, error) for dt, error, _ in found]
+    most = MOST_STEPS if scene.floor is None else MOST_RECORDED
+    tried: list[tuple[float, list[float]]] = []
+    spent = 0.0
+    ended: Ending = "longest_run"
+    reason = f"a run of the next smaller step would have more than {most:,} steps"
+    try:
+        processes.call(entry, _error, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
+        for division in takewhile(lambda division: scene.duration * division / interval <= most, DIVISIONS):
+            tried.append((interval / division, [math.nan] * len(metrics)))
+            errors, taken = processes.call(entry, _error, scene, interval / division, division, metrics)
+            if np.isfinite(errors).all():
+                tried[-1] = (interval / division, errors)
+            spent += taken
+            if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])]):
+                ended, reason = "error_stopped_falling", f"over the last {stalled} steps the error fell by less than a fifth per step"
+                break
+            if spent >= budget:
+                ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
+                break
+    except Failed as failure:
+        ended, reason = ("failed" if tried else "not_run"), failure.reason
+    steps = tuple((dt, errors[0]) for dt, errors in tried)
+    return Ladder(entry.label, steps, ended, reason, _left_out(tried, metrics[1], reason))
 
 
-def _verify_convergence(errors: Sequence[float], metric: str) -> None:
-    """Raise `Failed` if the errors of the motion do not fall with the time step."""
-    stays = max(errors) > SMALL and min(errors) > CONVERGED * max(errors)
-    if stays and len(errors) > FEWEST_POINTS:
-        unit = METRICS[metric].unit
-        value = f"{errors[-1]:.3g}" + ("" if unit == "1" else f" {unit}")
-        raise Failed("failed", f"it does not converge: {metric.replace('_', ' ')} stays at {value}, however small the step")
+def _stalled(errors: Sequence[float]) -> int:
+    """Over how many of the last steps the errors have stopped falling; 0 if they still fall, or if there are too few to say."""
+    patience = PATIENCE if errors and errors[-1] < SMALL else PATIENCE_WHILE_LARGE
+    stays = len(errors) > FEWEST_POINTS and all(later >= NO_BETTER * earlier for earlier, later in pairwise(errors[-patience - 1 :]))
+    return patience if stays else 0
+
+
+def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: str) -> str:
+    """Why an engine has no errors that count: none is finite, or those of the motion do not fall; empty if it has."""
+    if not tried:
+        return reason
+    range_tried = f"{len(tried)} time steps tried, {1e3 * tried[0][0]:.4g} ms to {1e3 * tried[-1][0]:.4g} ms"
+    errors = [motion for _, (_, motion) in tried if np.isfinite(motion)]
+    if not errors:
+        return f"no error is finite at the {range_tried}: {reason}"
+    if len(errors) > FEWEST_POINTS and max(errors) > SMALL and min(errors) > CONVERGED * max(errors):
+        unit = "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
+        return f"no convergence is seen: {metric.replace('_', ' ')} is {min(errors):.3g} to {max(errors):.3g}{unit} at the {range_tried}"
+    return ""
 
 
 def _error(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
-    """Absolute values of metrics at a time step, NaN where one is undefined, and the wall time of a run [s]."""
+    """Absolute values of metrics at a time step, NaN where one is undefined, and the processor time that it took [s]."""
     assert entry.engine is not None
+    start = processor_time()
     truth = truth_for(scene)
     in_flight = scene.floor is None
     phases = [StartPhase(scene, truth)] if in_flight else start_phases(scene, truth, dt)
-    taken, cases = 0.0, []
+    cases = []
     for phase in phases:
-        start = time.perf_counter()
         try:
             motion = record(entry.engine, phase.scene, dt, division if in_flight else 1).motion
         except Diverged:
-            return [math.nan] * len(metrics), 0.0
-        taken += time.perf_counter() - start
+            return [math.nan] * len(metrics), processor_time() - start
         cases.append(Comparison.with_truth(phase.scene, motion, phase.truth))
-    return [_size(metric, cases) for metric in metrics], taken / len(phases)
+    return [_size(metric, cases) for metric in metrics], processor_time() - start
+
+
+def processor_time() -> float:
+    """Processor time of this process and of its children that have ended [s]."""
+    times = os.times()
+    return time.process_time() + times.children_user + times.children_system
 
 
 def _size(metric: str, cases: Sequence[Comparison]) -> float:

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.tradeoff.ladder import Ladder
 from scenarios import Scenario
 
 Array = NDArray[np.float64]
@@ -15,7 +16,7 @@ LEVEL = 1.25
 """Two costs with a smaller ratio than this, or whose order differs between rounds, are level."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CostPoint:
     """An engine at a time step.
 
@@ -46,7 +47,7 @@ class Recommendation:
     Attributes:
         within: The tolerance.
         best: The cheapest point.
-        next_best: The next best; None if no other engine reaches the tolerance.
+        next_best: The next best; None if no other engine reaches the tolerance at a step tried.
         ratio: The cost of the next best over the best's, median of the rounds.
         level: Whether the difference between the two is too small to rely on.
     """
@@ -66,13 +67,18 @@ class TradeOff:
         scene: The scene.
         metric: The metric of the error.
         points: Engines at time steps.
-        left_out: Engines without points, and why.
+        ladders: Of every engine that was asked for, the time steps tried and why no smaller one was.
     """
 
     scene: Scenario
     metric: str
     points: tuple[CostPoint, ...]
-    left_out: dict[str, str] = field(default_factory=dict)
+    ladders: tuple[Ladder, ...]
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Engines without points, and why."""
+        return {ladder.engine: ladder.left_out for ladder in self.ladders if ladder.left_out}
 
     @property
     def pareto_front(self) -> list[CostPoint]:
@@ -85,10 +91,15 @@ class TradeOff:
         return _pareto_front([point for point in self.points if np.isfinite(point.cost_per_world)], lambda point: point.cost_per_world)
 
     @property
-    def dominated(self) -> list[str]:
-        """The engines and methods without a point on the Pareto front."""
-        on_front = {point.engine for point in self.pareto_front}
-        return [label for label in dict.fromkeys(point.engine for point in self.points) if label not in on_front]
+    def dominated(self) -> dict[CostPoint, CostPoint]:
+        """Of each engine without a point on the Pareto front, its most accurate point, and the cheapest that is as accurate."""
+        front = self.pareto_front
+        best: dict[str, CostPoint] = {}
+        for point in sorted(self.points, key=lambda one: one.error, reverse=True):
+            best[point.engine] = point
+        on_front = {point.engine for point in front}
+        inside = [best[ladder.engine] for ladder in self.ladders if ladder.engine in best.keys() - on_front]
+        return {point: next(one for one in front if one.error <= point.error) for point in inside}
 
     def recommendation(self, within: float) -> Recommendation | None:
         """The cheapest point within a tolerance; None if no point is.

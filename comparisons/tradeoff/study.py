@@ -4,8 +4,9 @@ Timed is native stepping alone, of all entries in turn, round after round: a dis
 of costs are taken round by round.
 """
 
+import math
 from collections.abc import Callable, Iterable, Sequence
-from itertools import groupby
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from comparisons.measuring.metrics import leading_metric, metrics_for
 from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, several
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.tradeoff.costs import cost, costs_per_world
-from comparisons.tradeoff.errors import errors_over_steps
+from comparisons.tradeoff.errors import BUDGET, errors_over_steps
+from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
 from scenarios import DropspinError, Scenario, truth_for
 from scenarios.errors import UnknownName
@@ -41,6 +43,7 @@ ON_A_FLOOR = (
     "pybullet[coordinates=multibody]",
 )
 ROUNDS = 9
+NO_COST = "its cost could not be measured: native stepping fails, or does not give a finite state"
 
 OnProgress = Callable[[str, float], None]
 """Called with what is done, and the share of the whole study."""
@@ -51,6 +54,7 @@ def tradeoff(
     engines: Engine | str | Iterable[Engine | str] = (),
     metric: str | None = None,
     *,
+    budget: float = BUDGET,
     on_progress: OnProgress = lambda what, share: None,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
 ) -> TradeOff:
@@ -60,12 +64,15 @@ def tradeoff(
         scene: A scene with an exact solution, its catalogue name, or the path of its file.
         engines: Engines, or names with options; by default the methods that differ on such a scene.
         metric: The metric of the error; by default the scene's leading metric.
+        budget: Processor time for the errors of each engine, at all time steps together [s]; where it is spent, its ladder of steps ends.
         on_progress: Called with what is done, and the share of the whole study.
         resources: What each run may use.
 
     Raises:
-        DropspinError: The scene has no exact solution, or not this metric; or no engine runs it.
+        DropspinError: The scene has no exact solution, or not this metric; the budget is not above 0; or no engine runs the scene.
     """
+    if not 0.0 < budget < math.inf:
+        raise DropspinError(f"budget: got {budget!r}; give a number of seconds above 0.")
     scene = as_scene(scene)
     truth = truth_for(scene)
     if truth is None:
@@ -75,46 +82,52 @@ def tradeoff(
     known = [one.name for one in metrics_for(scene, truth)]
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
-    entries = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
+    entries = {one.label: one for one in named}
     with EngineProcesses(resources) as processes:
-        ladders, left_out = _errors(entries, scene, [chosen, of_the_motion], processes, on_progress)
-        found = _with_costs(ladders, scene, processes, on_progress)
-    return TradeOff(scene, chosen, tuple(point for point in found if np.isfinite(point.cost).all()), left_out)
-
-
-def _errors(
-    entries: Sequence[EngineEntry], scene: Scenario, metrics: Sequence[str], processes: EngineProcesses, on_progress: OnProgress
-) -> tuple[list[tuple[EngineEntry, float, float]], dict[str, str]]:
-    """Engines with time steps and errors, and the engines left out, with reasons."""
-    ladders: list[tuple[EngineEntry, float, float]] = []
-    left_out: dict[str, str] = {}
-    for number, entry in enumerate(entries):
-        try:
-            errors = errors_over_steps(entry, scene, metrics, processes)
-        except Failed as failure:
-            left_out[entry.label] = failure.reason
-            continue
-        ladders += [(entry, dt, error) for dt, error in errors]
-        on_progress(f"errors of {entry.label}", 0.5 * (number + 1) / len(entries))
-    if not ladders:
-        raise DropspinError(f"no engine runs {scene.name}: {'; '.join(f'{label}: {why}' for label, why in left_out.items())}.")
-    return ladders, left_out
+        ladders = []
+        for number, entry in enumerate(entries.values(), 1):
+            ladders.append(errors_over_steps(entry, scene, [chosen, of_the_motion], budget, processes))
+            on_progress(f"errors of {entry.label}", 0.5 * number / len(entries))
+        points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, processes, on_progress)
+    measured = {point.engine for point in points}
+    ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
+    found = TradeOff(scene, chosen, points, tuple(ladders))
+    if not points:
+        raise DropspinError(f"no engine runs {scene.name}: {'; '.join(f'{label}: {why}' for label, why in found.left_out.items())}.")
+    return found
 
 
 def _with_costs(
-    ladders: Sequence[tuple[EngineEntry, float, float]], scene: Scenario, processes: EngineProcesses, on_progress: OnProgress
-) -> list[CostPoint]:
-    """Cost points: each time step in every round, and in a batch."""
-    costs: list[list[float]] = [[] for _ in ladders]
+    ladders: Sequence[tuple[EngineEntry, Ladder]], scene: Scenario, processes: EngineProcesses, on_progress: OnProgress
+) -> tuple[CostPoint, ...]:
+    """The steps of ladders with a finite error, with their cost in every round and in a batch; without those whose cost is not finite."""
+    steps = [(entry, dt, error) for entry, ladder in ladders for dt, error in ladder.steps if np.isfinite(error)]
+    costs: list[list[float]] = [[] for _ in steps]
     for number in range(ROUNDS):
-        for rounds, (entry, dt, _) in zip(costs, ladders, strict=True):
-            rounds.append(processes.call(entry, cost, scene, dt))
+        for rounds, (entry, dt, _) in zip(costs, steps, strict=True):
+            rounds.append(math.nan if rounds and math.isnan(rounds[-1]) else _cost(entry, scene, dt, processes))
         on_progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
     per_world: list[float] = []
-    for entry, some in groupby(ladders, lambda point: point[0]):
-        per_world += processes.call(entry, costs_per_world, scene, [dt for _, dt, _ in some])
+    for entry, _ in ladders:
+        per_world += _costs_per_world(entry, scene, [dt for mine, dt, _ in steps if mine is entry], processes)
     on_progress("batches", 1.0)
-    return [
+    return tuple(
         CostPoint(entry.label, dt, error, np.array(rounds), batch)
-        for (entry, dt, error), rounds, batch in zip(ladders, costs, per_world, strict=True)
-    ]
+        for (entry, dt, error), rounds, batch in zip(steps, costs, per_world, strict=True)
+        if np.isfinite(rounds).all()
+    )
+
+
+def _cost(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineProcesses) -> float:
+    try:
+        return processes.call(entry, cost, scene, dt)
+    except Failed:
+        return math.nan
+
+
+def _costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], processes: EngineProcesses) -> list[float]:
+    try:
+        return processes.call(entry, costs_per_world, scene, dts)
+    except Failed:
+        return [math.nan] * len(dts)

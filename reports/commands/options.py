@@ -28,14 +28,19 @@ def _finite(context: click.Context, parameter: click.Parameter, value: float) ->
     return value
 
 
-def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
-    """The option `--time-limit` of an engine's process."""
+def seconds_option(name: str, default: float, of: str) -> Callable[[Command], Command]:
+    """An option that is a processor time."""
     return click.option(
-        "--time-limit",
+        name,
         type=click.FloatRange(min=0.0, min_open=True),
         default=default,
         show_default=True,
         metavar="SECONDS",
         callback=_finite,
-        help=f"Processor time that {of}.",
+        help=f"Processor time {of}",
     )
+
+
+def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
+    """The option `--time-limit` of an engine's process."""
+    return seconds_option("--time-limit", default, f"that {of}.")

@@ -6,7 +6,7 @@ import os
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json
+from reports.commands.options import as_json, seconds_option
 
 
 @click.command("tradeoff")
@@ -22,12 +22,21 @@ from reports.commands.options import as_json
     metavar="TOLERANCE",
     help="The largest error allowed; repeat for more.",
 )
+@seconds_option(
+    "--budget", 10.0, "for the errors of one engine, at all its time steps together; no smaller step is tried once it is spent."
+)
 @click.option("-o", "--output", default="out/tradeoff", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
 @as_json
 def tradeoff_command(
-    scenes: tuple[str, ...], engines: tuple[str, ...], metric: str | None, within: tuple[float, ...], output: str, json_output: bool
+    scenes: tuple[str, ...],
+    engines: tuple[str, ...],
+    metric: str | None,
+    within: tuple[float, ...],
+    budget: float,
+    output: str,
+    json_output: bool,
 ) -> None:
-    """Measure what accuracy costs: error against time over a ladder of time steps, and the cheapest configuration within a tolerance.
+    """Measure what accuracy costs: error against time over a ladder of time steps, and the cheapest one tested within a tolerance.
 
     Without arguments: the scene spin-asymmetric and the methods that differ on it.
     """
@@ -35,7 +44,7 @@ def tradeoff_command(
     from reports.output import folder_made
     from reports.study_files import write_tradeoff
     from reports.terminal.progress import share_bar
-    from reports.terminal.rows import print_rows
+    from reports.terminal.rows import print_rows, print_sentences
     from reports.views import tradeoff as view
     from scenarios import load
 
@@ -48,11 +57,10 @@ def tradeoff_command(
                     stop_if_interrupted()
                     progress(what, share)
 
-                found.append(tradeoff(load(name), engines, metric, on_progress=on_progress))
+                found.append(tradeoff(load(name), engines, metric, budget=budget, on_progress=on_progress))
             if not json_output:
                 print_rows(view.pareto_front_rows(found[-1]), json_output=False)
-                for sentence in view.sentences(found[-1], within):
-                    click.echo(sentence)
+                print_sentences(view.sentences(found[-1], within))
         write_tradeoff(found, within, folder)
     if json_output:
         click.echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))

@@ -8,53 +8,87 @@ import numpy as np
 
 from comparisons.measuring.metrics import METRICS
 from comparisons.tradeoff.costs import BATCH
+from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
 
-COLUMNS = ("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "cost_per_world", "on_pareto_front")
+COLUMNS = (
+    *("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "cost_per_world", "on_pareto_front"),
+    *("dominated_by", "ladder_ended", "ladder_reason", "left_out"),
+)
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
-    """Every point: its error, and the time per simulated second as median, best and quartiles of the rounds [s]."""
+    """Every time step tried with every engine, and a row without a step of an engine that was not run.
+
+    With its error, the time per simulated second as median, best and quartiles of the rounds [s], and why the engine's ladder ended.
+    """
+    points = {(point.engine, point.dt): point for point in found.points}
     front = found.pareto_front
+    dominated_by = {point.engine: other.engine for point, other in found.dominated.items()}
     return [
         {
             "scene": found.scene.name,
             "metric": found.metric,
-            "engine": point.engine,
-            "dt": point.dt,
-            "error": point.error,
-            "cost": point.typical_cost,
-            "cost_best": float(point.cost.min()),
-            "cost_quartiles": [float(value) for value in np.quantile(point.cost, [0.25, 0.75])],
-            "cost_per_world": None if math.isnan(point.cost_per_world) else point.cost_per_world,
-            "on_pareto_front": point in front,
+            "engine": ladder.engine,
+            "dt": _finite(dt),
+            "error": _finite(error),
+            **_costs(points.get((ladder.engine, dt))),
+            "on_pareto_front": any(point.engine == ladder.engine and point.dt == dt for point in front),
+            "dominated_by": dominated_by.get(ladder.engine),
+            "ladder_ended": ladder.ended,
+            "ladder_reason": ladder.reason,
+            "left_out": ladder.left_out or None,
         }
-        for point in found.points
+        for ladder in found.ladders
+        for dt, error in ladder.steps or [(math.nan, math.nan)]
     ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _costs(point: CostPoint | None) -> dict[str, Any]:
+    if point is None:
+        return dict.fromkeys(("cost", "cost_best", "cost_quartiles", "cost_per_world"))
+    return {
+        "cost": point.typical_cost,
+        "cost_best": float(point.cost.min()),
+        "cost_quartiles": [float(value) for value in np.quantile(point.cost, [0.25, 0.75])],
+        "cost_per_world": _finite(point.cost_per_world),
+    }
 
 
 def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
-    """The Pareto front in words, from the cheapest to the most accurate."""
-    unit = _unit(found)
-    return [
-        {
-            "engine": point.engine,
-            "step": f"{1e3 * point.dt:.4g} ms",
-            "error": f"{point.error:.2e}{unit}",
-            "per simulated second": _time(point.typical_cost),
-            "best": _time(float(point.cost.min())),
-            f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else _time(point.cost_per_world),
-        }
-        for point in found.pareto_front
-    ]
+    """The Pareto front, cheapest first; then the most accurate step of each dominated engine; then the engines left out."""
+    on_front = [_row(found, point, "yes") for point in found.pareto_front]
+    dominated = [_row(found, point, f"dominated by {other.engine}") for point, other in found.dominated.items()]
+    left_out = [dict(zip(on_front[0], (label, *["–"] * 4, "left out, see below"), strict=True)) for label in found.left_out]
+    return on_front + dominated + left_out
+
+
+def _row(found: TradeOff, point: CostPoint, on_front: str) -> dict[str, str]:
+    return {
+        "engine": point.engine,
+        "step [ms]": f"{1e3 * point.dt:.4g}",
+        f"error [{METRICS[found.metric].unit}]": f"{point.error:.2e}",
+        "per simulated second": _time(point.typical_cost),
+        f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else _time(point.cost_per_world),
+        "on the Pareto front": on_front,
+    }
 
 
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
-    """The cheapest configuration within each tolerance, then the engines that are dominated and those that are left out."""
-    listed = [_recommendation(found, tolerance) for tolerance in within]
-    if found.dominated:
-        listed.append(f"Dominated, less accurate or slower than another engine at every time step: {', '.join(found.dominated)}.")
-    return listed + [f"Left out: {label}, {why}." for label, why in found.left_out.items()]
+    """The cheapest configuration within each tolerance, then where and why each ladder of time steps ended, and who is left out."""
+    ended: dict[str, list[str]] = {}
+    for ladder in found.ladders:
+        if ladder.steps:
+            ended.setdefault(_reason(ladder), []).append(f"{ladder.engine} at {_step(ladder.steps[-1][0])}")
+    return [
+        *(_recommendation(found, tolerance) for tolerance in within),
+        *(f"No smaller step was tried because {reason}: {', '.join(labels)}." for reason, labels in ended.items()),
+        *(f"Left out: {label}, {why}." for label, why in found.left_out.items()),
+    ]
 
 
 def _recommendation(found: TradeOff, tolerance: float) -> str:
@@ -64,10 +98,16 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
     advice = found.recommendation(tolerance)
     if advice is None:
         nearest = min(found.points, key=lambda point: point.error)
-        return f"{goal}: no tested configuration reaches it; the most accurate is {_named(nearest)} with {nearest.error:.2e}{unit}."
+        ladder = next(one for one in found.ladders if one.engine == nearest.engine)
+        last = ladder.steps[-1][0]
+        where = "where its ladder of steps ended" if nearest.dt == last else f"and its ladder of steps ended at {_step(last)}"
+        return (
+            f"{goal}: no tested configuration reaches it; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}, "
+            f"{where} because {_reason(ladder)}."
+        )
     sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical_cost)} per simulated second"
     if advice.next_best is None:
-        sentence += "; no other engine reaches it."
+        sentence += "; no other tested configuration reaches it."
     elif advice.level:
         sentence += f"; {_named(advice.next_best)} takes about as long, {advice.ratio:.2f} times that."
     else:
@@ -78,8 +118,16 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
     return sentence
 
 
+def _reason(ladder: Ladder) -> str:
+    return ladder.reason + (" (option --budget)" if ladder.ended == "budget" else "")
+
+
+def _step(dt: float) -> str:
+    return f"{1e3 * dt:.4g} ms"
+
+
 def _named(point: CostPoint) -> str:
-    return f"{point.engine} at {1e3 * point.dt:.4g} ms"
+    return f"{point.engine} at {_step(point.dt)}"
 
 
 def _unit(found: TradeOff) -> str:

@@ -1,13 +1,19 @@
 """The trade-off study: the ladder of steps, the Pareto front, and the recommendation. No assertion depends on the machine's speed."""
 
+import os
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from support.engines import Exact, ExactSimulation
 
+from comparisons.engines.base import Diverged
 from comparisons.measuring.metrics import METRICS, leading_metric
 from comparisons.running.recording import simulate
 from comparisons.running.run import measure
 from comparisons.tradeoff import costs, errors, study
 from comparisons.tradeoff.errors import DIVISIONS, output_interval
+from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
 from comparisons.tradeoff.study import tradeoff
 from scenarios import DropspinError, load
@@ -17,7 +23,13 @@ SPIN = load("spin-asymmetric")
 
 def made(*points):
     """A trade-off of points (engine, dt, error, cost in each of three rounds)."""
-    return TradeOff(SPIN, "orientation_error", tuple(CostPoint(engine, dt, error, np.array(cost)) for engine, dt, error, cost in points))
+    return found_with(CostPoint(engine, dt, error, np.array(cost)) for engine, dt, error, cost in points)
+
+
+def found_with(points):
+    points = tuple(points)
+    ladders = [Ladder(name, (), "budget", "") for name in dict.fromkeys(point.engine for point in points)]
+    return TradeOff(SPIN, "orientation_error", points, tuple(ladders))
 
 
 def test_steps_divide_the_output_interval():
@@ -36,7 +48,8 @@ def test_pareto_front_has_no_point_that_is_beaten_in_error_and_cost():
         ("beaten", 0.2, 2e-1, [2, 2, 2]),
     )
     assert [point.engine for point in found.pareto_front] == ["fast", "middling", "slow"]
-    assert found.dominated == ["beaten"]
+    [(beaten, by)] = found.dominated.items()
+    assert (beaten.engine, beaten.dt, by.engine) == ("beaten", 0.1, "middling")  # its most accurate, and the cheapest that is as accurate
 
 
 def test_recommendation_is_the_cheapest_within_the_tolerance():
@@ -51,8 +64,7 @@ def test_recommendation_is_the_cheapest_within_the_tolerance():
 def test_best_in_batch_is_among_engines_with_batches():
     """By cost per world, at the coarsest time step within the tolerance."""
     ways = [("lanes", 0.2, 1e-2, 1e-8), ("lanes", 0.1, 1e-4, 2e-8), ("threads", 0.1, 1e-4, 3e-8), ("alone", 0.1, 1e-5, np.nan)]
-    points = tuple(CostPoint(engine, dt, error, np.array([1.0]), cost) for engine, dt, error, cost in ways)
-    found = TradeOff(SPIN, "orientation_error", points)
+    found = found_with(CostPoint(engine, dt, error, np.array([1.0]), cost) for engine, dt, error, cost in ways)
     best = found.best_in_batch(1e-3)
     assert (best.engine, best.dt) == ("lanes", 0.1)
     assert found.best_in_batch(1e-5) is None
@@ -117,7 +129,10 @@ def test_errors_fall_by_their_order(spin):
 
 def test_engine_that_does_not_converge_is_left_out(spin):
     """Wang's method has no gyroscopic term: it converges to another motion."""
-    assert "does not converge" in spin.left_out["document"]
+    assert spin.left_out["document"].startswith("no convergence is seen: orientation error is 1.")
+    [ladder] = [one for one in spin.ladders if one.engine == "document"]
+    coarsest, finest = (f"{1e3 * dt:.4g} ms" for dt, _ in (ladder.steps[0], ladder.steps[-1]))
+    assert spin.left_out["document"].endswith(f"at the {len(ladder.steps)} time steps tried, {coarsest} to {finest}")
     assert {point.engine for point in spin.points} == {f"document[rotation={name}]" for name in ("midpoint", "rk4", "exact")}
     assert min(point.error for point in spin.points if "exact" in point.engine) < 1e-13
 
@@ -126,10 +141,125 @@ def test_engine_that_conserves_the_energy_of_a_wrong_motion_is_left_out():
     """Wang's method keeps the energy of a spin that it gets wrong; midpoint keeps that of the right one."""
     short = SPIN.model_copy(update={"duration": 10.0})
     found = tradeoff(short, ["document", "document[rotation=midpoint]", "document[rotation=rk4]"], metric="energy_error")
-    assert "does not converge: orientation error" in found.left_out["document"]
+    assert "no convergence is seen: orientation error" in found.left_out["document"]
     of = {name: [point.error for point in found.points if name in point.engine] for name in ("midpoint", "rk4")}
     assert max(of["midpoint"]) < 1e-11  # measured 1e-13, at steps of a radian too
     assert of["rk4"][0] > 1e-4
+
+
+class Clock:
+    """A clock that engines of a test advance."""
+
+    now = 0.0
+
+
+class FirstOrder(Exact):
+    """Turns too fast by a share of the step, and takes 1 ms of processor time per step; below `smallest` it ends its process."""
+
+    name = "first-order"
+    smallest = 0.0
+
+    def prepare(self, scene, dt):
+        if dt < self.smallest:
+            os.abort()
+        simulation = ExactSimulation(scene, dt)
+        simulation._truth = lambda t, truth=simulation._truth: truth(t * (1.0 + 0.1 * dt))
+        record = simulation.record
+        simulation._truth.horizon = np.inf
+
+        def counted(steps, every=1):
+            Clock.now += 1e-3 * steps
+            return record(steps, every)
+
+        simulation.record = counted
+        return simulation
+
+
+class Aborting(FirstOrder):
+    """The same, but its process ends at steps below 50 ms."""
+
+    name = "fails-below-50-ms"
+    smallest = 0.05
+
+
+class Never(Exact):
+    """Gives up at every step."""
+
+    name = "never"
+
+    def prepare(self, scene, dt):
+        raise Diverged("no step is small enough")
+
+
+@pytest.fixture
+def _processor_time_of_the_steps(monkeypatch):
+    monkeypatch.setattr(errors, "processor_time", lambda: Clock.now)
+
+
+SHORT = SPIN.model_copy(update={"duration": 4.0})
+
+
+@pytest.mark.usefixtures("_processor_time_of_the_steps")
+@pytest.mark.parametrize("budget", [0.05, 0.2, 1.0])
+def test_ladder_ends_where_the_budget_of_processor_time_is_spent(budget):
+    """The steps tried are those whose processor times, all but the last, are together within the budget; more budget, more steps."""
+    found = tradeoff(SHORT, [FirstOrder()], budget=budget)
+    [ladder] = found.ladders
+    spent = np.cumsum([1e-3 * SHORT.steps(dt) for dt, _ in ladder.steps])
+    assert spent[-2] < budget <= spent[-1]
+    assert (ladder.ended, ladder.reason) == ("budget", f"the budget of {budget:g} s of processor time was spent")
+    assert all(finer < 0.9 * coarser for (_, coarser), (_, finer) in pairwise(ladder.steps))  # it could have gone on
+
+
+@pytest.mark.usefixtures("_processor_time_of_the_steps")
+def test_every_engine_that_was_asked_for_has_a_ladder_with_the_reason_of_its_end():
+    names = ["document[rotation=exact]", "mujoco[integrator=rk4]"]
+    found = tradeoff(SHORT, [FirstOrder(), Aborting(), Never(), *names, names[0]], budget=0.5)
+    ladders = {ladder.engine: ladder for ladder in found.ladders}
+    assert {name: (one.ended, bool(one.left_out)) for name, one in ladders.items()} == {
+        "first-order": ("budget", False),
+        "fails-below-50-ms": ("failed", False),
+        "never": ("longest_run", True),
+        names[0]: ("error_stopped_falling", False),
+        names[1]: ("error_stopped_falling", False),
+    }
+    failing = ladders["fails-below-50-ms"]
+    assert failing.reason == "its process was ended by SIGABRT"
+    assert [np.isfinite(error) for dt, error in failing.steps] == [dt >= 0.05 for dt, _ in failing.steps]
+    assert failing.steps[-1][0] < 0.05
+    assert len([point for point in found.points if point.engine == failing.engine]) == len(failing.steps) - 1
+
+
+def test_ladder_that_ends_at_the_longest_run_says_so(monkeypatch):
+    monkeypatch.setattr(errors, "MOST_STEPS", 60)
+    [ladder] = tradeoff(SHORT, ["mujoco"]).ladders
+    assert (ladder.ended, ladder.reason) == ("longest_run", "a run of the next smaller step would have more than 60 steps")
+    assert 60 / 1.5 <= SHORT.steps(ladder.steps[-1][0]) <= 60
+
+
+class NoCost(Exact):
+    """Fails when it is timed."""
+
+    name = "no-cost"
+
+    def prepare(self, scene, dt):
+        simulation = ExactSimulation(scene, dt)
+        simulation.advance = None
+        return simulation
+
+
+def test_engine_whose_cost_cannot_be_measured_is_left_out_with_the_reason():
+    found = tradeoff(SHORT, [NoCost(), "document[rotation=exact]"])
+    assert list(found.left_out) == ["no-cost"]
+    assert "cost could not be measured" in found.left_out["no-cost"]
+    with pytest.raises(DropspinError, match="no engine runs spin-asymmetric: no-cost: its cost could not be measured"):
+        tradeoff(SHORT, [NoCost()])
+
+
+@pytest.mark.parametrize("budget", [0.0, -1.0, np.nan, np.inf])
+def test_budget_must_be_a_time_above_0(budget):
+    with pytest.raises(DropspinError, match="budget: got"):
+        tradeoff(SHORT, ["mujoco"], budget=budget)
 
 
 def test_every_cost_is_a_positive_time(spin):

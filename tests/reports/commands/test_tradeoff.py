@@ -4,6 +4,9 @@ import json
 
 from support.cli import dropspin
 
+from comparisons.tradeoff.errors import BUDGET
+from reports.commands.tradeoff import tradeoff_command
+
 SCENE = """
 duration = 0.5
 [body]
@@ -22,8 +25,9 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     assert done.returncode == 0, done.stderr
     output = " ".join(done.stdout.split())
     assert "orientation error within 1e-09 rad: document[rotation=" in output
-    assert "within 1e-30 rad: no tested configuration reaches it; the most accurate is document[rotation=" in output
-    assert "Left out: document, it does not converge: orientation error stays at" in output
+    assert "within 1e-30 rad: no tested configuration reaches it; the nearest is document[rotation=" in output
+    assert "Left out: document, no convergence is seen: orientation error is" in output
+    assert "No smaller step was tried because over the last 2 steps the error fell by less than a fifth per step: document[" in output
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "section.json",
         "short.svg",
@@ -32,10 +36,26 @@ def test_pareto_front_recommendations_and_files(tmp_path):
         "tradeoff.md",
     ]
     rows = json.loads((tmp_path / "out" / "tradeoff.json").read_text())
-    assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]"}
-    assert all(row["cost_best"] <= row["cost"] for row in rows)
-    assert any(row["on_pareto_front"] for row in rows)
-    assert all(row["cost_per_world"] > 0.0 for row in rows)
+    assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]", "document"}
+    assert {row["engine"] for row in rows if row["left_out"]} == {"document"}
+    compared = [row for row in rows if not row["left_out"]]
+    assert all(row["cost_best"] <= row["cost"] for row in compared)
+    assert any(row["on_pareto_front"] for row in compared)
+    assert all(row["cost_per_world"] > 0.0 for row in compared)
+
+
+def test_budget_is_an_option_with_the_default_of_the_study(tmp_path):
+    """A budget that any run exceeds ends every ladder at its first step, and the output says so."""
+    [option] = [one for one in tradeoff_command.params if one.name == "budget"]
+    assert option.default == BUDGET
+    (tmp_path / "short.toml").write_text(SCENE)
+    done = dropspin("tradeoff", "short.toml", "-e", "mujoco", "-e", "pybullet", "--budget", "1e-9", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    output = " ".join(done.stdout.split())
+    assert "because the budget of 1e-09 s of processor time was spent (option --budget): mujoco at 62.5 ms, pybullet at 62.5 ms." in output
+    assert {row["dt"] for row in json.loads((tmp_path / "out/tradeoff.json").read_text())} == {0.0625}
+    refused = dropspin("tradeoff", "short.toml", "--budget", "inf", cwd=tmp_path)
+    assert (refused.returncode, "is not a finite number of seconds" in refused.stderr) == (2, True)
 
 
 def test_a_scene_without_an_exact_solution_is_refused(tmp_path):

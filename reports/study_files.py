@@ -22,11 +22,11 @@ def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
         section.add_table(steps)
     for one in found:
         section.add_heading(one.scene.name)
+        section.add_text(limits.nominal(one))
         if one.scans:
             section.add_picture(one.scene.name, limits_figure(one))
-            section.add_table(limits.range_rows([one]))
-        for engine, why in one.left_out.items():
-            section.add_text(f"Left out: {engine}, {why}.")
+            section.add_table(limits.range_rows(one))
+        section.add_list(limits.sentences(one))
     section.write(folder, "limits")
 
 

@@ -95,8 +95,8 @@ def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
     gain = float(np.max(whole.energy) - whole.energy[0]) / scale
     if not gain <= BLOWN_UP:
         yield Diagnosis("diverged", "blows up", gain, f"the energy rises by {gain:.1e} of the scene's")
-    elif gain > (GAIN_BY_LAW if _may_gain(whole.scene) else GAIN):
-        yield Diagnosis("gains_energy", "gains energy", gain, f"the energy rises by {gain:.2g} of the scene's")
+    elif gain > (limit := GAIN_BY_LAW if _may_gain(whole.scene) else GAIN):
+        yield Diagnosis("gains_energy", "gains energy", gain, f"the energy rises by {gain:.4g} of the scene's (limit {limit:g})")
 
 
 def _may_gain(scene: Scenario) -> bool:
@@ -141,7 +141,8 @@ def _errors(motion: ExtendedMotion, own: Comparison, within: float) -> Iterator[
         else:
             unit = "" if metric.unit == "1" else f" {metric.unit}"
             name = metric.name.replace("_", " ")
-            message = f"{name} is {size:.2g}{unit}" if math.isfinite(size) else f"{name} is undefined: no impact was detected"
+            value = f"{name} is {size:.4g}{unit} (tolerance {within:g})"
+            message = value if math.isfinite(size) else f"{name} is undefined: no impact was detected"
             yield Diagnosis("inaccurate", metric.name, size if math.isfinite(size) else math.inf, message)
 
 
@@ -154,7 +155,9 @@ def _position_off(own: Comparison) -> Iterator[Diagnosis]:
     distance = distance if distance > DEEPER * size else size
     error = float(length(own.motion.position[: len(exact)] - exact).max()) / distance
     if not error <= POSITION_OFF:
-        yield Diagnosis("inaccurate", "position", error, f"the position error is {error:.2g} of the distance covered")
+        yield Diagnosis(
+            "inaccurate", "position", error, f"the position error is {error:.3g} of the distance covered (limit {POSITION_OFF:g})"
+        )
 
 
 def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosis]:
@@ -165,7 +168,8 @@ def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosi
     fastest = float(np.linalg.norm(motion.whole.velocity[late], axis=1).max())
     allowed = motion.dt * float(np.linalg.norm(motion.scene.acceleration))
     if fastest > NEVER_RESTS * allowed:
-        message = f"the body never rests: it moves at {fastest:.2g} m/s, {fastest / allowed:.3g} times g dt, where the exact solution rests"
+        speed = f"{fastest:.2g} m/s, {fastest / allowed:.3g} times g dt (limit {NEVER_RESTS:g})"
+        message = f"the body moves at {speed} in the last tenth of {motion.whole.t[-1]:.3g} s, where the exact solution rests"
         yield Diagnosis("inaccurate", "never rests", fastest / allowed, message)
 
 

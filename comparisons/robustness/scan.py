@@ -1,13 +1,14 @@
-"""The scan of an axis: a few values, and bisection between neighbours with different failure modes."""
+"""The scan of an axis: a few values, and bisection between neighbours with different failure modes; and smaller steps than the nominal."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from comparisons.robustness.axes import Axis
+from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.failure_modes import Diagnosis, FailureMode
 from comparisons.robustness.operating_point import OperatingPoint
-from comparisons.robustness.runner import Runner
+from comparisons.robustness.runner import MOST_ROWS, Runner
+from comparisons.running.inputs import MOST_STEPS
 from scenarios import Scenario
 
 NEAR = 1.03
@@ -16,6 +17,10 @@ MOST_TRANSITIONS = 3
 """Between two of the first values; more of them would be chance."""
 UNSTEADY = "timed_out"
 """The failure mode whose transitions depend on the machine, and are not bisected."""
+
+MOST_HALVINGS = 6
+FINAL = frozenset({"sound", "declined", "crashed", "timed_out"})
+"""Failure modes at which no smaller step is tried."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +78,34 @@ class AxisScan:
         return first, last
 
 
+def refine(runner: Runner, nominal: OperatingPoint, on_progress: Callable[[float], None] = lambda dt: None) -> tuple[ScanPoint, ...]:
+    """An engine at the nominal time step, and at halves of it until it is sound, `MOST_HALVINGS` at most.
+
+    With a floor every step is recorded, because impacts are judged from that only.
+    """
+    diagnose = runner.along(nominal, AXES["step"])
+    most = MOST_STEPS if nominal.scene.floor is None else MOST_ROWS
+    points: list[ScanPoint] = []
+    for dt in (nominal.dt / 2**halving for halving in range(1 + MOST_HALVINGS)):
+        if points and (nominal.scene.duration / dt > most or points[-1].mode in FINAL):
+            break
+        points.append(ScanPoint(dt, diagnose(dt)))
+        on_progress(dt)
+    return tuple(points)
+
+
 def scan_axis(
-    runner: Runner, nominal: OperatingPoint, axis: Axis, near: float = NEAR, on_progress: Callable[[float], None] = lambda value: None
+    runner: Runner,
+    nominal: OperatingPoint,
+    axis: Axis,
+    near: float = NEAR,
+    on_progress: Callable[[float], None] = lambda value: None,
+    known: Sequence[ScanPoint] = (),
 ) -> AxisScan:
-    """Scan an axis with an engine; `on_progress` is called with each value that is done."""
+    """Scan an axis with an engine; `on_progress` is called with each value that is done, `known` points are part of the scan."""
     base = axis.base(nominal)
     diagnose = runner.along(nominal, axis)
-    points: dict[float, ScanPoint] = {}
+    points = {one.value: one for one in known}
 
     def point(value: float) -> ScanPoint:
         if value not in points:
@@ -87,7 +113,7 @@ def scan_axis(
             on_progress(value)
         return points[value]
 
-    first = [point(value) for value in sorted({*axis.values(nominal), base})]
+    first = [point(value) for value in sorted({*axis.values(nominal), base, *points})]
     for low, high in pairwise(first):
         _find_transitions(point, axis, near, low, high)
     return AxisScan(nominal.scene, axis, runner.label, base, tuple(points[value] for value in sorted(points)))

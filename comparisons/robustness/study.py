@@ -4,13 +4,13 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product, takewhile
+from itertools import takewhile
 
 from comparisons.engines.base import Engine
 from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
-from comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
+from comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
 from comparisons.running.inputs import as_scene, engine_entry, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from scenarios import DropspinError, Scenario
@@ -51,6 +51,7 @@ class RobustnessStudy:
         within: The largest error that counts as accurate.
         scans: Each engine along each axis.
         left_out: Engines that do not run the scene, and why.
+        refinements: Of each other engine, the nominal time step, and the smaller ones tried where it is not sound there.
     """
 
     scene: Scenario
@@ -58,10 +59,16 @@ class RobustnessStudy:
     within: float
     scans: tuple[AxisScan, ...]
     left_out: dict[str, str]
+    refinements: dict[str, tuple[ScanPoint, ...]]
+
+    def steps(self, engine: str) -> tuple[ScanPoint, ...]:
+        """An engine at each time step tried, in the order of the steps."""
+        scanned = (one.points for one in self.scans if one.axis.name == "step" and one.engine == engine)
+        return next(scanned, tuple(reversed(self.refinements.get(engine, ()))))
 
     def largest_steps(self, engine: str) -> tuple[float | None, float | None]:
-        """The largest time steps at and below which an engine is accurate, and stable [s]; None if it is not at the finest."""
-        points = next((one.points for one in self.scans if one.axis.name == "step" and one.engine == engine), ())
+        """The largest time steps tried at which, and at all smaller ones tried, an engine is accurate, and stable [s]; None without one."""
+        points = self.steps(engine)
         return _last_in_a_row(points, ACCURATE), _last_in_a_row(points, STABLE)
 
 
@@ -103,13 +110,17 @@ def find_limits(
     named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
     entries = list({one.label: one for one in named}.values())
     left_out = {one.label: one.missing for one in entries if one.engine is None}
-    work = list(product([one for one in entries if one.engine is not None], chosen))
-    scans = []
+    present = [one for one in entries if one.engine is not None]
+    scans, refinements = [], {}
+    nominal = OperatingPoint(scene, dt)
     with EngineProcesses(resources) as processes:
-        for number, (entry, axis) in enumerate(work):
-            report = partial(_report, on_progress, f"{entry.label}, {axis.name}", number / len(work))
-            scans.append(scan_axis(Runner(entry, within, processes), OperatingPoint(scene, dt), axis, on_progress=report))
-    return RobustnessStudy(scene, dt, within, tuple(scans), left_out)
+        for number, entry in enumerate(present):
+            runner, share = Runner(entry, within, processes), number / len(present)
+            known = refinements[entry.label] = refine(runner, nominal, partial(_report, on_progress, f"{entry.label}, dt", share))
+            for done, axis in enumerate(chosen):
+                report = partial(_report, on_progress, f"{entry.label}, {axis.name}", share + done / len(chosen) / len(present))
+                scans.append(scan_axis(runner, nominal, axis, on_progress=report, known=known if axis.name == "step" else ()))
+    return RobustnessStudy(scene, dt, within, tuple(scans), left_out, refinements)
 
 
 def _report(on_progress: Callable[[str, float], None], what: str, share: float, value: float) -> None:

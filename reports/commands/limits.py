@@ -47,7 +47,7 @@ def limits_command(
     from reports.output import folder_made
     from reports.study_files import write_limits
     from reports.terminal.progress import share_bar
-    from reports.terminal.rows import print_rows
+    from reports.terminal.rows import print_rows, print_sentences
     from reports.views import limits as view
     from scenarios import load
 
@@ -70,7 +70,11 @@ def limits_command(
     if json_output:
         click.echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
         return
-    for rows in (view.range_rows(found), view.step_rows(found)):
-        if rows:
+    for one in found:
+        print_sentences([view.nominal(one)])
+        if rows := view.range_rows(one):
             print_rows(rows, json_output=False)
+        print_sentences(view.sentences(one))
+    if rows := view.step_rows(found):
+        print_rows(rows, json_output=False)
     click.echo(f"Written: {os.path.join(output, 'limits.md')}")

@@ -47,7 +47,7 @@ def plot_failure_modes(found: RobustnessStudy, axis_name: str, axes: "Axes") -> 
     axes.set_yticks(range(len(lines)), [_in_lines(line.engine) for line in lines], fontsize=7)
     axes.set_ylabel("engine")
     axes.invert_yaxis()
-    _label(lines[0].axis, [point.value for point in lines[0].points], axes)
+    _label(lines[0].axis, [point.value for line in lines for point in line.points], axes)
 
 
 def _in_lines(label: str) -> str:

@@ -1,11 +1,13 @@
-"""`dropspin limits` in words: the largest time steps, and the range in which each engine is sound."""
+"""`dropspin limits` in words: the largest time steps, and the range in which each engine is sound, of the values tested."""
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
+from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.scan import AxisScan, ScanPoint
 from comparisons.robustness.study import RobustnessStudy
 
@@ -13,18 +15,23 @@ COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterio
 
 
 def rows(found: RobustnessStudy) -> list[dict[str, Any]]:
-    """Every point of every scan."""
-    return [_row(scan, point) for scan in found.scans for point in scan.points]
+    """Every point of every scan, the smaller steps tried at the nominal values, and a row without a value of each engine left out."""
+    name, scanned = found.scene.name, {scan.engine for scan in found.scans if scan.axis.name == "step"}
+    table = [_row(name, scan.engine, scan.axis, point) for scan in found.scans for point in scan.points]
+    not_scanned = [engine for engine in found.refinements if engine not in scanned]
+    table += [_row(name, engine, AXES["step"], point) for engine in not_scanned for point in found.steps(engine)]
+    left_out = dict.fromkeys(COLUMNS) | {"scene": name, "failure_mode": "missing"}
+    return table + [left_out | {"engine": engine, "message": why} for engine, why in found.left_out.items()]
 
 
-def _row(scan: AxisScan, point: ScanPoint) -> dict[str, Any]:
+def _row(scene: str, engine: str, axis: Axis, point: ScanPoint) -> dict[str, Any]:
     diagnosis = point.diagnosis
     return {
-        "scene": scan.scene.name,
-        "engine": scan.engine,
-        "axis": scan.axis.name,
+        "scene": scene,
+        "engine": engine,
+        "axis": axis.name,
         "value": point.value,
-        "unit": scan.axis.unit,
+        "unit": axis.unit,
         "failure_mode": diagnosis.mode,
         "criterion": diagnosis.criterion,
         "size": diagnosis.size if math.isfinite(diagnosis.size) else None,
@@ -32,49 +39,75 @@ def _row(scan: AxisScan, point: ScanPoint) -> dict[str, Any]:
     }
 
 
+def nominal(found: RobustnessStudy) -> str:
+    """What holds for every axis of a study but those that vary it."""
+    return f"{found.scene.name} at dt = {_step(found.dt)}; an error up to {found.within:g} is sound."
+
+
 def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
-    """The largest time steps, by scene and engine."""
+    """The largest time steps tried, by scene and engine."""
     table = []
     for one in found:
         spin = float(np.linalg.norm(one.scene.start.angular_velocity)) if one.scene.floor is None else 0.0
         for engine in dict.fromkeys(scan.engine for scan in one.scans if scan.axis.name == "step"):
-            accurate, stable = one.largest_steps(engine)
-            table.append(
-                {"scene": one.scene.name, "engine": engine, "accurate up to": _step(accurate, spin), "stable up to": _step(stable, spin)}
-            )
+            accurate, stable = (_largest(dt, one.steps(engine), spin) for dt in one.largest_steps(engine))
+            table.append({"scene": one.scene.name, "engine": engine, "accurate up to": accurate, "stable up to": stable})
     return table
 
 
-def _step(dt: float | None, spin: float) -> str:
+def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
+    """The largest step of some kind, or the smallest tried if there is none."""
     if dt is None:
-        return "none tested"
-    return (f"{1e3 * dt:.3g} ms" if dt < 1.0 else f"{dt:.3g} s") + (f", {spin * dt:.2g} rad" if spin else "")
+        return f"{_mode(tried[0])} at {_step(tried[0].value)}, the smallest tested"
+    turn = f", {spin * dt:.2g} rad" if spin else ""
+    return _step(dt) + turn + (", the largest tested" if dt == tried[-1].value else "")
 
 
-def range_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
+def _step(dt: float) -> str:
+    return f"{1e3 * dt:.3g} ms" if dt < 1.0 else f"{dt:.3g} s"
+
+
+def _mode(point: ScanPoint) -> str:
+    return point.mode.replace("_", " ")
+
+
+def range_rows(found: RobustnessStudy) -> list[dict[str, str]]:
     """The range in which each engine is sound along each axis, and the failure modes beyond."""
-    return [
-        {
-            "scene": scan.scene.name,
-            "axis": scan.axis.label,
-            "engine": scan.engine,
-            **_range(scan),
-        }
-        for one in found
-        for scan in one.scans
-    ]
+    return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan)} for scan in found.scans]
 
 
 def _range(scan: AxisScan) -> dict[str, str]:
     points, sound = scan.points, scan.sound_range
     if sound is None:
-        own = scan.at(scan.base)
-        return {"sound from": "–", "to": "–", "beyond": f"{own.mode.replace('_', ' ')} at the nominal value: {own.diagnosis.message}"}
+        those = sum(point.mode == "sound" for point in points)
+        beyond = f"{_mode(scan.at(scan.base))} at the nominal value, {scan.base:.4g}; sound at {those} of {len(points)} tested values"
+        return {"sound from": "–", "to": "–", "beyond": beyond}
     first, last = sound
-    outside = [points[number] for number in (first - 1, last + 1) if 0 <= number < len(points)]
-    beyond = "; ".join(f"{point.mode.replace('_', ' ')} at {point.value:.4g}" for point in outside)
-    return {
-        "sound from": f"{points[first].value:.4g}",
-        "to": f"{points[last].value:.4g}",
-        "beyond": beyond or "not within the range tested",
-    }
+    outside = [f"{_mode(points[number])} at {points[number].value:.4g}" for number in (first - 1, last + 1) if 0 <= number < len(points)]
+    if not outside:
+        outside = [f"not tested; {'the same motion' if scan.axis.invariant else 'sound'} at all {len(points)} tested values"]
+    elif len(outside) == 1:
+        outside.append(f"no {'smaller' if first == 0 else 'larger'} value tested")
+    return {"sound from": f"{points[first].value:.4g}", "to": f"{points[last].value:.4g}", "beyond": "; ".join(outside)}
+
+
+def sentences(found: RobustnessStudy) -> list[str]:
+    """Of each engine that is not sound at the nominal values: how far off it is, and at which smaller steps; and the engines left out."""
+    failing = [(engine, points) for engine, points in found.refinements.items() if points[0].mode != "sound"]
+    return [_refinement(engine, points) for engine, points in failing] + [
+        f"Left out: {engine}, {why}." for engine, why in found.left_out.items()
+    ]
+
+
+def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:
+    nominal, *smaller = points
+    sentence = (
+        f"{engine} is not sound at the nominal values and dt = {_step(nominal.value)}: {_mode(nominal)}, {nominal.diagnosis.message}."
+    )
+    if not smaller:
+        return f"{sentence} No smaller step was tried."
+    tried = [f"{mode} at {', '.join(_step(point.value) for point in some)}" for mode, some in groupby(smaller, _mode)]
+    at_the_end = (
+        "" if smaller[-1].mode == "sound" else f" At {_step(smaller[-1].value)}, the smallest tried, {smaller[-1].diagnosis.message}."
+    )
+    return f"{sentence} Smaller steps tried: {'; '.join(tried)}.{at_the_end}"

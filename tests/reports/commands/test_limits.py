@@ -1,6 +1,7 @@
 """`dropspin limits`."""
 
 import json
+import re
 
 import pytest
 from support.cli import dropspin
@@ -22,8 +23,23 @@ def test_a_scan_is_printed_and_written(tmp_path):
         "section.json",
         "spin-principal.svg",
     }
+    assert "is not sound at the nominal values" not in output
     masses = dropspin(*asked[:6], "--axis", "mass", "--json", cwd=tmp_path)
     assert {row["failure_mode"] for row in json.loads(masses.stdout)} == {"sound", "declined"}
+
+
+def test_engine_that_is_not_accurate_at_the_nominal_step_is_tried_at_smaller_ones(tmp_path):
+    """MuJoCo's explicit gyroscopic term at 5 ms, and a tolerance that none of the smaller steps meets; every step tried is in the files."""
+    asked = ("limits", "spin-asymmetric", "-e", "mujoco", "--axis", "mass", "-o", "out")
+    output = " ".join(dropspin(*asked, cwd=tmp_path).stdout.split())
+    assert "spin-asymmetric at dt = 5 ms; an error up to 0.1 is sound." in output
+    assert "mujoco is not sound at the nominal values and dt = 5 ms: gains energy, the energy rises by 0.01" in output
+    assert "of the scene's (limit 0.01). Smaller steps tried: sound at 2.5 ms." in output
+    output = " ".join(dropspin(*asked, "--within", "1e-6", cwd=tmp_path).stdout.split())
+    assert "Smaller steps tried: inaccurate at 2.5 ms, 1.25 ms, 0.625 ms, 0.312 ms, 0.156 ms, 0.0781 ms. " in output
+    assert re.search(r"At 0.0781 ms, the smallest tried, orientation error is [\d.e-]+ rad \(tolerance 1e-06\)\.", output)
+    rows = [row for row in json.loads((tmp_path / "out/limits.json").read_text()) if row["axis"] == "step"]
+    assert [row["value"] for row in rows] == [5e-3 / 2**n for n in range(6, -1, -1)]
 
 
 @pytest.mark.parametrize(

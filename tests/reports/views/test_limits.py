@@ -13,6 +13,7 @@ from comparisons.robustness.scan import AxisScan, ScanPoint
 from comparisons.robustness.study import RobustnessStudy
 from reports import plots
 from reports.study_files import write_limits
+from reports.terminal.rows import print_rows
 from reports.views import limits
 from scenarios import load
 
@@ -25,6 +26,10 @@ def scan(engine, modes, axis="spin"):
     return AxisScan(SPIN, AXES[axis], engine, 1.0, points)
 
 
+def points_of(mode, message="it is off by 0.2 rad (tolerance 0.1)", dt=5e-3):
+    return ScanPoint(dt, Diagnosis(mode, "orientation_error", 0.2, message if mode != "sound" else ""))
+
+
 @pytest.fixture
 def study():
     scans = (
@@ -32,26 +37,77 @@ def study():
         scan("b", ["sound", "clamped", "clamped"]),
         scan("a", ["sound", "inaccurate"], "step"),
     )
-    return RobustnessStudy(SPIN, 5e-3, 0.1, scans, {"c": "not installed"})
+    refinements = {"a": (points_of("sound", dt=1.0),), "b": (points_of("inaccurate"), points_of("sound", dt=2.5e-3))}
+    return RobustnessStudy(SPIN, 5e-3, 0.1, scans, {"c": "not installed"}, refinements)
 
 
 def test_tables_of_largest_steps_and_of_sound_ranges(study):
     assert limits.step_rows([study]) == [
-        {"scene": "spin-principal", "engine": "a", "accurate up to": "1 s, 5 rad", "stable up to": "10 s, 50 rad"}
+        {"scene": "spin-principal", "engine": "a", "accurate up to": "1 s, 5 rad", "stable up to": "10 s, 50 rad, the largest tested"}
     ]
-    ranges = limits.range_rows([study])
-    assert [ranges[0][key] for key in ("axis", "sound from", "to", "beyond")] == ["spin [rad/s]", "1", "10", "diverged at 100"]
+    ranges = limits.range_rows(study)
+    assert ranges[0] == {
+        "axis": "spin [rad/s]",
+        "engine": "a",
+        "sound from": "1",
+        "to": "10",
+        "beyond": "diverged at 100; no smaller value tested",
+    }
 
 
 def test_sound_range_around_the_nominal_value():
     """Both ways from the scene's nominal value, as far as every point is sound; none if the nominal value is not."""
     found = scan("a", ["sound", "inaccurate", "sound", "sound", "sound", "clamped", "sound"])
-    study = RobustnessStudy(SPIN, 5e-3, 0.1, (replace(found, base=1e3), replace(found, base=10.0), scan("a", ["sound"])), {})
-    assert [(row["sound from"], row["to"], row["beyond"]) for row in limits.range_rows([study])] == [
+    scans = (replace(found, base=1e3), replace(found, base=10.0), scan("a", ["sound"] * 4), scan("a", ["sound"] * 4, "mass"))
+    study = RobustnessStudy(SPIN, 5e-3, 0.1, scans, {}, {})
+    assert [(row["sound from"], row["to"], row["beyond"]) for row in limits.range_rows(study)] == [
         ("100", "1e+04", "inaccurate at 10; clamped at 1e+05"),
-        ("–", "–", "inaccurate at the nominal value: it is off by 0.2"),
-        ("1", "1", "not within the range tested"),
+        ("–", "–", "inaccurate at the nominal value, 10; sound at 5 of 7 tested values"),
+        ("1", "1000", "not tested; sound at all 4 tested values"),
+        ("1", "1000", "not tested; the same motion at all 4 tested values"),
     ]
+
+
+def test_engine_that_is_accurate_at_no_step_has_the_smallest_one_tried():
+    study = RobustnessStudy(SPIN, 5e-3, 0.1, (scan("a", ["inaccurate", "inaccurate", "diverged"], "step"),), {}, {})
+    [row] = limits.step_rows([study])
+    assert (row["accurate up to"], row["stable up to"]) == ("inaccurate at 1 s, the smallest tested", "10 s, 50 rad")
+
+
+def test_engine_that_is_not_sound_at_the_nominal_values_has_the_smaller_steps_tried(study):
+    """With the error and the tolerance, at the nominal step and at the smallest, if that is not sound either; nothing of a sound engine."""
+    never = (points_of("inaccurate"), points_of("gains_energy", dt=2.5e-3), points_of("inaccurate", "it is off by 0.15 rad", 1.25e-3))
+    study.refinements.update(never=never, crashing=(points_of("crashed", "no such thing"),))
+    assert limits.sentences(study) == [
+        "b is not sound at the nominal values and dt = 5 ms: inaccurate, it is off by 0.2 rad (tolerance 0.1). "
+        "Smaller steps tried: sound at 2.5 ms.",
+        "never is not sound at the nominal values and dt = 5 ms: inaccurate, it is off by 0.2 rad (tolerance 0.1). "
+        "Smaller steps tried: gains energy at 2.5 ms; inaccurate at 1.25 ms. At 1.25 ms, the smallest tried, it is off by 0.15 rad.",
+        "crashing is not sound at the nominal values and dt = 5 ms: crashed, no such thing. No smaller step was tried.",
+        "Left out: c, not installed.",
+    ]
+
+
+def test_table_of_80_columns_keeps_words_and_numbers_whole(study, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    long = replace(study.scans[0], engine="pybullet[coordinates=multibody,velocity_clamp=kept]", axis=AXES["inertia-ratio"])
+    print_rows(limits.range_rows(replace(study, scans=(*study.scans, long))), json_output=False)
+    print_rows(limits.step_rows([replace(study, scans=(replace(long, axis=AXES["step"]),))]), json_output=False)
+    output = capsys.readouterr().out
+    assert max(map(len, output.splitlines())) <= 80
+    for word in ("inertia-ratio", "diverged at 100", "clamped at 10", "tested", "pybullet[", "velocity_clamp=", "kept]", "multibody,"):
+        assert word in output
+
+
+def test_axis_of_the_figure_holds_the_smaller_steps_of_every_engine():
+    import matplotlib.pyplot as plt
+
+    coarse, fine = scan("a", ["sound"] * 3, "step"), scan("b", ["inaccurate"] * 3, "step")
+    fine = replace(fine, points=(points_of("sound", dt=1e-3), *fine.points))
+    axes = plt.figure().gca()
+    plots.plot_failure_modes(RobustnessStudy(SPIN, 5e-3, 0.1, (coarse, fine), {}, {}), "step", axes)
+    assert axes.get_xlim() == pytest.approx((math.log(1e-3), math.log(100.0)))
+    plt.close("all")
 
 
 def test_files_hold_each_point_once(study, tmp_path):
@@ -59,14 +115,20 @@ def test_files_hold_each_point_once(study, tmp_path):
     write_limits([study], tmp_path)
     with (tmp_path / "limits.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 3 + 3 + 2
-    assert [float(row["value"]) for row in rows] == [1.0, 10.0, 100.0, 1.0, 10.0, 100.0, 1.0, 10.0]
+    assert len(rows) == 3 + 3 + 2 + 2 + 1
+    assert [float(row["value"]) for row in rows[:-1]] == [1.0, 10.0, 100.0, 1.0, 10.0, 100.0, 1.0, 10.0, 2.5e-3, 5e-3]
+    assert [(row["engine"], row["axis"], row["failure_mode"], row["message"]) for row in rows[-3:]] == [
+        ("b", "step", "sound", ""),
+        ("b", "step", "inaccurate", "it is off by 0.2 rad (tolerance 0.1)"),
+        ("c", "", "missing", "not installed"),
+    ]
     content = json.loads((tmp_path / "limits.json").read_text(encoding="utf-8"))
     assert [row["failure_mode"] for row in content[:3]] == ["sound", "sound", "diverged"]
     page = (tmp_path / "limits.md").read_text(encoding="utf-8")
     assert "(spin-principal.svg)" in page
     assert (tmp_path / "spin-principal.svg").stat().st_size > 1000
     assert "Left out: c, not installed." in page
+    assert "b is not sound at the nominal values and dt = 5 ms: inaccurate, it is off by 0.2 rad (tolerance 0.1)." in page
 
 
 def test_bars_change_colour_half_way_between_two_points(study):

@@ -32,7 +32,7 @@ def print_rows(rows: list[dict[str, str]], json_output: bool) -> None:
     widths = _widths(cells, console.width)
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_header=cells[0] not in (["what", "is"], ["what", "found"]))
     for column, width in zip(cells[0], widths, strict=True):
-        table.add_column(_wrapped(column, width), overflow="fold")
+        table.add_column(Text(_wrapped(column, width)), overflow="fold")
     for row in cells[1:]:
         table.add_row(*(Text(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
     console.print(table)

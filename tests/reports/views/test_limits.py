@@ -95,7 +95,17 @@ def test_table_of_80_columns_keeps_words_and_numbers_whole(study, capsys, monkey
     print_rows(limits.step_rows([replace(study, scans=(replace(long, axis=AXES["step"]),))]), json_output=False)
     output = capsys.readouterr().out
     assert max(map(len, output.splitlines())) <= 80
-    for word in ("inertia-ratio", "diverged at 100", "clamped at 10", "tested", "pybullet[", "velocity_clamp=", "kept]", "multibody,"):
+    for word in (
+        "spin [rad/s]",
+        "inertia-ratio",
+        "diverged at 100",
+        "clamped at 10",
+        "tested",
+        "pybullet[",
+        "velocity_clamp=",
+        "kept]",
+        "multibody,",
+    ):
         assert word in output
 
 

@@ -88,7 +88,18 @@ def test_table_of_80_columns_keeps_words_and_numbers_whole(found, capsys, monkey
     output = capsys.readouterr().out
     assert max(map(len, output.splitlines())) <= 80
     words = output.split()
-    for word in ("simulated", "second", "(batch", "dominated", "5.20e-03", "mujoco[integrator=", "implicitfast]", "implicit-gyroscopic]"):
+    for word in (
+        "[ms]",
+        "[rad]",
+        "simulated",
+        "second",
+        "(batch",
+        "dominated",
+        "5.20e-03",
+        "mujoco[integrator=",
+        "implicitfast]",
+        "implicit-gyroscopic]",
+    ):
         assert word in words
     assert "500 µs" in output  # a number and its unit are on one line
 

@@ -123,7 +123,8 @@ def _sinks(motion: ExtendedMotion) -> Iterator[Diagnosis]:
     middle, end = (float(-heights[(share >= since) & (share <= since + 0.1)].max(initial=-math.inf)) for since in (0.5, 0.9))
     deeper = DEEPER * motion.scene.body.size
     if middle > 0.0 and end > middle + deeper:
-        message = f"the body is {end:.3g} m below the floor after {motion.whole.t[-1]:.3g} s, {middle:.3g} m after half of that"
+        depths = f"{end:.3g} m below the floor after {motion.whole.t[-1]:.3g} s, {middle:.3g} m after half of that"
+        message = f"the body is {depths} (limit {deeper:.2g} m more)"
         yield Diagnosis("sinks", "sinks", end, message)
 
 

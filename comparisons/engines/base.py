@@ -152,7 +152,10 @@ def calibrated_label(label: str) -> str | None:
 
 
 def _spelled(value: float | str) -> str:
-    return value if isinstance(value, str) else repr(value)
+    """An option's value as text: a number with six digits if these are exact, else with all."""
+    if isinstance(value, str):
+        return value
+    return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
 
 
 @dataclass(frozen=True)
@@ -202,7 +205,7 @@ class Engine:
                 )
 
     def _default(self, option: str) -> str:
-        return f"{self.numbers[option].default:g}" if option in self.numbers else self.choices[option][0]
+        return _spelled(self.numbers[option].default) if option in self.numbers else self.choices[option][0]
 
     def _canonical_number(self, option: str, value: str) -> str:
         """The canonical spelling of a number, so that equal options have equal labels."""
@@ -213,20 +216,25 @@ class Engine:
             number = float("nan")
         if not allowed.least <= number <= allowed.most:
             raise DropspinError(f"{self.name}'s {option}: got {value!r}; it is a number from {allowed.least:g} to {allowed.most:g}.")
-        return f"{number:g}" if float(f"{number:g}") == number else repr(number)
+        return _spelled(number)
 
     def option(self, name: str) -> str:
         """An option's value, given or default."""
         return self.options.get(name, self._default(name))
 
+    def accuracy_levels(self) -> list[Self]:
+        """The engine with each set of values of its accuracy options, coarsest first; empty if it has none."""
+        count = min(map(len, self.accuracy.values()), default=0)
+        levels = [
+            {option: _spelled(values[len(values) - count + level]) for option, values in self.accuracy.items()} for level in range(count)
+        ]
+        return [replace(self, options={**self.options, **level}) for level in levels]
+
     def refined(self, dts: Sequence[float]) -> list[tuple[float, Self]]:
-        """The finest of some time steps [s] and the engine at each, its accuracy options refined together with the time step."""
-        count = min(len(dts), *map(len, self.accuracy.values()))
-        path = []
-        for number, dt in enumerate(sorted(dts)[:count]):
-            options = {option: _spelled(values[-1 - number]) for option, values in self.accuracy.items()}
-            path.append((dt, replace(self, options={**self.options, **options})))
-        return path[::-1]
+        """The finest of some time steps [s], coarsest first, and the engine at each, its accuracy options refined with the step."""
+        levels = self.accuracy_levels()
+        count = min(len(dts), len(levels))
+        return list(zip(sorted(dts)[:count][::-1], levels[-count:], strict=True))
 
     @property
     def label(self) -> str:

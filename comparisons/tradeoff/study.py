@@ -83,7 +83,7 @@ def tradeoff(
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
     named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
-    entries = {one.label: one for one in named}
+    entries = {one.label: one for entry in named for one in _with_accuracy_levels(entry)}
     with EngineProcesses(resources) as processes:
         ladders = []
         for number, entry in enumerate(entries.values(), 1):
@@ -96,6 +96,12 @@ def tradeoff(
     if not points:
         raise DropspinError(f"no engine runs {scene.name}: {'; '.join(f'{label}: {why}' for label, why in found.left_out.items())}.")
     return found
+
+
+def _with_accuracy_levels(entry: EngineEntry) -> list[EngineEntry]:
+    """An engine, and the same with each value of the options that set its accuracy."""
+    levels = [] if entry.engine is None else entry.engine.accuracy_levels()
+    return [entry, *(EngineEntry(level.label, level) for level in levels)]
 
 
 def _with_costs(

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from support.accuracy_options import InnerStep
 from support.engines import Exact, ExactSimulation
 
 from comparisons.engines.base import Diverged
@@ -281,3 +282,11 @@ def test_unknown_metric_and_declining_engines_are_errors():
         tradeoff(SPIN, ["mujoco"], metric="restitution_error")
     with pytest.raises(DropspinError, match=r"no engine runs drop-ball: mujoco\[integrator=rk4\]: RK4 has no restitution"):
         tradeoff(load("drop-ball"), ["mujoco[integrator=rk4]"])
+
+
+def test_accuracy_options_are_walked_beside_the_time_step():
+    """Each value has a ladder of its own; a shorter inner step is more accurate at the coarsest steps."""
+    found = tradeoff(SPIN, InnerStep(), budget=0.02)
+    errors_at_coarsest = {ladder.engine: ladder.steps[0][1] for ladder in found.ladders}
+    assert list(errors_at_coarsest) == ["inner-step", *(f"inner-step[inner_step={1 / n!r}]" for n in (240, 480))]
+    assert errors_at_coarsest["inner-step"] < 0.2 * errors_at_coarsest[f"inner-step[inner_step={1 / 240!r}]"]

@@ -32,7 +32,8 @@ def jacobi(u: Array, m1: float | Array) -> Jacobi:
     Source: R. Bulirsch, Numerische Mathematik 7 (1965), 78-90, procedure sncndn.
     """
     if not np.any(m1):
-        sech = 1.0 / np.cosh(u)
+        decayed = np.exp(-np.abs(u))
+        sech = 2.0 * decayed / (1.0 + decayed * decayed)
         return Jacobi(np.tanh(u), sech, sech)
     a, b = np.ones_like(m1), np.sqrt(m1)
     steps = [(a, b)]
@@ -60,9 +61,11 @@ def quarter_period(m1: float) -> float:
 
 
 def argument(sn: float, cn: float, m1: float) -> float:
-    """The u in (-2K, 2K] with this elliptic sine and cosine."""
+    """The u in (-2K, 2K] with this elliptic sine and cosine; on the separatrix the cosine is positive."""
     from scipy.special import elliprf
 
+    if m1 == 0.0:
+        return math.asinh(sn / cn)
     dn2 = m1 + (1.0 - m1) * cn * cn
     u = sn * float(elliprf(cn * cn, dn2, 1.0))
     return u if cn >= 0.0 else math.copysign(2.0 * quarter_period(m1), sn) - u
@@ -71,14 +74,17 @@ def argument(sn: float, cn: float, m1: float) -> float:
 def integral_of_sn2(u: Array, at_u: Jacobi, n: float, m1: float) -> Array:
     """The integral of sn² / (1 - n sn²) from 0 to u, for n <= 0: (Π(n; u) - u) / n, without the cancellation.
 
+    On the separatrix it is the elementary integral of tanh² / (1 - n tanh²), which grows without end.
+
     Source: B. C. Carlson, DLMF 19.25.14: Π(n; φ, k) = F + n/3 sin³φ R_J(cos²φ, 1 - k² sin²φ, 1, 1 - n sin²φ).
     """
     from scipy.special import elliprj
 
+    if m1 == 0.0:
+        root = math.sqrt(-n)
+        return (u - (np.arctan(root * at_u.sn) / root if root > 0.0 else at_u.sn)) / (1.0 - n)
     K = quarter_period(m1)
     half_turns = np.round(u / (2.0 * K))
     sign = np.where(half_turns % 2 == 0, 1.0, -1.0)
     within = (sign * at_u.sn) ** 3 / 3.0 * elliprj(at_u.cn**2, at_u.dn**2, 1.0, 1.0 - n * at_u.sn**2)
-    if math.isinf(K):
-        return within
     return 2.0 * half_turns * float(elliprj(0.0, m1, 1.0, 1.0 - n)) / 3.0 + within

@@ -17,14 +17,15 @@ Valid for: any body without floor, or, undamped, between two impacts.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.model import Damping, Scenario
-from scenarios.state import PARTS
-from scenarios.truths.free_rotor import AsymmetricTop, free_rotor
-from scenarios.truths.truth import States, Truth
+from scenarios.state import ORIENTATION, PARTS, SPIN
+from scenarios.truths.free_rotor import FreeRotor, free_rotor
+from scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 
@@ -32,46 +33,69 @@ UNDAMPED = Damping()
 SERIES_TERMS = 22  # enough for 17 digits of φ₂ up to z = 1
 
 
-def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Damping = UNDAMPED) -> States:
-    """A function of times since `state` [s], shape (n,), that returns states, shape (n, 13)."""
-    x, q, v, w = (state[part] for part in PARTS.values())
-    rotor = free_rotor(inertia, q, w)
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A free flight; call it with times since its start [s], shape (n,), for states, shape (n, 13).
 
-    def undamped_states(t: Array) -> Array:
+    Attributes:
+        start: State at the time 0, shape (13,).
+        acceleration: Gravity [m/s²], shape (3,).
+        rotor: The rotation without damping.
+        damping: Decay rates.
+    """
+
+    start: Array
+    acceleration: Array
+    rotor: FreeRotor
+    damping: Damping = UNDAMPED
+
+    @property
+    def horizon(self) -> float:
+        """Time up to which one ulp of the start leaves the motion determined [s]."""
+        kappa, until = self.damping.angular, self.rotor.horizon
+        if kappa == 0.0:
+            return until
+        return -math.log1p(-kappa * until) / kappa if kappa * until < 1.0 else math.inf
+
+    def __call__(self, t: Array) -> Array:
+        """The states at times since the start [s]."""
+        x, _, v, _ = (self.start[part] for part in PARTS.values())
         t_ = t[:, None]
-        orientation, angular_velocity = rotor(t)
-        return np.hstack([x + t_ * v + t_ * t_ * 0.5 * acceleration, orientation, v + t_ * acceleration, angular_velocity])
-
-    def states(t: Array) -> Array:
-        k, t_ = damping.linear, t[:, None]
+        if self.damping == UNDAMPED:
+            orientation, angular_velocity = self.rotor(t)
+            position = x + t_ * v + t_ * t_ * 0.5 * self.acceleration
+            return np.hstack([position, orientation, v + t_ * self.acceleration, angular_velocity])
+        k = self.damping.linear
         slowed = t_ * _phi1(k * t_)
-        orientation, angular_velocity = rotor(t * _phi1(damping.angular * t))
-        position = x + slowed * v + t_ * t_ * _phi2(k * t_) * acceleration
-        velocity = np.exp(-k * t_) * v + slowed * acceleration
-        return np.hstack([position, orientation, velocity, np.exp(-damping.angular * t_) * angular_velocity])
+        orientation, angular_velocity = self.rotor(t * _phi1(self.damping.angular * t))
+        position = x + slowed * v + t_ * t_ * _phi2(k * t_) * self.acceleration
+        velocity = np.exp(-k * t_) * v + slowed * self.acceleration
+        return np.hstack([position, orientation, velocity, np.exp(-self.damping.angular * t_) * angular_velocity])
 
-    return undamped_states if damping == UNDAMPED else states
+
+def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Damping = UNDAMPED) -> Flight:
+    """The flight from a state, shape (13,)."""
+    return Flight(state, acceleration, free_rotor(inertia, state[ORIENTATION], state[SPIN]), damping)
 
 
 def flight(scene: Scenario) -> Truth | None:
     """The exact solution of a scene without a floor."""
     if scene.floor is not None:
         return None
-    q, w = np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
-    rotor = free_rotor(scene.body.inertia_tensor, q, w)
+    states = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration, scene.damping or UNDAMPED)
     parabola = "" if scene.gravity is None else "x = x0 + v0 t + g t²/2; "
-    if isinstance(rotor, AsymmetricTop):
+    if not states.rotor.is_steady:
         name = "free-rotor"
         turning = "Jacobi's elliptic functions for rates and attitude (Landau & Lifshitz, section 37; Whittaker, section 69)"
     else:
-        name = "principal-spin" if np.any(w) else "parabola"
-        turning = "angular velocity constant, angle ωt" if np.any(w) else "orientation constant"
+        spins = states.rotor.largest_spin > 0.0
+        name = "principal-spin" if spins else "parabola"
+        turning = "angular velocity constant, angle ωt" if spins else "orientation constant"
     if scene.damping is not None:
         name = f"damped-{name}"
         parabola = "" if scene.gravity is None else "path with resistance proportional to speed; "
         turning += ", at the time (1 - exp(-κt))/κ, with decaying rates"
-    states = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration, scene.damping or UNDAMPED)
-    return Truth(name, parabola + turning, states)
+    return Truth(name, parabola + turning, states, horizon=states.horizon)
 
 
 def _phi1(z: Array) -> Array:

@@ -15,38 +15,82 @@ Valid for: any inertia and angular velocity; a spin about a principal axis is co
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.mechanics import principal_axes
-from scenarios.rotations import about, cross, multiply, unrotate
+from scenarios.mechanics import is_diagonal, principal_axes
+from scenarios.rotations import about, cross, multiply
 from scenarios.truths.elliptic import Jacobi, argument, integral_of_sn2, jacobi, quarter_period
+from scenarios.truths.rotor_horizon import ULP, horizon, spin_rounding
 
 Array = NDArray[np.float64]
+SMALLEST_M1 = 1e-290
+"""Below it the squares of the elliptic functions underflow; then a body takes more than 300 e-foldings to turn over."""
+
+Exact = NDArray[Any]
+"""An array of exact rationals."""
 Rotor = Callable[[Array], tuple[Array, Array]]
 """A function of times, shape (n,), that returns orientations (n, 4) and world-frame angular velocities (n, 3)."""
 
-PARALLEL = 1e-15
-"""Sine of the angle between angular momentum and angular velocity below which they count as parallel."""
+
+@dataclass(frozen=True, eq=False)
+class FreeRotor:
+    """The motion of a free body; call it with times.
+
+    Attributes:
+        motion: Its attitude and angular velocity at times.
+        largest_spin: The largest |ω| [rad/s].
+        is_steady: Whether ω is constant.
+        horizon: Time up to which one ulp of the start leaves the motion determined [s]: `rotor_horizon`.
+    """
+
+    motion: Rotor
+    largest_spin: float
+    is_steady: bool
+    horizon: float
+
+    def __call__(self, t: Array) -> tuple[Array, Array]:
+        """Orientations (n, 4) and angular velocities (n, 3), world frame, at times [s], shape (n,)."""
+        return self.motion(t)
 
 
-def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> Rotor:
+def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> FreeRotor:
     """The motion of a free body from its start.
+
+    The numbers given are taken as exact: a spin that is 1e-16 off an unstable axis turns over in time.
 
     Args:
         inertia: In the body frame [kg m²], shape (3, 3).
         orientation: At t = 0, shape (4,).
         angular_velocity: At t = 0, world frame [rad/s], shape (3,).
     """
-    spin = unrotate(orientation, angular_velocity)
-    momentum = inertia @ spin
-    torque = np.linalg.norm(cross(momentum, spin))
-    # Parallel but for rounding: a spin about a principal axis is exact in the scene, and every axis of a ball is one.
-    if torque <= PARALLEL * np.linalg.norm(momentum) * np.linalg.norm(spin):
-        return principal_spin(orientation, angular_velocity)
-    return AsymmetricTop(inertia, orientation, angular_velocity)
+    heaviest, fastest = _power_of_two(inertia), _power_of_two(angular_velocity)
+    inertia, unit_spin = inertia / heaviest, angular_velocity / fastest  # so that no product leaves the range of doubles
+    moments, axes = principal_axes(inertia)
+    spin = _along(axes, orientation, unit_spin)
+    rounding = spin_rounding(orientation, unit_spin)
+    if not is_diagonal(inertia):  # the axes are rounded too
+        rounding = np.full(3, ULP * float(np.linalg.norm(unit_spin)))
+    ascending = np.argsort(moments, kind="stable")
+    until = horizon(tuple(moments[ascending].tolist()), tuple(spin[ascending]), rounding[ascending]) / fastest
+    if all(moments[m] == moments[n] or spin[m] == 0 or spin[n] == 0 for m, n in ((0, 1), (1, 2), (2, 0))):
+        return FreeRotor(principal_spin(orientation, angular_velocity), float(np.linalg.norm(angular_velocity)), True, until)
+    top = AsymmetricTop(inertia, orientation, unit_spin)
+
+    def motion(t: Array) -> tuple[Array, Array]:
+        turned, rates = top(t * fastest)
+        return turned, rates * fastest
+
+    return FreeRotor(motion, top.largest_spin * fastest, False, until)
+
+
+def _power_of_two(values: Array) -> float:
+    """The power of two just above the largest magnitude; 1 if all are 0."""
+    return float(np.ldexp(1.0, np.frexp(np.abs(values).max())[1]))
 
 
 def principal_spin(orientation: Array, angular_velocity: Array) -> Rotor:
@@ -68,23 +112,27 @@ class AsymmetricTop:
         from scipy.spatial.transform import Rotation
 
         moments, axes = principal_axes(inertia)
-        spin = axes.T @ unrotate(orientation, angular_velocity)
+        spin = _along(axes, orientation, angular_velocity)
         order = _circled_axis_last(moments, spin)
         self._axes = axes @ order.T  # columns: a, b, c in the body frame
         self._moments = Ia, Ib, Ic = tuple(float(value) for value in np.abs(order) @ moments)
-        spin_a, spin_b, spin_c = (float(value) for value in order @ spin)
+        exact_spin = tuple(order.astype(int) @ spin)
+        spin_a, spin_b, spin_c = map(float, exact_spin)
 
         # Written as sums of products of one sign, in which 2T I_c - L² and the others lose no digits.
         to_c = Ia * (Ic - Ia) * spin_a**2 + Ib * (Ic - Ib) * spin_b**2  # 2 T Ic - L²
         to_a = Ib * (Ib - Ia) * spin_b**2 + Ic * (Ic - Ia) * spin_c**2  # L² - 2 T Ia
-        to_b = _beyond_separatrix(self._moments, (spin_a, spin_b, spin_c))  # L² - 2 T Ib
+        to_b = _beyond_separatrix(self._moments, exact_spin)  # L² - 2 T Ib
         self._a = math.sqrt(to_c / (Ia * (Ic - Ia)))
         self._b = math.sqrt(to_c / (Ib * (Ic - Ib)))
         self._c = math.copysign(math.sqrt(to_a / (Ic * (Ic - Ia))), spin_c)
         self._b *= math.copysign(1.0, (Ic - Ib) * self._c)  # the sense in which L circles c
         self._rate = math.sqrt((Ic - Ib) * to_a / (Ia * Ib * Ic))
-        self._m1 = min((Ic - Ia) * to_b / ((Ic - Ib) * to_a), 1.0)
+        self._m1 = 0.0 if to_b == 0 else max(min((Ic - Ia) * float(to_b) / ((Ic - Ib) * to_a), 1.0), SMALLEST_M1)
+        if self._m1 == 0.0 and spin_a < 0.0:  # cn has one sign on the separatrix; half a turn about c leaves the equations unchanged
+            self._a, self._b = -self._a, -self._b
         self._u0 = self._initial_phase(spin_a, spin_b)
+        self.largest_spin = math.sqrt(max(self._a**2 + self._c**2, self._b**2 + self._m1 * self._c**2))
         self.period = 4.0 * quarter_period(self._m1) / self._rate
 
         self._set_precession()
@@ -144,18 +192,29 @@ class AsymmetricTop:
         return np.stack([first, cross(along, first), along], axis=2), spins
 
 
-def _circled_axis_last(moments: Array, spin: Array) -> Array:
+def _along(axes: Array, orientation: Array, angular_velocity: Array) -> Exact:
+    """Components along body axes, the columns of (3, 3), of a vector in the world frame, in exact rationals, shape (3,)."""
+    x, y, z, w = map(Fraction, orientation.tolist())
+    vector = np.array([Fraction(component) for component in angular_velocity.tolist()])
+    along, across = np.array([x, y, z]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    squares = w * w + along @ along
+    spin = ((w * w - along @ along) * vector + 2 * (along @ vector) * along - 2 * w * (across @ vector)) / squares
+    turned: Exact = np.array([[Fraction(component) for component in axis] for axis in axes.T.tolist()]) @ spin
+    return turned
+
+
+def _circled_axis_last(moments: Array, spin: Exact) -> Array:
     """The proper signed permutation, (3, 3), to axes a, b, c with b intermediate and c the one that L circles."""
     ascending = np.argsort(moments, kind="stable")
     ordered = tuple(float(value) for value in moments[ascending])
-    circles_largest = _beyond_separatrix(ordered, tuple(float(value) for value in spin[ascending])) >= 0.0
+    circles_largest = _beyond_separatrix(ordered, tuple(spin[ascending])) >= 0
     order = np.eye(3)[ascending if circles_largest else ascending[::-1]]
     order[2] *= np.linalg.det(order)
     return order
 
 
-def _beyond_separatrix(moments: tuple[float, ...], spin: tuple[float, ...]) -> float:
-    """L² - 2 T I_b = I_c (I_c - I_b) ω_c² - I_a (I_b - I_a) ω_a², a difference, computed in exact rationals."""
+def _beyond_separatrix(moments: tuple[float, ...], spin: tuple[Fraction, ...]) -> Fraction:
+    """L² - 2 T I_b = I_c (I_c - I_b) ω_c² - I_a (I_b - I_a) ω_a², a difference, in exact rationals."""
     Ia, Ib, Ic = map(Fraction, moments)
-    wa, _, wc = map(Fraction, spin)
-    return float(Ic * (Ic - Ib) * wc**2 - Ia * (Ib - Ia) * wa**2)
+    wa, _, wc = spin
+    return Ic * (Ic - Ib) * wc**2 - Ia * (Ib - Ia) * wa**2

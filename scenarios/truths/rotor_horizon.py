@@ -1,0 +1,72 @@
+"""How long one ulp of the start leaves a free rotation determined: growth near the unstable motion about the intermediate axis.
+
+With a < b < c or a > b > c the principal axes, P = |I_c (I_c - I_b)| and Q = |I_a (I_b - I_a)|, the separatrix is
+
+    S = L² - 2 T I_b = ± (√P ω_c - √Q ω_a) (√P ω_c + √Q ω_a) = 0
+
+near which one factor grows as e^(λt), λ² = (I_c - I_b) (I_b - I_a) ω_b²/(I_a I_c). An error δ of a factor, over its largest value F,
+becomes δ/F (e^(λt) - 1) rad of the attitude; a relative error κ of the moments, which leaves the state as it is, κ (cosh λt - 1). Where
+these errors change S by a share of `TOLERANCE` at most, they only shift when the body turns over, by that share.
+
+Source: linearised Euler equations, L. D. Landau & E. M. Lifshitz, Mechanics, section 37.
+"""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+"""Error of the attitude over the angle turned that one ulp of the start may cause, before the solution counts as undetermined."""
+
+ULP = 2.0**-52
+
+
+def spin_rounding(orientation: Array, angular_velocity: Array) -> Array:
+    """How far one ulp of a start's numbers changes its spin along the body axes [rad/s], shape (3,); 0 where all terms are 0."""
+    x, y, z, w = np.abs(orientation)
+    off = 2.0 * np.array([[0.0, x * y + z * w, x * z + y * w], [x * y + z * w, 0.0, y * z + x * w], [x * z + y * w, y * z + x * w, 0.0]])
+    rounding: Array = ULP * (np.eye(3) + off) @ np.abs(angular_velocity)
+    return rounding
+
+
+def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Array) -> float:
+    """Time [s] up to which one ulp of a start changes the attitude by at most `TOLERANCE` of the angle turned; often infinite.
+
+    Args:
+        moments: Principal moments [kg m²], the intermediate one second.
+        spin: Along their axes, at the start [rad/s].
+        rounding: Of the spin [rad/s], shape (3,).
+    """
+    Ia, Ib, Ic = map(Fraction, moments)
+    P, Q = math.sqrt(abs(Ic * (Ic - Ib))), math.sqrt(abs(Ia * (Ib - Ia)))
+    at_c, at_a = P * abs(float(spin[2])), Q * abs(float(spin[0]))
+    of_state = P * rounding[2] + Q * rounding[0]
+    of_moments = sum(
+        at * ULP * float((one + other) / abs(one - other)) for at, one, other in ((at_c, Ic, Ib), (at_a, Ib, Ia)) if one != other
+    )
+    separation = abs(float(Ic * (Ic - Ib) * spin[2] ** 2 - Ia * (Ib - Ia) * spin[0] ** 2))
+    change = of_state + of_moments
+    if 2.0 * (at_c + at_a + change) * change <= TOLERANCE * separation or P * Q == 0.0:
+        return math.inf
+    to_a = float(abs(Ib * (Ib - Ia) * spin[1] ** 2 + Ic * (Ic - Ia) * spin[2] ** 2))
+    rate = math.sqrt(float(abs(Ic - Ib) / (Ia * Ib * Ic)) * to_a)
+    largest = P * math.sqrt(to_a / float(abs(Ic * (Ic - Ia))))
+    speed = math.sqrt(float(sum(w * w for w in spin)))
+    return _crossing(of_state / largest, of_moments / largest, speed / rate) / rate
+
+
+def _crossing(of_state: float, of_moments: float, angle: float) -> float:
+    """Solve of_state (eˣ - 1) + of_moments (cosh x - 1) = TOLERANCE angle x for x > 0; the left side grows faster than the right."""
+    from scipy.optimize import brentq
+
+    def excess(x: float) -> float:
+        return of_state * math.expm1(x) + of_moments * 2.0 * math.sinh(0.5 * x) ** 2 - TOLERANCE * angle * x
+
+    least, most = 1e-12, 700.0
+    if excess(least) >= 0.0:
+        return 0.0
+    return float(brentq(excess, least, most)) if excess(most) > 0.0 else math.inf

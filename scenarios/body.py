@@ -17,6 +17,9 @@ NotNegative = Annotated[Number, Field(ge=0)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
 PositiveVector = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
 
+FLAT = 1e-14
+"""Thickness of a set of points, over its size, that is rounding."""
+
 
 class Table(BaseModel):
     """A table of a file: immutable, without unknown keys."""
@@ -52,6 +55,11 @@ class _Body(Table):
     def vertices(self) -> Array:
         """The points that may touch the floor, from the centre of mass [m], shape (n, 3)."""
         raise NotImplementedError
+
+    @property
+    def hull(self) -> Array:
+        """Those of the vertices that can be the lowest, the corners of the convex hull, in their order [m], shape (m, 3)."""
+        return self.vertices
 
     @property
     def rounding(self) -> float:
@@ -173,6 +181,10 @@ class Vertices(_Body):
         return np.trace(spread) * np.eye(3) - spread
 
     @cached_property
+    def hull(self) -> Array:
+        return self.vertices[hull_corners(self.vertices)]
+
+    @cached_property
     def resting_height(self) -> float:
         # On the face nearest to the centre of mass; a plane set of points can lie flat.
         centred = self.vertices - self.vertices.mean(axis=0)
@@ -181,6 +193,24 @@ class Vertices(_Body):
         from scipy.spatial import ConvexHull
 
         return float(np.min(np.abs(ConvexHull(self.vertices).equations[:, 3])))
+
+
+def hull_corners(points: Array) -> NDArray[np.intp]:
+    """Ascending numbers of the points, shape (n, 3), that are corners of their convex hull; it may be flat, a line or a point."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    centred = points - points.mean(axis=0)
+    _, extents, directions = np.linalg.svd(centred, full_matrices=False)
+    spanned = directions[extents > FLAT * np.linalg.norm(points)]
+    if len(spanned) == 0:
+        return np.array([0])
+    if len(spanned) == 1:
+        along = centred @ spanned[0]
+        return np.unique([np.argmin(along), np.argmax(along)])
+    try:
+        return np.sort(ConvexHull(points if len(spanned) == 3 else centred @ spanned.T).vertices).astype(np.intp)
+    except QhullError:  # thinner than Qhull resolves
+        return np.arange(len(points))
 
 
 Body = Annotated[Sphere | Box | Vertices, Field(discriminator="shape")]

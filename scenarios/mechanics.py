@@ -83,7 +83,7 @@ def apex(scene: Scenario, motion: Trajectory) -> Array:
 def lowest_height(scene: Scenario, motion: Trajectory) -> Array:
     """Height of the body's lowest point above the floor [m], shape (n,)."""
     orientation, lowest = _components(motion.orientation), np.full(len(motion), np.inf)
-    for vertex in scene.body.vertices.tolist():
+    for vertex in scene.body.hull.tolist():
         np.minimum(lowest, offset_of(orientation, vertex), out=lowest)
     return motion.position[:, 1] + lowest - scene.body.rounding
 

@@ -1,0 +1,214 @@
+"""When a body in free flight next descends through the floor, found by steps that cannot contain a contact.
+
+A corner r of a free body has the upward acceleration g_y + (α × r + ω × (ω × r))_y. With Ω the largest |ω|, |α| <= Ω²/√3 for the moments
+that a body can have, because |(I_j - I_k)/I_i| <= 1. So from its height h and its upward velocity v, for all s > 0,
+
+    h(t + s) >= h + v s + (g_y - c) s²/2,   c = (1 + 1/√3) Ω² |r|,   or |ω_horizontal| |ω × r| where ω is constant
+
+and there is no contact before the first zero of the right-hand side. The zeros approach a contact quadratically from before. Without
+rotation c = 0, and the first zero is the contact.
+
+Source: interval exclusion by Taylor's theorem with Lagrange's remainder; Euler's equations for |α|.
+Valid for: undamped flight. A corner that comes within rounding of the floor without clearly crossing it ends the search: whether it touches
+is beyond the digits. So does a stretch too long to search.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.model import TOUCHING
+from scenarios.rotations import cross, rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from scenarios.truths.flight import Flight
+
+Array = NDArray[np.float64]
+
+ANGULAR_ACCELERATION = 1.0 / math.sqrt(3.0)  # largest |α| over Ω²
+FIRST_ANGLE = 0.5  # rad, between the times at which contacts are excluded first
+HALVINGS = 6  # of the intervals in which none could be excluded, before they are searched step by step
+MAX_INTERVALS = 250_000  # of the first kind, after which the search ends; and
+MAX_STEPS = 10_000  # within one stretch where the body nearly touches
+MAX_DESCENT = 100  # steps of a corner within rounding of the floor, until it crosses or ascends
+FIRST_CHUNK = 32  # intervals at a time, doubled up to
+LARGEST_CHUNK = 50_000  # heights of corners at a time
+HEIGHT_ROUNDING = 1e-15  # of all terms of a height
+ATTITUDE_ROUNDING = 1e-15  # rad, for each rad turned
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Where a search ends: at a contact, or undecided, where it is not known whether there is one from here on; `time` in s."""
+
+    time: float
+    is_decided: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSearch:
+    """The search in one flight.
+
+    Attributes:
+        flight: The flight.
+        points: Corners of the body's convex hull, from the centre of mass in the body [m], shape (n, 3).
+        rounding: Radius about each of them [m].
+    """
+
+    flight: Flight
+    points: Array
+    rounding: float
+
+    def next_contact(self, duration: float) -> Contact | None:
+        """The next descent of a corner through the floor; None if there is none within `duration` [s].
+
+        Corners that touch the floor at the start must ascend, or rest where gravity pulls them upwards.
+        """
+        searched = 0
+        for begin, end in self._within_reach(duration):
+            count = max(1, math.ceil(min((end - begin) * self.flight.rotor.largest_spin / FIRST_ANGLE, 1e15)))
+            done, chunk = 0, FIRST_CHUNK
+            while done < count:
+                if searched > MAX_INTERVALS:
+                    return Contact(begin + (end - begin) * (done / count), False)
+                numbers = np.arange(done, min(done + chunk, count) + 1)
+                edges = np.minimum(begin + (end - begin) * (numbers / count), end)
+                for first, last in self._suspects(edges):
+                    contact = self._step_by_step(first, last)
+                    if contact is not None:
+                        return contact
+                done, searched, chunk = int(numbers[-1]), searched + len(numbers), min(2 * chunk, max(1, LARGEST_CHUNK // len(self.points)))
+        return None
+
+    @cached_property
+    def _curvature(self) -> Array:
+        """Bound c of each corner's acceleration apart from gravity's [m/s²], shape (n,)."""
+        rotor = self.flight.rotor
+        if rotor.is_steady:
+            spin = self.flight.start[SPIN]
+            moving = cross(np.broadcast_to(spin, self.points.shape), rotate(self.flight.start[ORIENTATION], self.points))
+            bound: Array = math.hypot(spin[0], spin[2]) * np.linalg.norm(moving, axis=1)
+            return bound
+        return (1.0 + ANGULAR_ACCELERATION) * rotor.largest_spin**2 * np.linalg.norm(self.points, axis=1)
+
+    @cached_property
+    def _reach(self) -> float:
+        return float(np.linalg.norm(self.points, axis=1).max())
+
+    @cached_property
+    def _size(self) -> float:
+        return self._reach + self.rounding
+
+    @cached_property
+    def _gravity(self) -> float:
+        return float(self.flight.acceleration[1])
+
+    def _within_reach(self, duration: float) -> list[tuple[float, float]]:
+        """The intervals [s] in which the centre of mass is low enough for a corner to touch the floor."""
+        y, speed = self.flight.start[POSITION][1] - 1.001 * self._size, self.flight.start[VELOCITY][1]  # rounding may miss the size itself
+        sinks = _zeros(y + 1.002 * self._size, speed, self._gravity)  # the centre of mass is below the floor, beyond rounding
+        duration = min([duration, *sinks])
+        edges = [0.0, *(t for t in _zeros(y, speed, self._gravity) if t < duration), duration]
+        return [(a, b) for a, b in pairwise(edges) if y + 0.5 * (a + b) * (speed + 0.25 * (a + b) * self._gravity) < 0.0]
+
+    def _suspects(self, edges: Array) -> Iterator[tuple[float, float]]:
+        """The intervals between ascending times in which a contact could not be excluded, neighbours joined; in order."""
+        begins, ends = edges[:-1], edges[1:]
+        for _ in range(HALVINGS if len(edges) > 2 else 0):
+            clear, is_below = self._excluded(begins, ends)
+            known = np.logical_or.accumulate(is_below)  # a contact comes before
+            begins, ends = begins[~clear & ~known], ends[~clear & ~known]
+            middles = 0.5 * (begins + ends)
+            begins, ends = np.column_stack([begins, middles]).ravel(), np.column_stack([middles, ends]).ravel()
+        joined = np.flatnonzero(np.concatenate([[True], begins[1:] != ends[:-1]])) if len(begins) else np.empty(0, dtype=int)
+        for first, after in pairwise([*joined, len(begins)]):
+            yield float(begins[first]), float(ends[after - 1])
+
+    def _excluded(self, begins: Array, ends: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether no corner can touch the floor in each interval, by the bounds from both of its ends up to its middle, shape (m,).
+
+        And whether the body is below the floor at its begin, farther than at any start.
+        """
+        half = 0.5 * (ends - begins)[:, None]
+        sag = 0.5 * np.maximum(self._curvature - self._gravity, 0.0) * half**2
+        tolerance = self._tolerance(ends)
+        (first, falling), (last, rising) = self._corners(begins), self._corners(ends)
+        lowest = np.minimum(np.minimum(first, last), np.minimum(first + falling * half, last - rising * half) - sag)
+        return lowest.min(axis=1) > tolerance, first.min(axis=1) < -2.0 * TOUCHING * self._size
+
+    def _step_by_step(self, begin: float, end: float) -> Contact | None:
+        """The first contact in an interval [s]."""
+        now = begin
+        for _ in range(MAX_STEPS):
+            if now > end:
+                return None
+            heights, speeds = (values[0] for values in self._corners(np.array([now])))
+            tolerance = float(self._tolerance(np.array([now]))[0])
+            low = heights <= (tolerance if now > 0.0 else TOUCHING * self._size)
+            lands = low & (speeds <= 0.0)
+            if now > 0.0 and lands.any():
+                return self._landing(now, lands, tolerance)
+            if (lands & (self._curvature > self._gravity)).any():
+                return Contact(0.0, False)
+            steps = _safe_steps(np.maximum(heights - 0.5 * tolerance, 0.0), speeds, self._gravity - self._curvature)
+            step = np.where(lands, np.inf, steps).min()  # gravity pulls those that rest on the floor upwards
+            now += float(max(step, 4.0 * math.ulp(now)))
+        return Contact(now, False)
+
+    def _landing(self, now: float, lands: NDArray[np.bool_], tolerance: float) -> Contact:
+        """The contact of corners within rounding of the floor that descend; decided once one of them certainly crosses it.
+
+        A step of |v| over the largest upward acceleration does not pass the lowest point of any of them.
+        """
+        upward = (self._gravity + self._curvature)[lands]
+        later = now
+        for _ in range(MAX_DESCENT):
+            heights, speeds = (values[0, lands] for values in self._corners(np.array([later])))
+            crosses = (speeds < 0.0) & (speeds**2 > 2.0 * upward * np.maximum(heights + tolerance, 0.0))
+            if crosses.any():
+                return Contact(later + float((heights / -speeds)[crosses].min()), True)  # Newton's last step
+            steps = (-speeds / upward)[speeds < 0.0]
+            if not len(steps) or later + steps.min() == later:
+                break
+            later += float(steps.min())
+        return Contact(now, False)
+
+    def _corners(self, times: Array) -> tuple[Array, Array]:
+        """Heights above the floor [m] and upward velocities [m/s] of the corners, shapes (m, n), at times [s], shape (m,)."""
+        states = self.flight(times)
+        arms = rotate(states[:, None, ORIENTATION], self.points)
+        spin = states[:, None, SPIN]
+        rising = spin[..., 2] * arms[..., 0] - spin[..., 0] * arms[..., 2]
+        return states[:, 1:2] + arms[..., 1] - self.rounding, states[:, 8:9] + rising
+
+    def _tolerance(self, times: Array) -> Array:
+        """Rounding of a corner's height [m] at times [s], shape (m,)."""
+        y, speed = self.flight.start[POSITION][1], self.flight.start[VELOCITY][1]
+        terms = abs(y) + times * (abs(speed) + 0.5 * times * abs(self._gravity)) + self._size
+        return HEIGHT_ROUNDING * terms + ATTITUDE_ROUNDING * self._reach * self.flight.rotor.largest_spin * times
+
+
+def _safe_steps(heights: Array, speeds: Array, acceleration: Array) -> Array:
+    """The first positive zero [s] of h + v s + a s²/2 for h >= 0, infinite where there is none; from 0 upwards the next one."""
+    discriminant = speeds * speeds - 2.0 * acceleration * heights
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(discriminant)
+        falling = 2.0 * heights / (root - speeds)
+        rising = np.where(acceleration < 0.0, (speeds + root) / -acceleration, np.inf)
+    steps = np.where(speeds > 0.0, rising, np.where((discriminant >= 0.0) & (root > speeds), falling, np.inf))
+    return np.where(np.isnan(steps), np.inf, steps)
+
+
+def _zeros(height: float, speed: float, acceleration: float) -> list[float]:
+    """The positive zeros [s] of h + v s + a s²/2, ascending."""
+    discriminant = speed * speed - 2.0 * acceleration * height
+    if discriminant < 0.0:
+        return []
+    pivot = -(speed + math.copysign(math.sqrt(discriminant), speed))
+    candidates = [2.0 * height / pivot] if pivot != 0.0 else []
+    candidates += [pivot / acceleration] if acceleration != 0.0 else []
+    return sorted(t for t in candidates if 0.0 < t < math.inf)

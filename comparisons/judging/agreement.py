@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from comparisons.judging.horizon import with_horizon
 from comparisons.judging.verdicts import Judgement
 from comparisons.measuring.comparison import Comparison, Unresolved
 from comparisons.measuring.metric import Metric
@@ -38,11 +39,13 @@ def judge_agreement(
     for metric in METRICS.values():
         if not (metric.agreement and metric.applies(scene, truth or _as_truth(second[0].motion))):
             continue
+        unresolved: Unresolved | None = None
         try:
             judgement = Judgement(metric.average(pairs).value, "measured", reason=reason)
         except Unresolved as error:
+            unresolved = error
             judgement = Judgement(np.nan, "measured", cause="unresolved", reason="; ".join(filter(None, [reason, str(error)])))
-        yield metric, judgement
+        yield metric, with_horizon(judgement, scene, metric, truth, unresolved)
 
 
 def _paired(truth: Truth | None, one: Comparison, other: Comparison) -> Comparison:

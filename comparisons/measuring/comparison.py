@@ -32,6 +32,10 @@ class Unresolved(Exception):
     """The time step is too coarse for a metric; the text says why."""
 
 
+class BeyondHorizon(Unresolved):
+    """The exact solution ends before there is enough to compare."""
+
+
 def exactly(truth: Truth, times: Array) -> Trajectory:
     """The exact solution at those of some times at which it is known."""
     return truth(times[truth.covers(times)])
@@ -72,11 +76,11 @@ class Comparison:
         """The reference; metrics that need one apply only where there is one.
 
         Raises:
-            Unresolved: It ends after too few steps.
+            BeyondHorizon: It ends after too few steps.
         """
         assert self.reference is not None
         if len(self.reference) < min(SHORTEST_FLIGHT, len(self.motion) - 1):
-            raise Unresolved(f"the exact solution is known for {len(self.reference) - 1} steps of {self.dt:g} s only")
+            raise BeyondHorizon(f"the exact solution is known for {len(self.reference) - 1} steps of {self.dt:g} s only")
         return self.reference
 
     @property

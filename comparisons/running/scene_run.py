@@ -20,6 +20,7 @@ from comparisons.judging.convergence import (
     study_convergence,
 )
 from comparisons.judging.error_budget import is_sufficient
+from comparisons.judging.horizon import with_horizon
 from comparisons.judging.verdicts import Judgement, judge, with_limitations
 from comparisons.measuring.comparison import Comparison, Unresolved, exactly
 from comparisons.measuring.metric import Average, Metric
@@ -34,7 +35,7 @@ from comparisons.running.inputs import EngineEntry
 from comparisons.running.processes import EngineProcesses
 from comparisons.running.recording import Breakdown, divergence
 from comparisons.running.start_phases import StartPhase, start_phases
-from scenarios import Scenario, Trajectory
+from scenarios import Scenario, Trajectory, Truth
 
 FEWEST_STEPS = 8
 """A run of fewer steps is not worth adding."""
@@ -140,7 +141,7 @@ def _measure(
     perturbed = [_compare(motions, phases, exact) for motions in engine_run.perturbed]
     rows = [Measured(case.remark("limited", one.message), None) for one in engine_run.limitations]
     for metric in metrics_for(scene, truth):
-        average, judgement = _judge_metric(scene, dt, engine_run.label, metric, cases)
+        average, judgement = _judge_metric(scene, truth, dt, engine_run.label, metric, cases)
         moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))
         sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
         allowed = tolerance(scene, metric.unit, engine_run.precision, case.steps, sampling_noise)
@@ -152,21 +153,24 @@ def _measure(
     return rows
 
 
-def _judge_metric(scene: Scenario, dt: float, label: str, metric: Metric, cases: Sequence[Comparison]) -> tuple[Average, Judgement]:
+def _judge_metric(
+    scene: Scenario, truth: Truth | None, dt: float, label: str, metric: Metric, cases: Sequence[Comparison]
+) -> tuple[Average, Judgement]:
     """A metric's average over the start phases, and its judgement."""
+    unresolved: Unresolved | None = None
     try:
         with np.errstate(all="ignore"):  # an engine may return 1e300; the inf or NaN that follows is judged as such
             average = metric.average(cases)
-        unresolved = ""
     except Unresolved as error:
-        average, unresolved = Average(*[np.array([np.nan])] * 3), str(error)
+        average, unresolved = Average(*[np.array([np.nan])] * 3), error
     judgement = judge(scene, label, dt, metric, average.value)
-    reason = "; ".join(filter(None, [unresolved, judgement.reason]))
+    reason = "; ".join(filter(None, [str(unresolved or ""), judgement.reason]))
     # A value that is not a number is a failure, expected or not; one that the step cannot resolve fails only an expectation.
     verdict = "failed" if np.isnan(average.value) and not unresolved else judgement.verdict
     if verdict == "failed" and not reason:
         reason = "what it measures did not happen"
-    return average, replace(judgement, verdict=verdict, reason=reason, cause="unresolved" if unresolved else "")
+    judgement = replace(judgement, verdict=verdict, reason=reason, cause="unresolved" if unresolved else "")
+    return average, with_horizon(judgement, scene, metric, truth, unresolved)
 
 
 def _study(

@@ -50,6 +50,10 @@ class Truth:
         """Mask of the times [s] up to the horizon, with a margin because the last of n dt may round past it."""
         return t <= self.horizon * (1.0 + 1e-9)
 
+    def covers_all(self, duration: float) -> bool:
+        """Whether the formula is valid for a whole scene of this duration [s]."""
+        return bool(self.covers(np.array([duration]))[0])
+
     def after(self, delay: float) -> "Truth":
         """The motion from a time `delay` [s] on, which must not be after the first impact."""
         later = tuple(replace(event, time=event.time - delay) for event in self.events)

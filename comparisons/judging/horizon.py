@@ -1,0 +1,22 @@
+"""What is said of a measurement where the exact solution is valid for a part of the scene only."""
+
+from dataclasses import replace
+
+from comparisons.judging.verdicts import Judgement
+from comparisons.measuring.comparison import BeyondHorizon, Unresolved
+from comparisons.measuring.metric import Metric
+from scenarios import Scenario, Truth
+
+
+def with_horizon(judgement: Judgement, scene: Scenario, metric: Metric, truth: Truth | None, unresolved: Unresolved | None) -> Judgement:
+    """A judgement that states how much of the scene the exact solution covers, where it does not cover all.
+
+    A value that is missing for this reason has the verdict `no_truth`, unless an expectation of it failed. A metric of the first impact
+    is not limited: the exact solution has that impact.
+    """
+    if isinstance(unresolved, BeyondHorizon) and judgement.verdict == "measured":
+        return replace(judgement, verdict="no_truth")
+    if truth is None or metric.kind != "truth" or metric.first_flight or unresolved or truth.covers_all(scene.duration):
+        return judgement
+    limit = f"compared up to t = {truth.horizon:.3g} s: the exact solution is valid until then"
+    return replace(judgement, reason="; ".join(filter(None, [judgement.reason, limit])))

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.model import TOUCHING
-from scenarios.rotations import cross, rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from scenarios.rotations import cross, rotate, unrotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
 from scenarios.truths.flight import Flight
 
 Array = NDArray[np.float64]
@@ -32,7 +32,8 @@ Array = NDArray[np.float64]
 ANGULAR_ACCELERATION = 1.0 / math.sqrt(3.0)  # largest |α| over Ω²
 FIRST_ANGLE = 0.5  # rad, between the times at which contacts are excluded first
 HALVINGS = 6  # of the intervals in which none could be excluded, before they are searched step by step
-MAX_INTERVALS = 250_000  # of the first kind, after which the search ends; and
+MAX_INTERVALS = 250_000  # of the first kind, after which the search ends; or
+MAX_HEIGHTS = 50_000_000  # of corners in them; and
 MAX_STEPS = 10_000  # within one stretch where the body nearly touches
 MAX_DESCENT = 100  # steps of a corner within rounding of the floor, until it crosses or ascends
 FIRST_CHUNK = 32  # intervals at a time, doubled up to
@@ -73,7 +74,7 @@ class ContactSearch:
             count = max(1, math.ceil(min((end - begin) * self.flight.rotor.largest_spin / FIRST_ANGLE, 1e15)))
             done, chunk = 0, FIRST_CHUNK
             while done < count:
-                if searched > MAX_INTERVALS:
+                if searched > min(MAX_INTERVALS, MAX_HEIGHTS // len(self.points)):
                     return Contact(begin + (end - begin) * (done / count), False)
                 numbers = np.arange(done, min(done + chunk, count) + 1)
                 edges = np.minimum(begin + (end - begin) * (numbers / count), end)
@@ -133,12 +134,17 @@ class ContactSearch:
 
         And whether the body is below the floor at its begin, farther than at any start.
         """
-        half = 0.5 * (ends - begins)[:, None]
-        sag = 0.5 * np.maximum(self._curvature - self._gravity, 0.0) * half**2
-        tolerance = self._tolerance(ends)
-        (first, falling), (last, rising) = self._corners(begins), self._corners(ends)
-        lowest = np.minimum(np.minimum(first, last), np.minimum(first + falling * half, last - rising * half) - sag)
-        return lowest.min(axis=1) > tolerance, first.min(axis=1) < -2.0 * TOUCHING * self._size
+        half = 0.5 * (ends - begins)
+        sag = 0.5 * max(float(self._curvature.max()) - self._gravity, 0.0) * half**2
+        (first, from_first), (last, from_last) = self._lowest(begins, half), self._lowest(ends, -half)
+        lowest = np.minimum(np.minimum(first, last), np.minimum(from_first, from_last) - sag)
+        return lowest > self._tolerance(ends), first < -2.0 * TOUCHING * self._size
+
+    def _lowest(self, times: Array, later: Array) -> tuple[Array, Array]:
+        """The lowest height at times [s], and the lowest if from then on each corner kept its velocity, `later` [s]; shapes (m,)."""
+        height, speed, vertical, turning = self._vertical_motion(times)
+        now = height + (vertical @ self.points.T).min(axis=1)
+        return now, height + later * speed + ((vertical + later[:, None] * turning) @ self.points.T).min(axis=1)
 
     def _step_by_step(self, begin: float, end: float) -> Contact | None:
         """The first contact in an interval [s]."""
@@ -179,11 +185,15 @@ class ContactSearch:
 
     def _corners(self, times: Array) -> tuple[Array, Array]:
         """Heights above the floor [m] and upward velocities [m/s] of the corners, shapes (m, n), at times [s], shape (m,)."""
+        height, speed, vertical, turning = self._vertical_motion(times)
+        return height[:, None] + vertical @ self.points.T, speed[:, None] + turning @ self.points.T
+
+    def _vertical_motion(self, times: Array) -> tuple[Array, Array, Array, Array]:
+        """Height and speed of the centre of mass, shape (m,), and the vectors in the body whose products with an arm add to them."""
         states = self.flight(times)
-        arms = rotate(states[:, None, ORIENTATION], self.points)
-        spin = states[:, None, SPIN]
-        rising = spin[..., 2] * arms[..., 0] - spin[..., 0] * arms[..., 2]
-        return states[:, 1:2] + arms[..., 1] - self.rounding, states[:, 8:9] + rising
+        up = np.broadcast_to(UP, (len(times), 3))
+        turning = unrotate(states[:, ORIENTATION], cross(up, states[:, SPIN]))  # (ω × r)·UP = (UP × ω)·r
+        return states[:, 1] - self.rounding, states[:, 8], unrotate(states[:, ORIENTATION], up), turning
 
     def _tolerance(self, times: Array) -> Array:
         """Rounding of a corner's height [m] at times [s], shape (m,)."""

@@ -6,8 +6,8 @@ that of a given law.
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
 Valid for: one corner touches, or the two of an edge that meet the floor at once and have one velocity, before and after; a ball with any
 spin; a Coulomb coefficient for a ball of equal moments only, or by a given law; no damping. Valid from the start to the tenth impact at
-most, to an impact that is not of this kind, to one after which the body stays on the floor, or to where a disturbance of 1e-10 rad/s at the
-start has grown to 1e-6, whichever comes first.
+most, to an impact that is not of this kind, to one after which the body stays on the floor, to where rounding decides whether the body
+touches or when it turns over, or to where a disturbance of 1e-10 rad/s at the start has grown to 1e-6, whichever comes first.
 """
 
 import math

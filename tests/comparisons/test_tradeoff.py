@@ -286,7 +286,7 @@ def test_unknown_metric_and_declining_engines_are_errors():
 
 def test_accuracy_options_are_walked_beside_the_time_step():
     """Each value has a ladder of its own; a shorter inner step is more accurate at the coarsest steps."""
-    found = tradeoff(SPIN, InnerStep(), budget=0.02)
+    found = tradeoff("fall-spin", InnerStep(), "position_error", budget=0.02)
     errors_at_coarsest = {ladder.engine: ladder.steps[0][1] for ladder in found.ladders}
     assert list(errors_at_coarsest) == ["inner-step", *(f"inner-step[inner_step={1 / n!r}]" for n in (240, 480))]
-    assert errors_at_coarsest["inner-step"] < 0.2 * errors_at_coarsest[f"inner-step[inner_step={1 / 240!r}]"]
+    assert errors_at_coarsest["inner-step"] < 0.5 * errors_at_coarsest[f"inner-step[inner_step={1 / 240!r}]"]

@@ -10,7 +10,7 @@ from reference_impl.corrections import projection
 from reference_impl.laws import clamped, coulomb, normal, note, poisson
 from reference_impl.rotations import exact, gyroscopic, implicit_gyroscopic, midpoint, rk4, symmetric_top
 from reference_impl.rotations import note as note_rotation
-from reference_impl.step import TRANSLATION_DISCRETISATION, TRANSLATION_ORDER
+from reference_impl.step import DAMPING_ORDER, TRANSLATION_DISCRETISATION, TRANSLATION_ORDER
 
 Leaf = ModuleType
 """A module with one method, and the facts about it:
@@ -78,10 +78,11 @@ class Methods:
         """Whether the law takes a coefficient of friction between 0 and infinity."""
         return bool(LAWS[self.law].ANY_FRICTION)
 
-    def order(self, *, gravity: bool, floor: bool) -> float | None:
+    def order(self, *, gravity: bool, damping: bool, floor: bool) -> float | None:
         """Order of accuracy in dt of a motion: the lowest of the parts that it needs; None if one of them claims none."""
         orders: list[float | None] = [ROTATIONS[self.rotation].ORDER]
         orders += [TRANSLATION_ORDER] if gravity else []
+        orders += [DAMPING_ORDER] if damping else []
         orders += [leaf.ORDER for leaf in self._floor_leaves] if floor else []
         claimed = [order for order in orders if order is not None]
         return min(claimed) if len(claimed) == len(orders) else None

@@ -2,7 +2,7 @@
 
 A part that is None (gravity, forces, damping, floor, rotation or correction) is left out of the compiled step.
 
-Order: 1 for the translation under gravity, as semi-implicit Euler.
+Order: 1 for the translation under gravity, as semi-implicit Euler, and under damping, which is exact but acts before the motion.
 Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithm 1.
 """
 
@@ -10,6 +10,7 @@ from reference_impl.quaternion import rotation_matrix
 from reference_impl.vectors import Vec3, any_, compiled, cross, row, transpose
 
 TRANSLATION_ORDER = 1.0
+DAMPING_ORDER = 1.0
 TRANSLATION_DISCRETISATION = "semi-implicit Euler"
 
 

@@ -39,7 +39,7 @@ class Document(Engine):
 
     def order_in(self, scene: Scenario) -> float | None:
         """The lowest order among the methods that the scene needs; None if one of them claims none, as all contacts do."""
-        return self.methods().order(gravity=scene.gravity is not None, floor=scene.floor is not None)
+        return self.methods().order(gravity=scene.gravity is not None, damping=scene.damping is not None, floor=scene.floor is not None)
 
     def discretisation(self, scene: Scenario) -> str | None:
         """The discretisation of the flight, and how contacts are treated if there is a floor."""

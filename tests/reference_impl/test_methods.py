@@ -25,18 +25,19 @@ def test_leaf_declares_its_order_lanes_cost_and_source(leaf):
 
 
 @pytest.mark.parametrize(
-    ("methods", "gravity", "floor", "order"),
+    ("methods", "gravity", "damping", "floor", "order"),
     [
-        (Methods(), False, False, None),
-        (Methods(rotation="rk4"), False, False, 4.0),
-        (Methods(rotation="rk4"), True, False, 1.0),
-        (Methods(rotation="exact"), False, False, math.inf),
-        (Methods(rotation="exact"), True, True, None),
-        (Methods(rotation="midpoint", correction="projection"), False, False, 2.0),
+        (Methods(), False, False, False, None),
+        (Methods(rotation="rk4"), False, False, False, 4.0),
+        (Methods(rotation="rk4"), True, False, False, 1.0),
+        (Methods(rotation="rk4"), False, True, False, 1.0),
+        (Methods(rotation="exact"), False, False, False, math.inf),
+        (Methods(rotation="exact"), True, False, True, None),
+        (Methods(rotation="midpoint", correction="projection"), False, False, False, 2.0),
     ],
 )
-def test_order_is_the_lowest_of_the_parts_that_a_motion_needs(methods, gravity, floor, order):
-    assert methods.order(gravity=gravity, floor=floor) == order
+def test_order_is_the_lowest_of_the_parts_that_a_motion_needs(methods, gravity, damping, floor, order):
+    assert methods.order(gravity=gravity, damping=damping, floor=floor) == order
 
 
 def test_ensemble_runs_in_lanes_unless_one_of_its_methods_cannot():

@@ -1,13 +1,15 @@
 """Error budget: from an error at three or more time steps to its asymptotic value as dt → 0, its order, and its cause.
 
 An error that vanishes as dt → 0 is a discretisation error; one that does not is a model error. The asymptotic error is stated with an
-interval that contains it in at least 95 % of cases (docs/coverage.md), and the cause follows from the interval alone:
+interval that contains it in at least 95 % of cases (docs/coverage.md). The cause is stated where its opposite is improbable:
 
-    model            the interval excludes 0
-    discretisation   the interval contains 0 and nothing larger than is allowed: the error at the finest step, or a 64th of that at
-                     the coarsest of the three finest, but at most half of it; and the likeliest value is at most half of what is allowed
+    model            the asymptotic error has a sign: 0 and the other sign are improbable
+    discretisation   an asymptotic error larger than allowed is improbable, and one up to half of that is likely. Allowed is the error at
+                     the finest step, or a 64th of that at the coarsest of the three finest; but at most half of it, and more than the noise
     rounding         no error is larger than rounding
     unresolved       everything else: the time steps do not decide it
+
+The interval excludes 0 under a model error, contains 0 otherwise, and reaches under a discretisation error no farther than said.
 """
 
 import math
@@ -17,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.judging.extrapolation import Posterior, extrapolate
+from comparisons.judging.extrapolation import ORDERS, Posterior, extrapolate
 from comparisons.judging.verdicts import Cause
 from scenarios import DropspinError
 
@@ -31,6 +33,13 @@ SMALLEST_RATIO = 3.99
 SHARE_OF_COARSEST = 1.0 / 64.0
 """By this an error of third order falls over three steps that halve; of higher orders the interval is wider than the finest error."""
 LARGEST_SHARE_OF_COARSEST = 0.5
+MODEL_RISK = 0.03
+"""A model error is stated where 0 and the other sign together are less probable than this. Of series that vanish far fewer come near."""
+DISCRETISATION_RISK = 0.04
+"""A discretisation error is stated where an asymptotic error larger than allowed is less probable than this: a little less than the 5 %
+that an interval may miss, for series that no form describes."""
+LARGER_THAN_HALF = 0.25
+"""Largest probability, under a discretisation error, of an asymptotic error larger than half of what is allowed."""
 ABOVE_NOISE = 3.0
 """Errors that are larger than this many times their noise have a size that an order can be fitted to."""
 SAME_SLOPE = 0.5
@@ -107,12 +116,12 @@ def error_budget(
         return ErrorBudget("rounding", "as small as rounding at every step", value, value - reach, value + reach)
     small = np.hypot(noise, floor)
     found = extrapolate(h, e, small, claimed_order, signed=signed)
-    cause = _cause(e, found, max(negligible, float(floor[-1])))
-    order, fitted = _fitted_order(h, e, 0.0 if cause == "discretisation" else found.median, small)
+    cause, median, lower, upper = _attributed(e, found, max(negligible, float(floor[-1])), float(noise[-1]))
+    order, fitted = _fitted_order(h, e, 0.0 if cause == "discretisation" else median, small)
     if cause == "unresolved" or math.isnan(order):
-        return ErrorBudget(cause, _reason(cause, e, small, order), found.median, found.lower, found.upper)
-    lower, upper = min(found.order_lower, order), max(found.order_upper, order)
-    return ErrorBudget(cause, _reason(cause, e, small, order), found.median, found.lower, found.upper, order, lower, upper, fitted)
+        return ErrorBudget(cause, _reason(cause, e, small, order), median, lower, upper)
+    orders = min(found.order_lower, order), max(found.order_upper, order)
+    return ErrorBudget(cause, _reason(cause, e, small, order), median, lower, upper, order, *orders, fitted)
 
 
 def _verify(h: Array, e: Array, signed: bool) -> None:
@@ -124,14 +133,23 @@ def _verify(h: Array, e: Array, signed: bool) -> None:
         raise DropspinError(f"an error without a sign is not negative; got {float(np.nanmin(e)):g}. Say signed=True if it has one.")
 
 
-def _cause(e: Array, found: Posterior, floor: float) -> Cause:
-    """The cause that the posterior of the asymptotic error implies; errors coarsest first."""
-    if found.lower > floor or found.upper < -floor:
-        return "model"
+def _attributed(e: Array, found: Posterior, floor: float, noise: float) -> tuple[Cause, float, float, float]:
+    """The cause that the posterior of the asymptotic error implies, and its median and interval; errors coarsest first."""
     coarsest, finest = float(np.min(np.abs(e[[0, -FEWEST_TIME_STEPS]]))), abs(float(e[-1]))
     allowed = max(min(max(finest, SHARE_OF_COARSEST * coarsest), LARGEST_SHARE_OF_COARSEST * coarsest), floor)
-    reach = max(-found.lower, found.upper, 2.0 * abs(found.median))
-    return "discretisation" if reach <= allowed else "unresolved"
+    above, below = found.beyond(floor)
+    median, lower, upper = found.interval()
+    if not found.has_sign:  # one part that is smaller than another does not show
+        upper = max(upper, finest)
+    if max(above, below) > 1.0 - MODEL_RISK:
+        lower, upper = (lower, min(upper, -floor)) if found.has_sign and below > above else (max(lower, floor), upper)
+        return "model", median, lower, upper
+    lower, upper = min(lower, 0.0), max(upper, 0.0)
+    is_small = sum(found.beyond(allowed)) < DISCRETISATION_RISK and sum(found.beyond(0.5 * allowed)) < LARGER_THAN_HALF
+    if not is_small or allowed < noise:
+        return "unresolved", median, lower, upper
+    lower, upper = max(lower, -allowed), min(upper, allowed)
+    return "discretisation", median, lower, upper
 
 
 def _fitted_order(h: Array, e: Array, limit: float, small: Array) -> tuple[float, tuple[float, ...]]:
@@ -147,7 +165,7 @@ def _fitted_order(h: Array, e: Array, limit: float, small: Array) -> tuple[float
     if len(clear) < 2 or abs(np.sign(rest[clear]).sum()) < len(clear):
         return math.nan, ()
     slope = float(np.polyfit(np.log(h[clear]), np.log(np.abs(rest[clear])), 1)[0])
-    return (slope, tuple(float(step) for step in h[clear])) if slope > 0.0 else (math.nan, ())
+    return (slope, tuple(float(step) for step in h[clear])) if slope > 0.5 * ORDERS[0] else (math.nan, ())
 
 
 def _reason(cause: Cause, e: Array, small: Array, order: float) -> str:

@@ -1,11 +1,11 @@
 """Extrapolation to dt = 0 with an honest interval: a Bayesian average over the forms that an error may have as a function of the step.
 
-    e(h) = m + s Hᵖ (c₀ + c₁ r Hᵈ + c₂ r² H²ᵈ + c₃ r³ H³ᵈ) + s ρ Hᵖ ξ(h) + noise        H = h / the coarsest h
+    e(h) = m + s Hᵖ (c₀ + q (c₁ r Hᵈ + c₂ r² H²ᵈ + c₃ r³ H³ᵈ)) + s ρ Hᵖ ξ(h) + noise        H = h / the coarsest h
 
 m is the asymptotic error. The cₖ and ξ(h) are independent standard normal variables: the former give a series of powers that starts at the
 order p, the latter a discrepancy that no smooth series has, such as a kink of a maximum or the time of an impact between two steps. What is
-not known is averaged over: p, r, d and ρ over the values below, s with the density 1/s, and m, which is normal with a standard deviation of
-s times a value on a logarithmic grid. Given these, everything is Student-t, with closed forms.
+not known is averaged over: p, r, d and ρ over the values below, s with the density 1/s, and m, which is 0 with even odds and else normal
+with a standard deviation of s times a value on a logarithmic grid. Given these, everything is Student-t, with closed forms.
 
 The error of a signed metric is e itself. One that cannot be negative is a norm, |m + …|, whose square is a smooth function of the step
 where the norm itself has a kink; then e and e² have even odds of being the series above.
@@ -17,6 +17,7 @@ Source: the model average is in the manner of C. J. Oates et al., Probabilistic 
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -26,44 +27,98 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ORDERS = np.arange(0.5, 6.01, 0.5)
-"""Orders that an error may start with. Half of the weight is on the integers up to 4, the orders that methods have."""
+"""Orders that an error may start with."""
 EACH_ORDER_FURTHER = 0.5
 """Weight of an order relative to the one that is nearer to 1 by 1: what looks like a high order may be lower powers that cancel."""
-TERM_RATIOS = (0.3, 1.0, 3.0)
-"""r: the next power's coefficient relative to the one before, at the coarsest step."""
+LATER_TERMS = 1.0 / 3.0
+"""q: the coefficients after the leading one, relative to it: a series that cancels its own leading term is rare."""
+TERM_RATIOS = (0.3, 1.0)
+"""r: how much smaller each further coefficient is, at the coarsest step."""
 TERM_DISTANCES = {1.0: 0.6, 2.0: 0.15, 0.5: 0.15}
 """d, from one power to the next, and its probability: all powers, even powers only, half powers too."""
 LOGARITHM = 0.1
 """Probability that a logarithm of the step multiplies the leading power."""
-DISCREPANCIES = {0.003: 0.5, 0.03: 0.35, 0.3: 0.15}
-"""ρ and its probability."""
+DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
+"""ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime moves each error by a fifth."""
+NO_ASYMPTOTIC_ERROR = 0.5
+"""Probability that m is 0 before the errors are seen."""
 SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2
-"""Standard deviations of m: from a thousandth of the change of the errors to ten times the largest error."""
-HIDDEN = 0.5
-"""A norm, or the largest of several errors, does not show one of them that is smaller than this share of it."""
+"""Standard deviations of m, where it is not 0: from a thousandth of the change of the errors to ten times the largest error."""
 NEGLIGIBLE_WEIGHT = 1e-3
-"""The least likely forms, with this much weight together, are left out of the quantiles."""
+"""The least likely forms, with this much weight together, are left out."""
 HALVINGS = 30
-CREDIBLE = 0.97
-"""Probability of the interval within the model: more than the 95 % that are stated, for series that no form describes."""
+CREDIBLE = 0.99
+"""Probability of the interval within the model, given that m is not 0: more than the 95 % that are stated, for series that no form
+describes."""
 
 
-class Posterior(NamedTuple):
-    """What a series of errors says about its value at dt = 0.
+class _Forms(NamedTuple):
+    covariances: Array
+    """Of the series divided by Hᵖ, (forms, n, n)."""
+    orders: Array
+    log_weights: Array
+    without_claim: Array
+    """The logarithm of the weights that no claim has changed, relative to `log_weights`."""
+
+
+class _Fit(NamedTuple):
+    log_weights: Array
+    """(forms, 1 + scales), the first for m = 0."""
+    centres: Array
+    """Of m, as the widths."""
+    widths: Array
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What a series of errors says about its value m at dt = 0.
 
     Attributes:
-        median: Of the asymptotic error.
-        lower: Lower end of its interval.
-        upper: Upper end of its interval.
+        zero: Probability that m is 0.
+        weights: Of the Student-t distributions that m follows otherwise, shape (k,), sum 1 - zero.
+        centres: Their centres, of m² where `squares`.
+        widths: Their scales.
+        squares: Whether each is a distribution of m².
+        freedom: Their degrees of freedom.
+        has_sign: Whether m can be negative.
         order_lower: Lower end of the interval of the order.
         order_upper: Upper end of the interval of the order.
     """
 
-    median: float
-    lower: float
-    upper: float
+    zero: float
+    weights: Array
+    centres: Array
+    widths: Array
+    squares: NDArray[np.bool_]
+    freedom: int
+    has_sign: bool
     order_lower: float
     order_upper: float
+
+    def beyond(self, reach: float) -> tuple[float, float]:
+        """Probabilities of m above `reach` and of m below -reach, which is not negative."""
+        low, high = self._below(np.array([-reach, reach]))
+        return float(1.0 - self.zero - high), float(low)
+
+    def interval(self) -> tuple[float, float, float]:
+        """Median, lower and upper end of m, given that it is not 0; of |m|, where m has no sign."""
+        roots = np.where(self.squares, np.sqrt(np.abs(self.centres) + 1e4 * self.widths), np.abs(self.centres) + 1e4 * self.widths)
+        unit, reach = float(np.min(np.where(self.squares, np.sqrt(self.widths), self.widths))), float(np.max(roots))
+        outside, other = 0.5 * (1.0 - CREDIBLE), 1.0 - self.zero
+        low, median, high = _quantiles(self._below, (other * outside, other * 0.5, other * (1.0 - outside)), unit, reach)
+        if self.has_sign:
+            return median, low, high
+        # A norm that extrapolates below 0 has a limit above 0, after a minimum at finer steps.
+        lower = max(low, -high, 0.0)
+        wanted = other * (CREDIBLE if lower == 0.0 else 1.0 - outside)
+        [upper] = _quantiles(lambda x: self._below(x) - self._below(-x), (wanted,), unit, reach)
+        return abs(median), lower, upper
+
+    def _below(self, x: Array) -> Array:
+        """Probability of an m other than 0 below each x."""
+        points = np.where(self.squares, np.abs(x[:, None]) * x[:, None], x[:, None])
+        found: Array = student_t(self.freedom, (points - self.centres) / self.widths) @ self.weights
+        return found
 
 
 def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None = None, *, signed: bool = True) -> Posterior:
@@ -82,34 +137,15 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
     if not signed:
         squares = _fit(forms, h, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
         parts.append(squares._replace(log_weights=squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), noise)))))
-    return _summary(parts, forms, abs(float(errors[np.argmin(dts)])))
-
-
-class _Forms(NamedTuple):
-    covariances: Array
-    """Of the series divided by Hᵖ, (forms, n, n)."""
-    orders: Array
-    log_weights: Array
-    without_claim: Array
-    """The logarithm of the weights that no claim has changed, relative to `log_weights`."""
-
-
-class _Fit(NamedTuple):
-    log_weights: Array
-    """(forms, scales)"""
-    centres: Array
-    """Of m, as the widths."""
-    widths: Array
-    freedom: int
+    return _posterior(parts, forms, len(h))
 
 
 @lru_cache(maxsize=64)
 def _forms(h: tuple[float, ...], claimed: float | None) -> _Forms:
     """All forms of a series at steps relative to the coarsest."""
     steps = np.array(h)
-    integer = (ORDERS % 1.0 == 0.0) & (ORDERS <= 4.0)
     weights = EACH_ORDER_FURTHER ** np.abs(ORDERS - 1.0)
-    weights = 0.5 * weights / weights.sum() + 0.5 * np.where(integer, weights, 0.0) / weights[integer].sum()
+    weights /= weights.sum()
     unclaimed = weights
     if claimed is not None:
         nearest = np.argmin(np.abs(ORDERS - claimed))
@@ -121,6 +157,7 @@ def _forms(h: tuple[float, ...], claimed: float | None) -> _Forms:
                 powers = np.array([ratio**k * steps ** (k * distance) for k in range(4)])
                 if distance == 0.0:
                     powers = np.array([np.ones_like(steps), np.log(steps), ratio * steps, ratio * steps * np.log(steps)])
+                powers[1:] *= LATER_TERMS
                 for discrepancy, share in DISCREPANCIES.items():
                     covariances.append(powers.T @ powers + discrepancy**2 * np.eye(len(steps)))
                     orders.append(order)
@@ -143,48 +180,38 @@ def _fit(forms: _Forms, h: Array, e: Array, noise: Array) -> _Fit:
     along = np.sum(weighted * ones, axis=1)[:, None]
     information = np.einsum("fi,fij,fj->f", ones, inverses, ones)[:, None]
     decades = math.log10(LARGEST_SCALE * size / scale / SMALLEST_SCALE)
-    variances = np.geomspace(SMALLEST_SCALE, LARGEST_SCALE * size / scale, 1 + math.ceil(SCALES_PER_DECADE * decades)) ** 2
+    scales = np.geomspace(SMALLEST_SCALE, LARGEST_SCALE * size / scale, 1 + math.ceil(SCALES_PER_DECADE * decades))
+    variances = np.array([0.0, *scales**2])
+    chances = np.array([NO_ASYMPTOTIC_ERROR, *np.full(len(scales), (1.0 - NO_ASYMPTOTIC_ERROR) / len(scales))])
     # Sherman and Morrison: m adds variances * 1 1ᵀ to the covariance.
     growth = 1.0 + variances * information
     residuals = np.maximum(residual - variances * along**2 / growth, 1e-12 * residual)
     determinants = np.linalg.slogdet(covariances)[1] + 2.0 * np.sum(np.log(leading), axis=1)
     log_weights = (
         forms.log_weights[:, None]
+        + np.log(chances)
         - 0.5 * (determinants[:, None] + np.log(growth))
         - 0.5 * len(h) * (np.log(residuals) + 2.0 * math.log(scale))
     )
     shrunk = variances / growth
-    return _Fit(log_weights, scale * shrunk * along, scale * np.sqrt(shrunk * residuals / len(h)), len(h))
+    return _Fit(log_weights, scale * shrunk * along, scale * np.sqrt(shrunk * residuals / len(h)))
 
 
-def _summary(parts: list[_Fit], forms: _Forms, hidden_by: float) -> Posterior:
-    """Quantiles over all forms; parts are the fits of e and, of a metric without a sign, of e²."""
+def _posterior(parts: list[_Fit], forms: _Forms, freedom: int) -> Posterior:
+    """All forms together; parts are the fits of e and, of a metric without a sign, of e²."""
     top = max(float(np.max(part.log_weights)) for part in parts)
     weights = [np.exp(part.log_weights - top) for part in parts]
+    zero, total = sum(float(one[:, 0].sum()) for one in weights), sum(float(one.sum()) for one in weights)
     columns = (weights, [part.centres for part in parts], [part.widths for part in parts])
-    weight, centre, width = (np.concatenate([one.ravel() for one in column]) for column in columns)
-    is_square = np.repeat(np.arange(len(parts)) == 1, [one.size for one in weights])
+    weight, centre, width = (np.concatenate([one[:, 1:].ravel() for one in column]) for column in columns)
+    is_square = np.repeat(np.arange(len(parts)) == 1, [one[:, 1:].size for one in weights])
     likeliest = np.argsort(weight)[::-1]
     kept = likeliest[: 1 + np.searchsorted(np.cumsum(weight[likeliest]), (1.0 - NEGLIGIBLE_WEIGHT) * weight.sum())]
-    weight, centre, width, is_square = weight[kept] / weight[kept].sum(), centre[kept], width[kept], is_square[kept]
-
-    def below(x: Array) -> Array:
-        """Probability of an asymptotic error below each x."""
-        points = np.where(is_square, np.abs(x[:, None]) * x[:, None], x[:, None])
-        found: Array = student_t(parts[0].freedom, (points - centre) / width) @ weight
-        return found
-
-    reach = np.where(is_square, np.sqrt(np.abs(centre) + 1e4 * width), np.abs(centre) + 1e4 * width)
-    unit = float(np.min(np.where(is_square, np.sqrt(width), width)))
-    outside = 0.5 * (1.0 - CREDIBLE)
-    lower, median, upper = _quantiles(below, (outside, 0.5, 1.0 - outside), unit, float(np.max(reach)))
-    if len(parts) == 2:  # a norm that extrapolates below 0 has a limit above 0, after a minimum at finer steps
-        lower, median = max(lower, -upper, 0.0), abs(median)
-        [size] = _quantiles(lambda x: below(x) - below(-x), (CREDIBLE if lower == 0.0 else 1.0 - outside,), unit, float(np.max(reach)))
-        upper = max(size, HIDDEN * hidden_by)
+    share = (1.0 - zero / total) / weight[kept].sum()
     # A claim is what the order is judged by, so it does not count for the order's own interval; nor does e², which has another order.
     by_form = np.exp(forms.without_claim) * np.sum(weights[0], axis=1)
-    return Posterior(median, lower, upper, *_order_interval(by_form, forms.orders))
+    order = _order_interval(by_form, forms.orders)
+    return Posterior(zero / total, share * weight[kept], centre[kept], width[kept], is_square[kept], freedom, len(parts) == 1, *order)
 
 
 def student_t(freedom: int, x: Array) -> Array:

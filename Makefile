@@ -21,7 +21,7 @@ faults: $(VENV)/.installed-dev        ## engines with one planted fault each aga
 	$(BIN)/python tests/support/fault_suite.py
 
 coverage: $(VENV)/.installed-dev      ## how often the intervals of asymptotic errors are right: docs/coverage.md
-	$(BIN)/python tests/support/interval_coverage.py
+	PYTHONPATH=tests $(BIN)/python -m support.interval_coverage
 
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py

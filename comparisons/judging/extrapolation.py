@@ -136,7 +136,9 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
     parts = [_fit(forms, h, errors, noise)]
     if not signed:
         squares = _fit(forms, h, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
-        parts.append(squares._replace(log_weights=squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), noise)))))
+        log_weights = squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), noise)))
+        log_weights[forms.orders < 2.0 * ORDERS[0], 0] = -np.inf  # the square of an error that vanishes has twice its order
+        parts.append(squares._replace(log_weights=log_weights))
     return _posterior(parts, forms, len(h))
 
 

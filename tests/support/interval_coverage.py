@@ -5,7 +5,7 @@ Synthetic series have an asymptotic error m by construction.
 
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from comparisons.judging.error_budget import error_budget
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).parents[2]
-SERIES = 400
+SERIES = 500
 LARGE = 0.5
 """An asymptotic error larger than this share of the coarsest step's error is large."""
 
@@ -32,7 +32,10 @@ class Series(NamedTuple):
     asymptotic: float
 
 
-Draw = Callable[[np.random.Generator, Array], Series]
+Vanishing = Callable[[np.random.Generator, Array], Array]
+"""The part of an error that vanishes."""
+Draw = Callable[[np.random.Generator, Array, float], Series]
+"""A series at steps relative to the coarsest; the last argument is the size of the smallest asymptotic error that is not 0."""
 
 
 class Outcome(NamedTuple):
@@ -45,9 +48,9 @@ class Outcome(NamedTuple):
     is_large: bool
 
 
-def limit(rng: np.random.Generator) -> float:
-    """0 in half of the cases; else of either sign and of any size from a thousandth to three times that of the leading term."""
-    return 0.0 if rng.random() < 0.5 else float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3.0, math.log10(3.0)))
+def limit(rng: np.random.Generator, least: float) -> float:
+    """0 in half of the cases; else of either sign and of any size from the least to three times that of the leading term."""
+    return 0.0 if rng.random() < 0.5 else coefficient(rng, least, 3.0)
 
 
 def coefficient(rng: np.random.Generator, least: float, most: float) -> float:
@@ -55,7 +58,7 @@ def coefficient(rng: np.random.Generator, least: float, most: float) -> float:
     return float(rng.choice([-1.0, 1.0]) * math.exp(rng.uniform(math.log(least), math.log(most))))
 
 
-def powers(first: float, apart: float = 1.0, most: float = 1.0) -> Callable[[np.random.Generator, Array], Array]:
+def powers(first: float, apart: float = 1.0, most: float = 1.0) -> Vanishing:
     """Three powers of the step; the second and third have coefficients of up to `most`, the first of .3 to 3."""
 
     def vanishing(rng: np.random.Generator, h: Array) -> Array:
@@ -90,11 +93,11 @@ def jitter(rng: np.random.Generator, h: Array) -> Array:
     return h * rng.uniform(0.5, 1.0, len(h))
 
 
-def plain(vanishing: Callable[[np.random.Generator, Array], Array]) -> Draw:
+def plain(vanishing: Vanishing) -> Draw:
     """An asymptotic error and one that vanishes."""
 
-    def draw(rng: np.random.Generator, h: Array) -> Series:
-        m = limit(rng)
+    def draw(rng: np.random.Generator, h: Array, least: float) -> Series:
+        m = limit(rng, least)
         return Series(m + vanishing(rng, h), 0.0, True, m)
 
     return draw
@@ -103,36 +106,36 @@ def plain(vanishing: Callable[[np.random.Generator, Array], Array]) -> Draw:
 def noisy(times: float) -> Draw:
     """A first-order error with sampling noise of 1 to 10 % of its leading coefficient; `times` as large as stated."""
 
-    def draw(rng: np.random.Generator, h: Array) -> Series:
-        m, noise = limit(rng), 10.0 ** rng.uniform(-2.0, -1.0)
+    def draw(rng: np.random.Generator, h: Array, least: float) -> Series:
+        m, noise = limit(rng, least), 10.0 ** rng.uniform(-2.0, -1.0)
         return Series(m + powers(1.0)(rng, h) + times * noise * rng.normal(size=len(h)), noise, True, m)
 
     return draw
 
 
-def absolute(rng: np.random.Generator, h: Array) -> Series:
+def absolute(rng: np.random.Generator, h: Array, least: float) -> Series:
     """The size of an error with a sign."""
-    m = limit(rng)
+    m = limit(rng, least)
     return Series(np.abs(m + powers(float(rng.choice([1.0, 2.0])))(rng, h)), 0.0, False, abs(m))
 
 
-def norm(rng: np.random.Generator, h: Array) -> Series:
+def norm(rng: np.random.Generator, h: Array, least: float) -> Series:
     """The length of a vector with three components."""
-    limits, share = rng.normal(size=3), limit(rng)
+    limits, share = rng.normal(size=3), limit(rng, least)
     m = share * limits / np.linalg.norm(limits)
     return Series(np.linalg.norm([part + powers(1.0)(rng, h) for part in m], axis=0), 0.0, False, abs(share))
 
 
-def maximum(rng: np.random.Generator, h: Array) -> Series:
+def maximum(rng: np.random.Generator, h: Array, least: float) -> Series:
     """The largest of three errors, each with a limit and an order of its own."""
-    limits = [limit(rng) if rng.random() < 0.5 else 0.0 for _ in range(3)]
+    limits = [limit(rng, least) if rng.random() < 0.5 else 0.0 for _ in range(3)]
     errors = [np.abs(m + powers(float(rng.choice([1.0, 2.0])))(rng, h)) for m in limits]
     return Series(np.max(errors, axis=0), 0.0, False, float(np.max(np.abs(limits))))
 
 
-def angle(rng: np.random.Generator, h: Array) -> Series:
+def angle(rng: np.random.Generator, h: Array, least: float) -> Series:
     """The angle of a rotation by m + C hᵖ, which cannot exceed π; angles near π are not usable."""
-    m, order = abs(limit(rng)), float(rng.choice([1.0, 2.0]))
+    m, order = abs(limit(rng, least)), float(rng.choice([1.0, 2.0]))
     turned = m + math.exp(rng.uniform(math.log(0.1), math.log(12.0))) * h**order
     found = np.abs((turned + math.pi) % (2.0 * math.pi) - math.pi)
     return Series(np.where(found > 0.9 * math.pi, math.nan, found), 0.0, False, m)
@@ -150,14 +153,70 @@ FAMILIES: dict[str, Draw] = {
     "norms of vectors": norm,
     "maxima": maximum,
 }
+
+
+def kinked(rng: np.random.Generator, h: Array) -> Array:
+    """First order, with another coefficient above some step."""
+    return coefficient(rng, 0.3, 3.0) * h + coefficient(rng, 0.3, 3.0) * np.maximum(h - rng.uniform(0.1, 0.9), 0.0)
+
+
+def random_powers(rng: np.random.Generator, h: Array) -> Array:
+    """Four powers from a random order on, with normal coefficients."""
+    powers_of_h = h ** (rng.integers(1, 4) + np.arange(4))[:, None]
+    found: Array = rng.normal(size=4) @ powers_of_h
+    return found
+
+
 OTHERS: dict[str, Draw] = {
     "order 1/2": plain(powers(0.5, 0.5)),
+    "order 0.7": plain(powers(0.7)),
+    "order 1, ten times as large powers": plain(powers(1.0, most=10.0)),
+    "random powers": plain(random_powers),
     "exponentials": plain(exponential),
     "h / (1 + c h)": plain(fraction),
+    "tanh": plain(lambda rng, h: np.tanh(coefficient(rng, 0.1, 7.0) * h)),
     "sines of up to 6 rad": plain(sine),
+    "kinks": plain(kinked),
     "order 1 with jitter of a half": plain(jitter),
     "noise twice as large as stated": noisy(2.0),
 }
+
+
+def larger_of_two(rng: np.random.Generator, h: Array) -> Array:
+    """The larger of two errors with signs, of first and of second order."""
+    return np.maximum(powers(1.0)(rng, h), powers(2.0)(rng, h))
+
+
+def one_of_many(rng: np.random.Generator, h: Array, least: float) -> Series:
+    """The largest of six errors, one of which has an asymptotic error."""
+    m = limit(rng, least)
+    errors = [np.abs(part + powers(float(rng.choice([1.0, 2.0, 3.0])))(rng, h)) for part in (m, 0.0, 0.0, 0.0, 0.0, 0.0)]
+    return Series(np.max(errors, axis=0), 0.0, False, abs(m))
+
+
+def size_of_any_order(rng: np.random.Generator, h: Array, least: float) -> Series:
+    """The size of an error with a sign, of order 1.5, 3 or 4."""
+    m = limit(rng, least)
+    return Series(np.abs(m + powers(float(rng.choice([1.5, 3.0, 4.0])))(rng, h)), 0.0, False, abs(m))
+
+
+HELD_OUT: dict[str, Draw] = {
+    "order 1.25": plain(powers(1.25)),
+    "order 2.5": plain(powers(2.5)),
+    "order 5": plain(powers(5.0)),
+    "orders 1 and 3": plain(powers(1.0, 2.0)),
+    "orders 2, 3 and 4 mixed": plain(powers(2.0, most=3.0)),
+    "h² log h": plain(lambda rng, h: h * logarithm(rng, h)),
+    "1 - exp(-c h)": plain(lambda rng, h: -np.expm1(-coefficient(rng, 0.1, 7.0) * h)),
+    "larger of two with signs": plain(larger_of_two),
+    "order 2 with jitter of a half": plain(lambda rng, h: h * jitter(rng, h)),
+    "order 1 and additional jitter": plain(
+        lambda rng, h: powers(1.0)(rng, h) + coefficient(rng, 0.03, 0.3) * h * rng.uniform(-1.0, 1.0, len(h))
+    ),
+    "absolute values, orders 1.5 to 4": size_of_any_order,
+    "largest of six": one_of_many,
+}
+"""Families that were not looked at until all constants had been chosen."""
 
 
 def outcome(series: Series, dts: Array) -> Outcome:
@@ -171,15 +230,22 @@ def outcome(series: Series, dts: Array) -> Outcome:
     return Outcome(series.asymptotic, is_covered, found.cause, width, abs(series.asymptotic) > LARGE * coarsest)
 
 
-def outcomes(name: str, count: int, steps: int) -> list[Outcome]:
+HALVING = {3: 0.5 ** np.arange(3), 5: 0.5 ** np.arange(5)}
+UNEVEN = {3: np.array([1.0, 0.6, 0.25]), 5: np.array([1.0, 0.5, 0.3, 0.15, 0.0625])}
+"""Steps relative to the coarsest."""
+SMALL, COMPARABLE = 1e-3, 0.1
+"""The smallest asymptotic errors that are not 0, relative to the leading term."""
+
+
+def outcomes(name: str, count: int, steps: int, least: float = SMALL) -> list[Outcome]:
     """What the error budget says about many series of a family; those that give no interval are left out."""
-    rng, h = np.random.default_rng([steps, *name.encode()]), 0.5 ** np.arange(steps)
-    draw = {**FAMILIES, **OTHERS}[name]
-    found = [outcome(draw(rng, h), 4e-3 * h) for _ in range(count)]
+    rng, h = np.random.default_rng([steps, round(1.0 / least), *name.encode()]), (UNEVEN if name in HELD_OUT else HALVING)[steps]
+    draw = {**FAMILIES, **OTHERS, **HELD_OUT}[name]
+    found = [outcome(draw(rng, h, least), 4e-3 * h) for _ in range(count)]
     return [one for one in found if not math.isnan(one.width)]
 
 
-def row(name: str, steps: int, found: list[Outcome]) -> list[str]:
+def row(name: str, steps: str, found: list[Outcome]) -> list[str]:
     """A row of the table."""
     decided = [one for one in found if one.cause != "unresolved"]
     zeros, large = [one for one in found if one.asymptotic == 0.0], [one for one in found if one.is_large]
@@ -190,7 +256,7 @@ def row(name: str, steps: int, found: list[Outcome]) -> list[str]:
         _share(one.cause == "model" for one in zeros),
         _share(one.cause == "discretisation" for one in large),
     ]
-    return [name, str(steps), str(len(found)), *shares, f"{np.median([one.width for one in found]):.2g}"]
+    return [name, steps, str(len(found)), *shares, f"{np.median([one.width for one in found]):.2g}"]
 
 
 def _share(hits: Iterator[bool]) -> str:
@@ -199,27 +265,44 @@ def _share(hits: Iterator[bool]) -> str:
 
 
 HEAD = ["family", "time steps", "series", "covered", "of those decided", "unresolved", "false model", "large missed", "median width"]
+TABLES = {
+    "Asymptotic errors from a thousandth of the leading term": ((*FAMILIES, *OTHERS), SMALL),
+    "Asymptotic errors from a tenth of the leading term": ((*FAMILIES, *OTHERS), COMPARABLE),
+    "Families that no constant was chosen by, at steps that do not halve": (tuple(HELD_OUT), COMPARABLE),
+}
 
 
 def main() -> None:
-    """Print the table and write it to docs/coverage.md."""
-    jobs = [(name, steps) for name in (*FAMILIES, *OTHERS) for steps in (3, 5)]
+    """Print the tables and write them to docs/coverage.md."""
+    from support import engine_coverage  # which uses this module's outcomes
+
+    lines: list[str] = []
     with ProcessPoolExecutor() as pool:
-        tables = list(pool.map(_row_of, jobs))
-    lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
-    for number, cells in enumerate(tables):
-        if number == 2 * len(FAMILIES):
-            lines += ["", "Families that the forms do not contain:", "", *lines[:2]]
-        lines.append("| " + " | ".join(cells) + " |")
+        for title, (names, least) in TABLES.items():
+            jobs = [(name, steps, least) for name in names for steps in (3, 5)]
+            lines += ["", f"## {title}", "", *_table(pool.map(_row_of, jobs))]
+        kinds = [kind.title for kind in engine_coverage.KINDS]
+        found = zip(kinds, pool.map(engine_coverage.outcomes, kinds, [engine_coverage.RUNS] * len(kinds)), strict=True)
+        lines += [
+            "",
+            "## Engines with one wrong parameter",
+            "",
+            *_table(row(kind, "3, 5", [one for _, one in some]) for kind, some in found),
+        ]
     sys.stdout.write("\n".join(lines) + "\n")
     page = ROOT / "docs/coverage.md"
     text = page.read_text(encoding="utf-8")
     start, end = text.index("<!-- table -->"), text.index("<!-- end -->")
-    page.write_text(text[:start] + "<!-- table -->\n" + "\n".join(lines) + "\n" + text[end:], encoding="utf-8")
+    page.write_text(text[:start] + "<!-- table -->" + "\n".join(lines) + "\n" + text[end:], encoding="utf-8")
 
 
-def _row_of(job: tuple[str, int]) -> list[str]:
-    return row(*job, outcomes(job[0], SERIES, job[1]))
+def _table(rows: Iterable[list[str]]) -> list[str]:
+    return ["| " + " | ".join(cells) + " |" for cells in (HEAD, ["---"] * len(HEAD), *rows)]
+
+
+def _row_of(job: tuple[str, int, float]) -> list[str]:
+    name, steps, least = job
+    return row(name, str(steps), outcomes(name, SERIES, steps, least))
 
 
 if __name__ == "__main__":

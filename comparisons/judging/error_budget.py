@@ -4,8 +4,9 @@ An error that vanishes as dt → 0 is a discretisation error; one that does not 
 interval that contains it in at least 95 % of cases (docs/coverage.md). The cause is stated where its opposite is improbable:
 
     model            the asymptotic error has a sign: 0 and the other sign are improbable
-    discretisation   an asymptotic error larger than allowed is improbable, and one up to half of that is likely. Allowed is the error at
-                     the finest step, or a 64th of that at the coarsest of the three finest; but at most half of it, and more than the noise
+    discretisation   an asymptotic error larger than allowed is improbable, one up to half of that is likely, and one larger than half of
+                     the error at the coarsest of the three finest steps is very improbable. Allowed is the error at the finest step, or a
+                     64th of that at the coarsest, and more than the noise
     rounding         no error is larger than rounding
     unresolved       everything else: the time steps do not decide it
 
@@ -35,9 +36,10 @@ SHARE_OF_COARSEST = 1.0 / 64.0
 LARGEST_SHARE_OF_COARSEST = 0.5
 MODEL_RISK = 0.03
 """A model error is stated where 0 and the other sign together are less probable than this. Of series that vanish far fewer come near."""
-DISCRETISATION_RISK = 0.04
-"""A discretisation error is stated where an asymptotic error larger than allowed is less probable than this: a little less than the 5 %
-that an interval may miss, for series that no form describes."""
+DISCRETISATION_RISK = 0.05
+"""A discretisation error is stated where an asymptotic error larger than allowed is less probable than this."""
+LARGE_RISK = 0.01
+"""And where one larger than half of the error at the coarsest of the three finest steps is less probable than this."""
 LARGER_THAN_HALF = 0.25
 """Largest probability, under a discretisation error, of an asymptotic error larger than half of what is allowed."""
 ABOVE_NOISE = 3.0
@@ -136,7 +138,8 @@ def _verify(h: Array, e: Array, signed: bool) -> None:
 def _attributed(e: Array, found: Posterior, floor: float, noise: float) -> tuple[Cause, float, float, float]:
     """The cause that the posterior of the asymptotic error implies, and its median and interval; errors coarsest first."""
     coarsest, finest = float(np.min(np.abs(e[[0, -FEWEST_TIME_STEPS]]))), abs(float(e[-1]))
-    allowed = max(min(max(finest, SHARE_OF_COARSEST * coarsest), LARGEST_SHARE_OF_COARSEST * coarsest), floor)
+    large = max(LARGEST_SHARE_OF_COARSEST * coarsest, floor)
+    allowed = min(max(finest, SHARE_OF_COARSEST * coarsest, floor), large)
     above, below = found.beyond(floor)
     median, lower, upper = found.interval()
     if not found.has_sign:  # one part that is smaller than another does not show
@@ -145,7 +148,8 @@ def _attributed(e: Array, found: Posterior, floor: float, noise: float) -> tuple
         lower, upper = (lower, min(upper, -floor)) if found.has_sign and below > above else (max(lower, floor), upper)
         return "model", median, lower, upper
     lower, upper = min(lower, 0.0), max(upper, 0.0)
-    is_small = sum(found.beyond(allowed)) < DISCRETISATION_RISK and sum(found.beyond(0.5 * allowed)) < LARGER_THAN_HALF
+    risks = ((allowed, DISCRETISATION_RISK), (0.5 * allowed, LARGER_THAN_HALF), (large, LARGE_RISK))
+    is_small = all(sum(found.beyond(reach)) < risk for reach, risk in risks)
     if not is_small or allowed < noise:
         return "unresolved", median, lower, upper
     lower, upper = max(lower, -allowed), min(upper, allowed)

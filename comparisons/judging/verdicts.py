@@ -98,6 +98,17 @@ def with_limitations(judgement: Judgement, metric: str, limitations: Iterable[Kn
     return replace(judgement, verdict="limited", reason="; ".join(dict.fromkeys(filter(None, [*reasons, judgement.reason]))))
 
 
+def with_precision(judgement: Judgement, rounded: float) -> Judgement:
+    """A failure as `limited`, where it is beyond its bound by no more than rounding in the precision that the engine declares may cause."""
+    beyond = max(
+        judgement.lower - judgement.value, judgement.value - judgement.upper, key=lambda part: -math.inf if math.isnan(part) else part
+    )
+    if judgement.verdict != "failed" or not beyond <= rounded:
+        return judgement
+    reason = f"{judgement.reason}; rounding in the single precision that the engine declares may cause {rounded:.2g}"
+    return replace(judgement, verdict="limited", reason=reason)
+
+
 def verify_expectations(scene: Scenario, truth: Truth | None, engines: Iterable[str]) -> None:
     """Raise `SceneError` if an expectation would never be judged: no such metric, not for this scene, no such engine."""
     known_engines = {*BUILT_IN, *(label.split("[")[0] for label in engines)}

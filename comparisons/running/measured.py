@@ -1,0 +1,99 @@
+"""Every metric of one engine in one scene at one time step, judged."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from comparisons.judging.horizon import with_horizon
+from comparisons.judging.verdicts import Judgement, judge, with_limitations, with_precision
+from comparisons.measuring.comparison import Comparison, Unresolved, exactly
+from comparisons.measuring.metric import Average, Metric
+from comparisons.measuring.metrics import metrics_for
+from comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
+from comparisons.results.measurement import Case, Measurement
+from comparisons.running.engine_run import EngineRun
+from comparisons.running.recording import Breakdown, divergence
+from comparisons.running.start_phases import StartPhase, start_phases
+from scenarios import Scenario, Trajectory, Truth
+
+
+class Measured(NamedTuple):
+    """A measurement, and the average over start phases that its value is the largest part of; None for a remark."""
+
+    measurement: Measurement
+    average: Average | None
+
+
+def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[Trajectory | None]]:
+    """The start phases at a time step [s], and the exact motion from each at every step, as far as there is an exact solution."""
+    phases = start_phases(own.scene, own.truth, dt)
+    times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
+    return phases, [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+
+
+def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[Trajectory | None]) -> list[Comparison]:
+    """Motions from all start phases compared with the exact solution."""
+    together = zip(phases, motions, exact, strict=True)
+    return [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in together]
+
+
+def breakdown_of(engine_run: EngineRun) -> Breakdown | None:
+    """Why an engine has no motion to measure; None if it has."""
+    if engine_run.breakdown is not None:
+        return engine_run.breakdown
+    assert engine_run.motion is not None
+    return next(filter(None, map(divergence, [engine_run.motion, *engine_run.phases])), None)
+
+
+def measure(
+    own: StartPhase,
+    dt: float,
+    engine_run: EngineRun,
+    phases: Sequence[StartPhase],
+    exact: Sequence[Trajectory | None],
+    cases: Sequence[Comparison],
+) -> list[Measured]:
+    """Every metric of one engine at one time step, judged; a remark if it has no motion."""
+    scene, truth = own
+    case = Case(scene.name, engine_run.label, dt, scene.steps(dt), engine_run.time_per_step)
+    breakdown = breakdown_of(engine_run)
+    if breakdown is not None:
+        return [Measured(case.remark(breakdown.verdict, breakdown.reason), None)]
+    perturbed = [compare(motions, phases, exact) for motions in engine_run.perturbed]
+    rows = [Measured(case.remark("limited", one.message), None) for one in engine_run.limitations]
+    for metric in metrics_for(scene, truth):
+        average, judgement = _judge_metric(scene, truth, dt, engine_run.label, metric, cases)
+        moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))
+        sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
+        allowed = tolerance(scene, metric.unit, engine_run.precision, case.steps, sampling_noise)
+        judgement = with_limitations(replace(judgement, tolerance=allowed), metric.name, engine_run.limitations)
+        if engine_run.precision is not np.float64:
+            rounded = float(rounding(scene, metric.unit, engine_run.precision, np.array(case.steps)))
+            judgement = with_precision(judgement, max(rounded, allowed))
+        name = truth.name if metric.kind == "truth" and truth is not None else ""
+        rows.append(Measured(case.measurement(metric.kind, metric.name, metric.unit, judgement, name), average))
+    if truth is None:
+        rows.append(Measured(case.remark("no_truth", "no closed form is known for this scene"), None))
+    return rows
+
+
+def _judge_metric(
+    scene: Scenario, truth: Truth | None, dt: float, label: str, metric: Metric, cases: Sequence[Comparison]
+) -> tuple[Average, Judgement]:
+    """A metric's average over the start phases, and its judgement."""
+    unresolved: Unresolved | None = None
+    try:
+        with np.errstate(all="ignore"):  # an engine may return 1e300; the inf or NaN that follows is judged as such
+            average = metric.average(cases)
+    except Unresolved as error:
+        average, unresolved = Average(*[np.array([np.nan])] * 3), error
+    judgement = judge(scene, label, dt, metric, average.value)
+    reason = "; ".join(filter(None, [str(unresolved or ""), judgement.reason]))
+    # A value that is not a number is a failure, expected or not; one that the step cannot resolve fails only an expectation.
+    verdict = "failed" if np.isnan(average.value) and not unresolved else judgement.verdict
+    if verdict == "failed" and not reason:
+        reason = "what it measures did not happen"
+    judgement = replace(judgement, verdict=verdict, reason=reason, cause="unresolved" if unresolved else "")
+    return average, with_horizon(judgement, scene, metric, truth, unresolved)

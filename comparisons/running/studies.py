@@ -1,0 +1,100 @@
+"""The convergence of each metric of one engine in one scene; where the steps leave it open, with further steps and refined options."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
+
+from comparisons.engines.base import Engine
+from comparisons.judging.convergence import (
+    ADDED_STEPS,
+    ARTEFACTS,
+    Claim,
+    ConvergenceStudy,
+    SeriesPoint,
+    attributed_to_accuracy,
+    study_convergence,
+)
+from comparisons.measuring.metrics import METRICS
+from comparisons.running.inputs import EngineEntry
+from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
+from comparisons.running.processes import EngineProcesses
+from comparisons.running.start_phases import StartPhase
+
+FEWEST_STEPS = 8
+"""A run of fewer steps is not worth adding."""
+
+Studies = dict[str, ConvergenceStudy]
+"""By metric."""
+
+
+def study_engine(own: StartPhase, entry: EngineEntry, claim: Claim, measured: Sequence[Measured], processes: EngineProcesses) -> Studies:
+    """The convergence of each metric of one engine; with coarser steps where those asked for leave it open.
+
+    Args:
+        own: The scene, and its exact solution.
+        entry: The engine.
+        claim: What it states.
+        measured: Its metrics at each time step.
+        processes: The engines' processes, for further steps.
+    """
+    series = _series(measured)
+    dts = sorted({point.dt for point in chain(*series.values())})
+    studies = {name: study_convergence(own.scene, claim, METRICS[name], points) for name, points in series.items()}
+    if any(study.is_open for study in studies.values()):
+        added = [factor * dts[-1] for factor in ADDED_STEPS]
+        coarser = _series([one for dt in added for one in _measured_at(own, entry, dt, processes)])
+        for name, points in coarser.items():
+            if name in studies and studies[name].is_open:
+                longer = study_convergence(own.scene, claim, METRICS[name], [*points, *series[name]])
+                studies[name] = _with_remark(longer, f"with {' and '.join(f'{point.dt:g}' for point in points)} s added")
+    if entry.engine is not None and entry.engine.accuracy and any(study.cause in ("model", "unresolved") for study in studies.values()):
+        return _with_accuracy_options(studies, own, claim, entry.engine, dts, processes)
+    return studies
+
+
+def _with_remark(study: ConvergenceStudy, remark: str) -> ConvergenceStudy:
+    """A study whose asymptotic error says how it was found."""
+    limit = study.asymptotic_error
+    return study if limit is None else replace(study, asymptotic_error=replace(limit, reason=f"{limit.reason} ({remark})"))
+
+
+def _with_accuracy_options(
+    studies: Studies, own: StartPhase, claim: Claim, engine: Engine, dts: Sequence[float], processes: EngineProcesses
+) -> Studies:
+    """The studies; where the time step alone does not make an error vanish, with the accuracy options refined too."""
+    refined = engine.refined(dts)
+    series = _series([one for dt, finer in refined for one in _measured_at(own, EngineEntry(finer.label, finer), dt, processes)])
+    again = {
+        name: study_convergence(own.scene, claim._replace(order=None), METRICS[name], points)
+        for name, points in series.items()
+        if len(points) == len(refined)
+    }
+    values = [", ".join(_short(finer.option(option)) for _, finer in refined) for option in engine.accuracy]
+    path = f"{'; '.join(values)}, with dt = {', '.join(f'{dt:g}' for dt, _ in refined)} s"
+    return {name: attributed_to_accuracy(study, again.get(name), " and ".join(engine.accuracy), path) for name, study in studies.items()}
+
+
+def _short(value: str) -> str:
+    """An option's value; numbers with six digits."""
+    try:
+        return f"{float(value):g}"
+    except ValueError:
+        return value
+
+
+def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: EngineProcesses) -> list[Measured]:
+    """Every metric of one engine at a step that was not asked for; none if it breaks down there."""
+    if own.scene.steps(dt) < FEWEST_STEPS:
+        return []
+    phases, exact = phases_at(own, dt)
+    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases])
+    return [] if breakdown_of(engine_run) else measure(own, dt, engine_run, phases, exact, compare(engine_run.phases, phases, exact))
+
+
+def _series(measured: Sequence[Measured]) -> Mapping[str, list[SeriesPoint]]:
+    """The errors at each time step, by metric."""
+    series: dict[str, list[SeriesPoint]] = {}
+    for row, average in measured:
+        if average is not None and row.metric not in ARTEFACTS:
+            series.setdefault(row.metric, []).append(SeriesPoint(row.dt, row.steps, average, row.tolerance))
+    return series

@@ -9,6 +9,14 @@ SUBTLE = {
     "99 % of the gyroscopic term": "spin-asymmetric",
     "Coulomb friction 1 % too strong": "slide-box",
 }
+HARD_CODED = {
+    "0.6 in place of infinite friction": "drop-ball-grip",
+    "1 in place of infinite friction": "drop-ball-grip",
+    "damping ignored": "fall-damped",
+    "gravity of 9.8 m/s² along -y in every scene": "drop-box-heavy",
+    "mass of 1 kg in every scene, inertia right": "drop-box-heavy",
+    "products of inertia dropped": "fall-tilted",
+}
 OTHER_KINDS = {
     "restitution that vanishes as dt → 0": "drop-ball",
     "attitude drifts by 1e-5 rad/s": "drop-ball",
@@ -18,7 +26,7 @@ OTHER_KINDS = {
 }
 
 
-@pytest.mark.parametrize(("title", "scene"), (SUBTLE | OTHER_KINDS).items())
+@pytest.mark.parametrize(("title", "scene"), (SUBTLE | HARD_CODED | OTHER_KINDS).items())
 def test_planted_fault_is_detected_in_one_scene(title, scene):
     """At the default time steps: a changed scene, changed states, changes at impacts and a wrong claim."""
     assert failed_checks(NUMBERS[title], [scene])
@@ -44,4 +52,4 @@ def test_suite_has_forty_faults_and_ten_correct_engines():
     assert len(FAULTS) >= 40
     assert len(SOUND) >= 10
     assert len(NUMBERS) == len(FAULTS) + len(SOUND)
-    assert {*SUBTLE.values(), *OTHER_KINDS.values()} <= set(core_scenes())
+    assert {*SUBTLE.values(), *HARD_CODED.values(), *OTHER_KINDS.values()} <= set(core_scenes())

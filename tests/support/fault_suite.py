@@ -22,6 +22,7 @@ from scipy.integrate import solve_ivp
 import scenarios
 from comparisons.engines.base import Engine, Simulation
 from comparisons.running.run import run
+from scenarios.body import Box
 from scenarios.model import Damping
 from scenarios.rotations import about, multiply, rotate, unrotate
 from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
@@ -99,6 +100,13 @@ def with_coefficient(factor):
     return lambda scene: with_floor(scene, friction=factor * scene.floor.friction) if rough(scene) else scene
 
 
+def with_grip(coefficient):
+    """A coefficient in place of infinite friction."""
+    return lambda scene: (
+        with_floor(scene, friction=coefficient) if scene.floor is not None and scene.floor.friction == "infinite" else scene
+    )
+
+
 def with_restitution(function):
     return lambda scene: scene if scene.floor is None else with_floor(scene, restitution=min(1.0, function(scene.floor.restitution)))
 
@@ -142,6 +150,30 @@ def with_damping(**rates):
         return scene.model_copy(update={"damping": old.model_copy(update=added)}) if scene.floor is None else scene
 
     return change
+
+
+def without_damping(scene):
+    return scene.model_copy(update={"damping": None})
+
+
+def hard_coded_gravity(scene):
+    if scene.gravity is None:
+        return scene
+    return scene.model_copy(update={"gravity": scene.gravity.model_copy(update={"acceleration": (0.0, -9.8, 0.0)})})
+
+
+def hard_coded_mass(scene):
+    """1 kg, with the scene's moments of inertia."""
+    return scene if scene.body.shape == "vertices" else with_body(mass=1.0 / scene.body.mass)(scene)
+
+
+def principal_inertia(scene):
+    """The inertia tensor without its products of inertia."""
+    tensor = scene.body.inertia_tensor
+    if np.count_nonzero(tensor) == np.count_nonzero(np.diag(tensor)):
+        return scene
+    moments = tuple(float(moment) for moment in np.diag(tensor))
+    return scene.model_copy(update={"body": Box(shape="box", half_extents=(0.3, 0.3, 0.3), mass=scene.body.mass, inertia=moments)})
 
 
 # Distortions of the states.
@@ -354,6 +386,12 @@ FAULTS = [
     fault("friction omitted", change=lambda scene: with_floor(scene, friction="none")),
     fault("Coulomb friction 1 % too strong", change=with_coefficient(1.01)),
     fault("friction where there is none", change=lambda scene: with_floor(scene, friction="infinite")),
+    fault("0.6 in place of infinite friction", change=with_grip(0.6)),
+    fault("1 in place of infinite friction", change=with_grip(1.0)),
+    fault("damping ignored", change=without_damping),
+    fault("gravity of 9.8 m/s² along -y in every scene", change=hard_coded_gravity),
+    fault("mass of 1 kg in every scene, inertia right", change=hard_coded_mass),
+    fault("products of inertia dropped", change=principal_inertia),
     fault("mass 1 % too large, inertia right", change=with_body(mass=1.01)),
     fault("inertia 1 % too large", change=with_body(moments=lambda m: 1.01 * m)),
     fault("inertia of two axes swapped", change=with_body(moments=lambda m: m[[1, 0, 2]])),

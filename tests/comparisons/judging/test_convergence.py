@@ -139,3 +139,32 @@ def test_known_fault_is_allowed_for_the_named_engine_only():
     other = run("spin-asymmetric", with_error(None, lambda dt: 0.7))
     assert study(other, "orientation_error", "asymptotic_error")["verdict"] == "failed"
     assert other.exit_code() == 1
+
+
+@pytest.mark.parametrize(
+    ("scene", "engine"),
+    [
+        ("spin-asymmetric", "document[rotation=rk4]"),
+        ("spin-dzhanibekov", "document[rotation=symmetric-top]"),
+        ("spin-damped", "document[rotation=rk4]"),
+    ],
+)
+def test_method_of_the_project_raises_no_false_alarm(scene, engine):
+    """An order of 3.62 fitted through an error of 5e-14 and one of 3.75 are within the interval of fourth order."""
+    assert ds.run(scene, engine).exit_code() == 0
+
+
+def test_lost_attitude_is_a_known_fault_and_does_not_pass():
+    table = ds.run("spin-principal-500", "document").table
+    [row] = table[(table["metric"] == "orientation_error") & (table["kind"] == "truth") & (table["dt"] == 1e-3)].to_dict("records")
+    assert row["value"] == pytest.approx(math.pi, abs=1e-3)
+    assert row["verdict"] == "known"
+
+
+def test_residuals_of_contact_solvers_are_no_model_errors():
+    """A drift of 5e-7 m does not matter to a box that slides by 1.5 m, whatever the engine."""
+
+    def distort(state, time):
+        return state + 5e-7 * np.eye(13)[0]
+
+    assert run("slide-box", made.engine_with("drifting", distort)).exit_code() == 0

@@ -1,0 +1,44 @@
+"""One status for each engine in each scene, and known faults in every count."""
+
+import pytest
+from support import engines as made
+
+import dropspin as ds
+from reports.junit import junit_xml
+from reports.views.run import overview
+
+
+@pytest.fixture(scope="module")
+def core(core_run):
+    return ds.load_results(core_run)
+
+
+@pytest.mark.parametrize(
+    ("scene", "engine", "verdict", "words"),
+    [
+        ("spin-asymmetric", "document", "known", "known model error"),
+        ("spin-principal-500", "document", "known", "known fault"),
+        ("spin-asymmetric", "mujoco", "passed", "converges"),
+        ("slide-box", "document", "declined", "declined"),
+        ("slide-box", "mujoco", "limited", "outside the documented range"),
+    ],
+)
+def test_engine_has_one_status_in_a_scene(core, scene, engine, verdict, words):
+    assert overview(core).statuses[scene][engine] == (verdict, words)
+
+
+def test_failure_is_the_status_of_its_scene():
+    results = ds.run("spin-principal", made.engine_with("drifting", made.turned_by(0.1)))
+    assert overview(results).statuses["spin-principal"]["drifting"] == ("failed", "failed")
+
+
+def test_known_faults_are_counted_apart_and_in_the_headline(core):
+    """They are neither passed nor failed; in JUnit they are skipped, with the reason."""
+    known = core.table[core.table["verdict"] == "known"]
+    summary = overview(core)
+    assert summary.counts.known == len(known) > 100
+    assert summary.counts.passed == (core.table["verdict"] == "passed").sum()
+    assert f"{len(known)} results show known faults" in summary.verdict
+    [sentence] = [one for one in summary.findings if "spin-principal-500" in one]
+    assert sentence.startswith("document: known fault")
+    assert junit_xml(core).decode().count("known fault: ") == len(known)

@@ -67,7 +67,8 @@ def statuses(results: Results) -> dict[str, dict[str, Status]]:
 def _status(rows: pd.DataFrame | None) -> Status:
     if rows is None:
         return Status("missing", word("missing"))
-    worst = min(rows["verdict"], key=SEVERITY.index)
+    mentioned = rows[(rows["verdict"] != "known") | (rows["value"].abs() > NEGLIGIBLE)]
+    worst = min(mentioned["verdict"], key=SEVERITY.index)
     of_model = bool((rows.loc[rows["verdict"] == "known", "cause"] == "model").any())
     studied = worst in ("passed", "measured") and bool((rows["kind"] == "asymptotic_error").any())
     words = "known model error" if of_model and worst == "known" else "converges" if studied else STATUS_WORDS.get(worst, word(worst))
@@ -178,9 +179,9 @@ def _undecided(limits: pd.DataFrame) -> list[str]:
 
 
 def _known_scenes(results: Results, engine: str) -> list[str]:
-    """The scenes in which results of an engine show a fault that is expected by name."""
-    rows = results.table[(results.table["engine"] == engine) & (results.table["verdict"] == "known")]
-    return list(rows["scene"].unique())
+    """The scenes in which results of an engine show a fault that is expected by name, negligible ones left out."""
+    known = (results.table["verdict"] == "known") & (results.table["value"].abs() > NEGLIGIBLE)
+    return list(results.table.loc[known & (results.table["engine"] == engine), "scene"].unique())
 
 
 def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from comparisons.tradeoff.study import tradeoff as tradeoff
     from reports.run_folder import write_report as write_report
     from reports.terminal.run_table import print_table as print_table
+    from scenarios.draw import draw as draw
     from scenarios.errors import DropspinError as DropspinError
     from scenarios.errors import SceneError as SceneError
     from scenarios.errors import UnknownName as UnknownName
@@ -104,6 +105,7 @@ _HOMES = {
     "comparisons.tradeoff.study": ("tradeoff",),
     "reports.run_folder": ("write_report",),
     "reports.terminal.run_table": ("print_table",),
+    "scenarios.draw": ("draw",),
     "scenarios.errors": ("DropspinError", "SceneError", "UnknownName"),
     "scenarios.loading": ("load", ("scene_names", "names")),
     "scenarios.model": ("Scenario",),

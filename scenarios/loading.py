@@ -1,4 +1,4 @@
-"""Loading a `Scenario` by its name in the catalogue, from a TOML file, or from a mapping."""
+"""Loading a `Scenario` by its name in the catalogue, or as a drawn scene, from a TOML file, or from a mapping."""
 
 import os
 import re
@@ -14,6 +14,8 @@ from scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scen
 from scenarios.validation import Alternatives, first_problem, shown
 
 CATALOGUE = Path(__file__).parent / "catalogue"
+DRAWN = r"draw-([0-9]{1,20})-([0-9]{1,4})"
+"""The name of a scene that `draw` draws: its seed and its number."""
 MAX_FILE_SIZE = 1_000_000  # bytes; a scene of ten thousand vertices is smaller
 FEATURES: dict[str, type[BaseModel]] = {
     "floor": Floor,
@@ -36,7 +38,7 @@ def names() -> list[str]:
 
 
 def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
-    """Load a scene by its catalogue name, from the path of a TOML file, or from a mapping with the same keys.
+    """Load a scene by its catalogue name or the name of a drawn scene, from the path of a TOML file, or from a mapping with the same keys.
 
     Raises:
         SceneError: The scene is not valid. The text names the file, the key, the value and what is allowed.
@@ -46,6 +48,10 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         return _validate(str(name), "", {key: value for key, value in scene.items() if key != "name"})
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
+    if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
+        from scenarios.draw import drawn_scene
+
+        return drawn_scene(*map(int, drawn.groups()))
     path = _find(scene)
     try:
         str(path).encode()

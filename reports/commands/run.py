@@ -1,6 +1,7 @@
 """`dropspin run`."""
 
 import os
+import secrets
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -35,6 +36,8 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
     metavar="DIR",
     help="Folder for the report and the data; an earlier run there is replaced.",
 )
+@click.option("--draw", "count", type=int, metavar="N", help="Draw N scenes at random, up to 1000, besides those named.")
+@click.option("--seed", type=int, metavar="SEED", help="Draw the scenes of this seed. [default: a fresh seed, which is printed]")
 @time_limit_option(300.0, "an engine may take for one scene at one step")
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that were measured are not run again.")
@@ -44,6 +47,8 @@ def run_command(
     engines: tuple[str, ...],
     dts: tuple[float, ...],
     output: str,
+    count: int | None,
+    seed: int | None,
     time_limit: float,
     baseline: str | None,
     resume: bool,
@@ -52,7 +57,8 @@ def run_command(
     """Run scenes with engines, side by side, and write the report.
 
     SCENE is a name of the catalogue, the path of a TOML file, or core for the core catalogue. The default is the core catalogue
-    with three engines at three time steps.
+    with three engines at three time steps. With --draw the scenes are drawn at random, each with its exact solution; a name such as
+    draw-7-012 is scene 12 of the seed 7.
 
     Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
     """
@@ -63,10 +69,19 @@ def run_command(
     from reports.views.check import BaselineFile
     from reports.views.failures import failures
     from scenarios import load
+    from scenarios.draw import draw
 
-    loaded = [scene for name in scenes or ["core"] for scene in (_core() if name == "core" else [load(name)])]
+    if seed is not None and count is None:
+        raise click.UsageError("--seed is for drawn scenes; add --draw N.")
+    named = scenes or (() if count is not None else ("core",))
+    loaded = [scene for name in named for scene in (_core() if name == "core" else [load(name)])]
+    drawn: dict[str, int] = {}
+    if count is not None:
+        drawn = {"draw": count, "seed": secrets.randbits(32) if seed is None else seed}
+        loaded += draw(count, drawn["seed"])
+        click.echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
     file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
-    results = _run(loaded, engines, dts, output, time_limit, resume, None if json_output else print_table)
+    results = _run(loaded, drawn, engines, dts, output, time_limit, resume, None if json_output else print_table)
     checked = _checked(results, file, json_output)
     if json_output:
         click.echo(json_rows(checked.results.table))
@@ -79,6 +94,7 @@ def run_command(
 
 def _run(
     scenes: "list[Scenario]",
+    drawn: dict[str, int],
     engines: tuple[str, ...],
     dts: tuple[float, ...],
     output: str,
@@ -108,7 +124,9 @@ def _run(
                     scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=measured.parts()
                 )
             stop_if_interrupted()
-            results = replace(results, provenance={**results.provenance, "named": sorted({name.strip() for name in engines})})
+            asked = {**results.provenance["asked"], **drawn}
+            named = sorted({name.strip() for name in engines})
+            results = replace(results, provenance={**results.provenance, "asked": asked, "named": named})
             if show is not None:
                 show(results)
             with status("writing the report"):

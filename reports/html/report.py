@@ -51,6 +51,7 @@ def _details(results: Results, tally: Counts, plots: dict[str, str]) -> dict[str
         "negligible": NEGLIGIBLE,
         "leading": leading_errors(results),
         "costs": step_costs(results),
+        "plotted": len({name.split("-")[0] for name in plots}),
         "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from comparisons.judging.verdicts import FAILURES
 from comparisons.results.results import Results
 from reports.plots.bounces import plot_bounce_ladder
 from reports.plots.convergence import plot_error_over_dt
@@ -36,11 +37,18 @@ GROWTH = ("orientation_error", "position_error", "energy_error")
 WORTH_A_POINT, WORTH_A_LINE = 1e-13, 1e-11
 """Errors that are nowhere larger are rounding; over time it accumulates."""
 MOST_PANELS = 3
+MOST_SCENES = 40
+"""A run of more scenes has plots of those that fail only, and of this many of them at most."""
 
 
 def report_figures(results: Results) -> "Iterator[tuple[str, Figure]]":
     """Name and figure of each plot of the report."""
-    for number, scene in enumerate(results.scenes):
+    names = list(results.scenes)
+    failing = results.table.loc[results.breakdowns | results.table["verdict"].isin(FAILURES), "scene"].unique()
+    plotted = names if len(names) <= MOST_SCENES else failing[:MOST_SCENES]
+    for number, scene in enumerate(names):
+        if scene not in plotted:
+            continue
         for kind, draw in FIGURES.items():
             figure = draw(results, scene)
             if figure is not None:

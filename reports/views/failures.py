@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,7 +99,23 @@ def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
         named_scene = repr(scene.origin) if scene.origin else f"<scene {scene.name!r}>"
         named_engine = f"<engine {row['engine']!r}>" if engine is None else repr(engine)
         return f"dropspin.run({named_scene}, {named_engine}, dt={[float(dt) for dt in steps]})"
-    options = [word for dt in steps for word in ("--dt", repr(float(dt)))]
-    options += [] if asked["time_limit"] == ResourceLimits().processor_time else ["--time-limit", f"{asked['time_limit']:g}"]
-    options += [] if baseline is None or row["kind"] != "baseline" else ["--baseline", baseline]
-    return shlex.join(["dropspin", "run", scene.origin, "-e", engine, *options, "-o", "out/again"])
+    options = [] if baseline is None or row["kind"] != "baseline" else ["--baseline", baseline]
+    return shlex.join(["dropspin", "run", scene.origin, "-e", engine, *_options(steps, asked["time_limit"]), *options, "-o", "out/again"])
+
+
+def reproduce_drawn(results: Results) -> list[str]:
+    """A sentence with the seed of a run's drawn scenes and the command that runs them again; empty if none were drawn."""
+    asked = results.provenance["asked"]
+    if "draw" not in asked:
+        return []
+    named = [results.scenes[name].origin for name in asked["scenes"][: -asked["draw"]]]
+    engines = [word for label in results.engines for word in ("-e", results.provenance["names"][label])]
+    options = _options(sorted(asked["dts"], reverse=True), asked["time_limit"])
+    command = ["dropspin", "run", *named, "--draw", str(asked["draw"]), "--seed", str(asked["seed"]), *engines, *options, "-o", "out/again"]
+    return [f"Scenes drawn with seed {asked['seed']}: {asked['draw']}. Reproduce: {shlex.join(command)}"]
+
+
+def _options(dts: Sequence[float], time_limit: float) -> list[str]:
+    """The options of `dropspin run` for time steps [s] and for a time limit [s] that is not the default one."""
+    options = [word for dt in dts for word in ("--dt", repr(float(dt)))]
+    return options if time_limit == ResourceLimits().processor_time else [*options, "--time-limit", f"{time_limit:g}"]

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from comparisons.results.results import Results
-from reports.views.failures import Failure, failures
+from reports.views.failures import Failure, failures, reproduce_drawn
 from reports.views.findings import (
     Counts,
     ProfileComparison,
@@ -24,7 +24,7 @@ class Overview:
 
     Attributes:
         verdict: The outcome of the checks in one sentence.
-        findings: The main finding about each engine.
+        findings: The main finding about each engine, and how drawn scenes are drawn again.
         counts: The verdicts, counted.
         statuses: By scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
@@ -43,4 +43,5 @@ def overview(results: Results) -> Overview:
     """The overview of a run."""
     tally, profiles = counts(results), profile_comparisons(results)
     findings = finding_sentences(results, {cause: asymptotic_errors(results, cause) for cause in ("model", "setting")}, profiles)
+    findings = [*findings, *reproduce_drawn(results)]
     return Overview(verdict_sentence(results, tally), findings, tally, statuses(results), profiles, failures(results))

@@ -188,3 +188,47 @@ def test_resume_runs_a_different_request_again(tmp_path):
     assert runs_again(scene, "mujoco[integrator=rk4]", 1e-2)
     assert runs_again(scene.model_copy(update={"duration": 0.5}), "mujoco", 1e-2)
     assert runs_again(scene, "mujoco", 1e-2, resources=ResourceLimits(processor_time=600.0))
+
+
+DRAWN = ("run", "drop-ball", "--draw", "2", "-e", "mujoco", "--dt", "0.01", "--dt", "0.005", "--time-limit", "100")
+
+
+def test_drawn_scenes_are_run_and_reproduced(tmp_path):
+    """Besides those named; the seed and the command are on the terminal, in run.json and in the reports, and give the same scenes again."""
+    with mock.patch("secrets.randbits", return_value=5):
+        first = dropspin(*DRAWN, "-o", "first", cwd=tmp_path)
+    assert first.returncode == 0, first.stderr
+    asked = json.loads((tmp_path / "first/run.json").read_text())["provenance"]["asked"]
+    assert asked["scenes"] == ["drop-ball", "draw-5-001", "draw-5-002"]
+    assert (asked["draw"], asked["seed"]) == (2, 5)
+    assert first.stdout.startswith("Drawn with --seed 5\n")
+    [command] = [line for line in (tmp_path / "first/report.md").read_text().splitlines() if "--seed" in line]
+    command = command.partition("Reproduce: ")[2]
+    assert command == "dropspin run drop-ball --draw 2 --seed 5 -e mujoco --dt 0.01 --dt 0.005 --time-limit 100 -o out/again"
+    assert command in first.stdout.replace("\n", " ")
+    assert command in (tmp_path / "first/report.html").read_text()
+    again = dropspin(*shlex.split(command)[1:], cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert rows_of(tmp_path / "out/again") == rows_of(tmp_path / "first")
+    one = dropspin("run", asked["scenes"][2], *DRAWN[4:], "-o", "one", cwd=tmp_path)
+    assert one.returncode == 0, one.stderr
+    assert [row for row in rows_of(tmp_path / "first") if row["scene"] == asked["scenes"][2]] == rows_of(tmp_path / "one")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--seed", "3"), "--seed is for drawn scenes; add --draw N."),
+        (("--draw", "0"), "count: got 0; it is a whole number from 1 to 1000."),
+        (("--draw", "1001"), "count: got 1001; it is a whole number from 1 to 1000."),
+        (("--draw", "two"), "Invalid value for '--draw': 'two' is not a valid integer."),
+        (("--draw", "1", "--seed", "-1"), "seed: got -1; it is a whole number from 0 to 18446744073709551615."),
+        (("draw-3-000",), "scene 'draw-3-000': scenes are drawn with seeds up to 18446744073709551615 and numbers from 1 to 1000."),
+    ],
+)
+def test_impossible_draws_are_refused_in_one_line(options, message, tmp_path):
+    done = dropspin("run", *options, cwd=tmp_path)
+    assert done.returncode == 2
+    assert [line for line in done.stderr.splitlines() if message in line], done.stderr
+    assert done.stdout == ""
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,116 @@
+"""Scenes drawn at random, each with an exact solution, so that no engine can be fitted to a list of scenes.
+
+Ten families follow each other in turn. U(a, b) is uniform, LU(a, b) is uniform in the logarithm; directions and attitudes are uniform
+(G. Marsaglia, Annals of Mathematical Statistics 43 (1972), by normal variates).
+
+    all           mass LU(0.01, 1000) kg, lengths LU(0.1, 1) m
+    flights       velocity U(0, 3) m/s and spin LU(0.5, 12) rad/s of any direction; no gravity in three of ten, else of any direction and
+                  LU(0.5, 30) m/s²; duration U(0.5, 1) s
+    floors        gravity LU(0.5, 30) m/s² downwards; restitution U(0.1, 0.95); infinite friction or none
+    falls         fall of U(0.12, 0.3) s from an upward velocity of U(-0.5, 0.5) of half the impact's, horizontal velocity U(0, 2) m/s;
+                  the end is U(0.5, 0.8) of the last flight, which counts up to 0.3 s
+    tilted        in three of ten falls of balls and corners gravity is inclined by U(0, 0.5) rad
+
+    free-tensor   a flight of 4 to 8 points of unequal masses, whose axes are not principal axes
+    free-axes     a flight of a ball, or of a box, whose three principal moments are drawn
+    damped        a flight with decay rates U(0.1, 2) 1/s of velocity and of angular velocity; any of these bodies
+    ball          a ball on a frictionless floor, one to three impacts; spin LU(0.5, 12) rad/s; half of them with three drawn moments
+    rough-ball    a solid ball with spin; one impact; infinite friction, or a coefficient U(0.05, 0.6)
+    flat-box      a box that lands on a face, one to three impacts; without friction it has spin U(-10, 10) rad/s about the vertical
+    corner        a box, or in one of three cases a set of points, of any attitude; one impact; spin U(0, 3) rad/s
+    edge          a box that lands on an edge; one impact; no spin
+    on-floor      a box that slides, or turns about the vertical, on a rough floor with a coefficient U(0.1, 0.6) for U(0.2, 0.6) s
+    standing      a box that falls over from an edge, which sticks or slips, until shortly before it lands
+
+A draw is repeated until its exact solution is known for the whole duration and the default time steps resolve it: 16 steps of 4 ms in each
+flight, at most 0.1 rad a step, and no second corner within a step's fall of the floor when one strikes it.
+
+Source of the exact solutions: `scenarios.truths`.
+"""
+
+import numpy as np
+
+from scenarios.errors import DropspinError, SceneError
+from scenarios.families import FAMILIES, Draws
+from scenarios.model import Scenario
+from scenarios.rotations import rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from scenarios.truths import Impact, truth_for
+
+MOST_SCENES = 1000
+LARGEST_SEED = 2**64 - 1
+COARSEST_STEP = 4e-3  # s, of a run by default
+FLIGHT_STEPS, TURN = 16, 0.1  # fewest steps of a flight, and the largest turn in one [rad]
+MOST_DRAWS = 1000  # of one scene; a dozen are usual
+
+
+def draw(count: int, seed: int) -> list[Scenario]:
+    """Draw scenes at random; each has an exact solution for its whole duration.
+
+    Scene k depends on the seed and on k only. Its name, such as `draw-7-012` for scene 12 of seed 7, loads it again.
+
+    Args:
+        count: How many, from 1 to 1000.
+        seed: From 0 to 2⁶⁴ - 1; the same seed draws the same scenes with the same versions of dropspin and NumPy.
+
+    Raises:
+        DropspinError: Count or seed are out of range.
+    """
+    for name, given, least, most in (("count", count, 1, MOST_SCENES), ("seed", seed, 0, LARGEST_SEED)):
+        if isinstance(given, bool) or not isinstance(given, int) or not least <= given <= most:
+            raise DropspinError(f"{name}: got {given!r}; it is a whole number from {least} to {most}.")
+    return [drawn_scene(seed, number) for number in range(1, count + 1)]
+
+
+def drawn_scene(seed: int, number: int) -> Scenario:
+    """One scene of a seed.
+
+    Raises:
+        SceneError: There is no such scene.
+    """
+    name = f"draw-{seed}-{number:03d}"
+    if not (1 <= number <= MOST_SCENES and seed <= LARGEST_SEED):
+        raise SceneError(f"scene {name!r}: scenes are drawn with seeds up to {LARGEST_SEED} and numbers from 1 to {MOST_SCENES}.")
+    family = list(FAMILIES)[(number - 1) % len(FAMILIES)]
+    summary, draw_content = FAMILIES[family]
+    draws = Draws(np.random.default_rng([seed, number]))
+    for _ in range(MOST_DRAWS):
+        content, last_impact = draw_content(draws)
+        scene = Scenario.model_validate({"name": name, "origin": name, "summary": summary, "tags": ["drawn", family], **content})
+        found = scene if last_impact is None else _ended(scene, last_impact, draws.uniform(0.5, 0.8))
+        if found is not None and _is_resolved(found):
+            return found
+    raise AssertionError(f"no scene of the family {family} was accepted in {MOST_DRAWS} draws")
+
+
+def _ended(scene: Scenario, last_impact: int, share: float) -> Scenario | None:
+    """The scene, with its end at a share of the time from one of its impacts to the next; None if it does not get so far."""
+    truth = truth_for(scene)
+    if truth is None or len(truth.events) < last_impact:
+        return None
+    times = [0.0, *(event.time for event in truth.events), min(truth.horizon, scene.duration)]
+    begins, ends = times[last_impact : last_impact + 2]
+    return scene.model_copy(update={"duration": begins + share * (ends - begins)})
+
+
+def _is_resolved(scene: Scenario) -> bool:
+    """Whether the exact solution is known for the whole duration, and the default time steps resolve it."""
+    truth = truth_for(scene)
+    if truth is None or not truth.covers_all(scene.duration):
+        return False
+    times = np.array([0.0, *(event.time for event in truth.events), scene.duration])
+    spins = [truth(np.linspace(0.0, scene.duration, 65)).angular_velocity, *(event.after[np.newaxis, SPIN] for event in truth.events)]
+    return (
+        bool(np.diff(times).min() >= FLIGHT_STEPS * COARSEST_STEP)
+        and float(np.linalg.norm(np.concatenate(spins), axis=1).max()) * COARSEST_STEP <= TURN
+        and all(_strikes_alone(scene, event) for event in truth.events)
+    )
+
+
+def _strikes_alone(scene: Scenario, impact: Impact) -> bool:
+    """Whether no other corner comes so near to the floor at an impact that a step could take both for one."""
+    points = rotate(impact.before[ORIENTATION], scene.body.vertices)
+    heights = impact.before[POSITION][1] + points[:, 1] - scene.body.rounding
+    speeds = impact.before[VELOCITY][1] + np.cross(impact.before[SPIN], points)[:, 1]
+    apart = heights > heights.min() + 1e-9 * scene.body.size
+    return bool((heights - heights.min() > -COARSEST_STEP * np.minimum(speeds, 0.0))[apart].all())

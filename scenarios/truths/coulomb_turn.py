@@ -5,9 +5,19 @@
 ρ is the distance of the base's corners from the axis. For any distribution of the weight that is equal at opposite corners, friction has
 this moment and no resultant force.
 
-Source: C. A. de Coulomb, Théorie des machines simples (1785); Euler's equation about a principal axis.
+A tilt θ about the horizontal axes 1 and 2 loads corners unequally, and by friction b = f h/ρ of this load acts at right angles, below the
+centre of mass at the height h. With I_1, I_2 the moments of inertia and S_1, S_2 the sums of the corners' squared distances from the axes,
+contacts of stiffness k give
+
+    I_1 θ_1'' = -k (S_1 θ_1 - b S_2 θ_2),   I_2 θ_2'' = -k (S_2 θ_2 + b S_1 θ_1)
+
+which flutters at a rate that grows with k if (p - q)² < 4 b² p q, p = S_1/I_1, q = S_2/I_2. Only an impact without rebound stops that.
+
+Source: C. A. de Coulomb, Théorie des machines simples (1785); Euler's equation about a principal axis; V. V. Bolotin, Nonconservative
+Problems of the Theory of Elastic Stability (1963), for the flutter by forces that are not symmetric.
 Valid for: a box flat on the floor at the start, turning about the vertical and not moving otherwise; a Coulomb coefficient above 0; gravity
-straight down, no damping. The corners touch, not the face between them. Restitution has no effect, because nothing separates.
+straight down, no damping. The corners touch, not the face between them. With restitution only where it does not flutter; then restitution
+has no effect, because nothing separates.
 """
 
 import math
@@ -33,7 +43,7 @@ def coulomb_turn(scene: Scenario) -> Truth | None:
     if not straight_down or start[VELOCITY].any() or start[10] != 0.0 or start[12] != 0.0 or start[11] == 0.0:
         return None
     lever = _lever(scene)
-    if lever is None:
+    if lever is None or (floor.restitution > 0.0 and _flutters(scene, floor.friction / lever)):
         return None
     vertical = unrotate(start[ORIENTATION], UP)
     moment = float(vertical @ scene.body.inertia_tensor @ vertical)
@@ -58,3 +68,14 @@ def _lever(scene: Scenario) -> float | None:
     corners = rotate(np.array(scene.start.orientation), scene.body.vertices)
     base = corners[corners[:, 1] <= corners[:, 1].min() + TOUCHING * scene.body.size]
     return float(np.hypot(base[:, 0], base[:, 2]).mean()) if len(base) == 4 else None
+
+
+def _flutters(scene: Scenario, friction_over_lever: float) -> bool:
+    """Whether the load of the corners oscillates with growing amplitude unless impacts damp it."""
+    assert isinstance(scene.body, Box)
+    upright = int(np.argmax(np.abs(unrotate(np.array(scene.start.orientation), UP))))
+    first, second = (axis for axis in range(3) if axis != upright)
+    squares, moments = np.square(scene.body.half_extents), np.diag(scene.body.inertia_tensor)
+    p, q = squares[second] / moments[first], squares[first] / moments[second]
+    b = friction_over_lever * scene.body.half_extents[upright]
+    return bool((p - q) ** 2 < 4.0 * b**2 * p * q)

@@ -59,3 +59,38 @@ def test_turn_is_limited_to_its_range_of_validity(change):
     """Not with sticking, a fall, another spin, rest, a tilt, damping or a ball."""
     truth = truth_for(turning(**change))
     assert truth is None or truth.name != "coulomb-turn"
+
+
+def whirl_rates(scene):
+    """Squared frequencies of the tilt on stiff corners [1/s², for a stiffness of 1], from forces and moments at each corner."""
+    corners = rotate(np.array(scene.start.orientation), scene.body.vertices)
+    base = corners[corners[:, 1] < 0.0]
+    along = np.sign(scene.start.angular_velocity[1]) * np.cross([0.0, 1.0, 0.0], base * [1.0, 0.0, 1.0])
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    axes = rotate(np.array(scene.start.orientation), np.eye(3))
+    inertia = axes.T @ scene.body.inertia_tensor @ axes
+    matrix = np.empty((2, 2))
+    for column, tilt in enumerate(np.eye(3)[[0, 2]]):
+        load = -np.cross(tilt, base)[:, 1]
+        forces = load[:, None] * ([0.0, 1.0, 0.0] - scene.floor.friction * along)
+        moment = np.cross(base, forces).sum(axis=0)
+        matrix[:, column] = -np.linalg.solve(inertia, moment)[[0, 2]]
+    return np.linalg.eigvals(matrix)
+
+
+def test_a_turn_that_flutters_has_no_solution_except_without_restitution():
+    """The load of the corners flutters where the tilt has complex frequencies: boxes of any shape and friction, some of each kind."""
+    random = np.random.default_rng(3)
+    found = []
+    for _ in range(60):
+        half = random.uniform(0.1, 0.5, 3)
+        body = {"shape": "box", "half_extents": half.tolist(), "mass": 2.0, "inertia": ("solid", "vertices")[random.integers(2)]}
+        start = {"position": [0.0, half[1], 0.0], "angular_velocity": [0.0, 5.0, 0.0]}
+        change = {"body": body, "start": start}
+        friction = float(random.uniform(0.02, 0.8))
+        flutters = bool(np.abs(whirl_rates(turning(friction=friction, **change)).imag).max() > 0.0)
+        assert (truth_for(turning(friction=friction, **change)) is None) == flutters
+        inelastic = turning(**change, floor={"restitution": 0.0, "friction": friction})
+        assert truth_for(inelastic).name == "coulomb-turn"
+        found.append(flutters)
+    assert 10 < sum(found) < 50

@@ -3,7 +3,9 @@
 Ten families follow each other in turn. U(a, b) is uniform, LU(a, b) is uniform in the logarithm; directions and attitudes are uniform
 (G. Marsaglia, Annals of Mathematical Statistics 43 (1972), by normal variates).
 
-    all           mass LU(0.01, 1000) kg, lengths LU(0.1, 1) m
+    all           mass LU(0.01, 1000) kg; diameters and edges LU(0.1, 1) m; points are normal with a standard deviation of half of that
+    moments       solid or of eight corner masses in one of three boxes each, else of masses whose mean square along each axis is
+                  U(0.1, 1) of the half extent's; these are the drawn moments
     flights       velocity U(0, 3) m/s and spin LU(0.5, 12) rad/s of any direction; no gravity in three of ten, else of any direction and
                   LU(0.5, 30) m/s²; duration U(0.5, 1) s
     floors        gravity LU(0.5, 30) m/s² downwards; restitution U(0.1, 0.95); infinite friction or none
@@ -19,8 +21,10 @@ Ten families follow each other in turn. U(a, b) is uniform, LU(a, b) is uniform 
     flat-box      a box that lands on a face, one to three impacts; without friction it has spin U(-10, 10) rad/s about the vertical
     corner        a box, or in one of three cases a set of points, of any attitude; one impact; spin U(0, 3) rad/s
     edge          a box that lands on an edge; one impact; no spin
-    on-floor      a box that slides, or turns about the vertical, on a rough floor with a coefficient U(0.1, 0.6) for U(0.2, 0.6) s
-    standing      a box that falls over from an edge, which sticks or slips, until shortly before it lands
+    on-floor      a box that slides, or turns about the vertical, with a coefficient of friction U(0.1, 0.6); it stops after U(0.2, 0.6) s
+                  and lies for a tenth of that
+    standing      a box that falls over from an edge, U(0.05, 0.3) rad from its balance, for U(0.5, 0.8) of the time until it lands; the
+                  edge sticks or slips; restitution 0
 
 A draw is repeated until its exact solution is known for the whole duration and the default time steps resolve it: 16 steps of 4 ms in each
 flight, at most 0.1 rad a step, and no second corner within a step's fall of the floor when one strikes it.

@@ -18,6 +18,7 @@ from comparisons.running.run import run
 from reports import run_folder
 from reports.html.report import html_report
 from reports.markdown import run_markdown
+from reports.plots import figures
 from reports.plots.figures import report_figures
 from reports.plots.svg import svg
 from reports.run_folder import write_report
@@ -389,3 +390,16 @@ def test_setting_errors_are_compared_with_the_calibrated_profile():
     assert "Setting errors of" in page
     assert comparison.sentence in overview(found).findings
     assert profile_comparisons(run("drop-ball", "pybullet[profile=default]", 1e-2)) == []
+
+
+def test_a_run_of_many_scenes_has_plots_of_those_that_fail(results, monkeypatch):
+    """The first of these; the page says of how many."""
+    last = list(results.scenes)[-1]
+    failing = replace(results, table=results.table.assign(verdict=np.where(results.table["scene"] == last, "failed", "passed")))
+    everything = {name: "<svg></svg>" for name, _ in report_figures(failing)}
+    assert {name[:2] for name in everything} == {"00", "01", "02"}
+    assert "scenes have plots" not in html_report(failing, overview(failing), everything)
+    monkeypatch.setattr(figures, "MOST_SCENES", 1)
+    plots = {name: "<svg></svg>" for name, _ in report_figures(failing)}
+    assert {name[:2] for name in plots} == {"02"}
+    assert "1 of 3 scenes have plots" in html_report(failing, overview(failing), plots)

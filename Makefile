@@ -19,6 +19,7 @@ test-all: lint test test-browser docs ## everything, and the studies that take m
 
 faults: $(VENV)/.installed-dev        ## engines with one planted fault each against the core catalogue: docs/faults.md
 	$(BIN)/python tests/support/fault_suite.py
+	PYTHONPATH=tests $(BIN)/python -m support.detection_power
 
 coverage: $(VENV)/.installed-dev      ## how often the intervals of asymptotic errors are right: docs/coverage.md
 	PYTHONPATH=tests $(BIN)/python -m support.interval_coverage

@@ -562,10 +562,16 @@ def report(caught: list[list[tuple[str, str]]], alarms: list[list[tuple[str, str
     for title, checks in false.items():
         console.print(f"false alarm of {title!r}: {checks}")
     sound = "; ".join(engine.title for engine in SOUND)
-    head = "# Faults that the core catalogue detects\n\nEach engine is exact except for one fault. The ensemble is left out. "
-    head += "Written by `make faults`.\n\n"
-    (ROOT / "docs" / "faults.md").write_text(head + "\n".join(lines) + f"\n\n{summary} The correct engines: {sound}.\n")
+    write_section("planted", "\n".join(lines) + f"\n\n{summary} The correct engines: {sound}.\n")
     return 1 if missed or false else 0
+
+
+def write_section(name: str, text: str) -> None:
+    """Replace what is between the marker of a section of docs/faults.md and the next end."""
+    page = ROOT / "docs/faults.md"
+    old = page.read_text(encoding="utf-8")
+    start = old.index(f"<!-- {name} -->") + len(f"<!-- {name} -->\n")
+    page.write_text(old[:start] + text + old[old.index("<!-- end -->", start) :], encoding="utf-8")
 
 
 if __name__ == "__main__":

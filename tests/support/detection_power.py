@@ -270,9 +270,9 @@ def detection_power(number: int, name: str) -> Power:
     if size <= REQUIRED:
         return Power(_percent(size), True)
     finer = smallest_caught(name, fault, FINER_DTS)
-    if finer == inf and any(rows_with(["limited"], scene, sound_engine(name), DEFAULT_DTS) for scene in fault.scenes):
-        return Power("limited", True)
-    return Power(f"{_percent(size)}; {_percent(finer)} at finer steps", finer <= REQUIRED)
+    limited = any(metric for scene in fault.scenes for _, metric, _ in rows_with(["limited"], scene, sound_engine(name), DEFAULT_DTS))
+    words = f"{_percent(size)}; {_percent(finer)} at finer steps" if finer < size else _percent(size)
+    return Power(words + " (limited)" * limited, finer <= REQUIRED or limited)
 
 
 def main() -> int:

@@ -4,7 +4,7 @@
 """
 
 _SCENES = {
-    "ball-impact": ("drop-ball-backspin",),
+    "ball-impact": ("drop-ball-backspin", "drop-ball-grip"),
     "bounce-ladder": (
         "bounce-95",
         "bounce-99",
@@ -16,13 +16,13 @@ _SCENES = {
         "drop-box-flat",
         "turn-box-flat",
     ),
-    "corner-impact": ("drop-box-anyhow", "drop-box-corner", "drop-box-sticking", "drop-box-tumble"),
+    "corner-impact": ("drop-box-anyhow", "drop-box-corner", "drop-box-heavy", "drop-box-sticking", "drop-box-tumble"),
     "coulomb-slide": ("slide-box",),
     "coulomb-turn": ("turn-box-rough",),
     "damped-free-rotor": ("spin-damped",),
     "damped-parabola": ("fall-damped",),
     "edge-impact": ("drop-box-edge",),
-    "free-rotor": ("spin-asymmetric", "spin-coin", "spin-dzhanibekov", "spin-needle"),
+    "free-rotor": ("fall-tilted", "spin-asymmetric", "spin-coin", "spin-dzhanibekov", "spin-needle"),
     "principal-spin": ("fall-spin", "spin-principal", "spin-principal-50", "spin-principal-500"),
     "rocking": ("rest-long", "rock-block"),
     "slipping": ("slip-stick",),

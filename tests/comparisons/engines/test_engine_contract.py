@@ -36,7 +36,8 @@ def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
         of_its_own = name == "rapier" or (name == "drake" and scene.floor.restitution > 0.0)
         undamped = "spring_steps" in name and scene.floor.restitution == 0.0
         coulomb = name == "document" and scene.floor.friction not in ("none", "infinite")
-        assert stages or of_its_own or undamped or coulomb
+        products = name.startswith("pybullet") and scene.name == "fall-tilted"
+        assert stages or of_its_own or undamped or coulomb or products
         return
     dt = 2e-3
     with chosen.prepare(scene, dt) as simulation:

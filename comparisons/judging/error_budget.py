@@ -1,7 +1,7 @@
 """Error budget: from an error at three or more time steps to its asymptotic value as dt → 0, its order, and its cause.
 
 An error that vanishes as dt → 0 is a discretisation error; one that does not is a model error. The asymptotic error is stated with an
-interval that contains it in at least 95 % of cases (docs/coverage.md). The cause is stated where its opposite is improbable:
+95 % interval; docs/coverage.md counts how often it contains it. The cause is stated where its opposite is improbable:
 
     model            the asymptotic error has a sign: 0 and the other sign are improbable
     discretisation   an asymptotic error larger than allowed is improbable, one up to half of that is likely, and one larger than half of

@@ -80,7 +80,7 @@ def judge_asymptotic_error(scene: Scenario, label: str, dt: float, metric: Metri
         lowers, uppers = zip(*(_bounds(one, metric) for one in named), strict=True) if named else ((math.inf,), (-math.inf,))
         if limit.lower <= min(uppers) and limit.upper >= max(lowers):
             return replace(limit, verdict="known", reason=reason)
-        return replace(limit, verdict="failed", reason=f"{limit.reason}; no step cures it")
+        return replace(limit, verdict="failed", reason=f"{limit.reason}; no time step removes it")
     if limit.cause == "unresolved":
         return replace(limit, verdict="measured")
     if named and _expect_fault(scene, named, metric):

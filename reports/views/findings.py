@@ -28,6 +28,7 @@ class Counts:
         failed: How many failed.
         known: How many show a fault that is expected by name.
         fixed: How many passed although such a fault is expected.
+        limited: How many would fail, but for a known limitation of the engine.
         of_studies: How many of those that passed or failed are on orders and asymptotic errors.
         broken: How many rows are of engines that broke down.
     """
@@ -36,6 +37,7 @@ class Counts:
     failed: int
     known: int
     fixed: int
+    limited: int
     of_studies: int
     broken: int
 
@@ -45,9 +47,10 @@ def counts(results: Results) -> Counts:
     verdicts = results.table["verdict"]
     passed, failed, known = verdicts == "passed", verdicts.isin(FAILURES), verdicts == "known"
     fixed = passed & results.table["reason"].str.startswith(HOLDS_AGAIN)
+    limited = (verdicts == "limited") & (results.table["metric"] != "")
     of_studies = (passed | failed) & results.table["kind"].isin(STUDIES)
     broken = verdicts.isin(BREAKDOWNS)
-    return Counts(*(int(rows.sum()) for rows in (passed, failed, known, fixed, of_studies, broken)))
+    return Counts(*(int(rows.sum()) for rows in (passed, failed, known, fixed, limited, of_studies, broken)))
 
 
 class Status(NamedTuple):
@@ -167,9 +170,12 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
 
 
 def _known(tally: Counts) -> str:
-    """The results that show known faults, and those that do no longer, as the end of a sentence."""
+    """The results that show known faults, those that do no longer, and those within limitations, as the end of a sentence."""
     known = f"; {tally.known} {'result shows' if tally.known == 1 else 'results show'} known faults" if tally.known else ""
-    return known + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not show" if tally.fixed else "")
+    limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} within known limitations of engines" if tally.limited else ""
+    return (
+        known + limited + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not show" if tally.fixed else "")
+    )
 
 
 def _undecided(limits: pd.DataFrame) -> list[str]:

@@ -15,7 +15,7 @@ from comparisons.judging.convergence import (
     study_convergence,
 )
 from comparisons.measuring.metrics import METRICS
-from comparisons.running.inputs import EngineEntry
+from comparisons.running.inputs import EngineEntry, engine_entry
 from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
 from comparisons.running.processes import EngineProcesses
 from comparisons.running.start_phases import StartPhase
@@ -63,7 +63,7 @@ def _with_accuracy_options(
 ) -> Studies:
     """The studies; where the time step alone does not make an error vanish, with the accuracy options refined too."""
     refined = engine.refined(dts)
-    series = _series([one for dt, finer in refined for one in _measured_at(own, EngineEntry(finer.label, finer), dt, processes)])
+    series = _series([one for dt, finer in refined for one in _measured_at(own, engine_entry(finer), dt, processes)])
     again = {
         name: study_convergence(own.scene, claim._replace(order=None), METRICS[name], points)
         for name, points in series.items()

@@ -101,7 +101,7 @@ def tradeoff(
 def _with_accuracy_levels(entry: EngineEntry) -> list[EngineEntry]:
     """An engine, and the same with each value of the options that set its accuracy."""
     levels = [] if entry.engine is None else entry.engine.accuracy_levels()
-    return [entry, *(EngineEntry(level.label, level) for level in levels)]
+    return [entry, *map(engine_entry, levels)]
 
 
 def _with_costs(

@@ -2,13 +2,13 @@
 "use strict";
 (() => {
   const form = document.getElementById("filters"), total = document.querySelectorAll("#scenes > section").length;
-  const cells = [...document.querySelectorAll("#matrix td[data-verdicts]")];
+  const cells = [...document.querySelectorAll("#matrix td[data-status]")];
 
   const apply = () => {
     const engines = new Set([...form.querySelectorAll("[name=engine]:checked")].map((box) => box.value));
-    const part = form.elements.scene.value.trim().toLowerCase(), verdict = form.elements.verdict.value;
+    const part = form.elements.scene.value.trim().toLowerCase(), status = form.elements.status.value;
     const found = new Set(cells
-      .filter((cell) => engines.has(cell.dataset.engine) && (!verdict || cell.dataset.verdicts.split(",").includes(verdict)))
+      .filter((cell) => engines.has(cell.dataset.engine) && (!status || cell.dataset.status === status))
       .map((cell) => cell.parentElement.dataset.scene)
       .filter((scene) => scene.toLowerCase().includes(part)));
     for (const element of document.querySelectorAll("[data-scene], [data-engine]")) {

@@ -45,6 +45,10 @@ class AsBuilt:
     gravity: Array
 
 
+MINOR = 0.01
+"""Share of a metric's scale."""
+
+
 class KnownLimitation(NamedTuple):
     """A known limitation of an engine that a simulation met.
 
@@ -56,6 +60,11 @@ class KnownLimitation(NamedTuple):
 
     message: str
     explained_errors: Mapping[str, float] = {}
+
+    @property
+    def is_minor(self) -> bool:
+        """Whether it explains errors below 1 % alone; it is then mentioned where it explains one, and not by itself."""
+        return bool(self.explained_errors) and max(self.explained_errors.values()) < MINOR
 
 
 class Simulation:

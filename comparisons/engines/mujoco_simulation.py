@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, KnownLimitation, Simulation
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, Simulation
+from comparisons.engines.mujoco_limitations import limitations_met
 from reference_impl.threads import usable_cores
 from scenarios import Scenario
-from scenarios.rotations import conjugate, cross, rotate
+from scenarios.rotations import conjugate, rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
-NO_SLIP = 1e-3  # m/s; a slip that friction has stopped may still have this speed
 ROW = slice(1, 14)  # position, quaternion and velocities in a full state, which begins with the time
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -58,7 +58,9 @@ class MuJoCoSimulation(Simulation):
         self._steps += (len(rows) - 1) * every
         states = _to_world(rows)
         self.known_limitations = (
-            list(_limitations_met(self._scene, states)) if every == 1 and self.settings["profile"] == "calibrated" else []
+            list(limitations_met(self._scene, states, self._model.opt.timestep))
+            if every == 1 and self.settings["profile"] == "calibrated"
+            else []
         )
         return states
 
@@ -123,40 +125,6 @@ def _last_good_row(rows: Array) -> int:
     """The last row before a number exceeds MuJoCo's limit, or before its recording stops and repeats the last state."""
     bad = ~(np.abs(rows) < mujoco.mjMAXVAL).all(axis=1) | (rows == rows[-1]).all(axis=1)
     return max(0, int(np.argmax(bad)) - 1)
-
-
-def _limitations_met(scene: Scenario, states: Array) -> Iterator[KnownLimitation]:
-    """The error bounds that follow from the slip of contacts under Coulomb friction.
-
-    The slip is taken in each step at the corners that begin it below the floor. MuJoCo's friction cone is convex: a contact that slips at
-    s [m/s] gains up to a = µ s of rebound speed (dual cone, one-step damper). The hop takes 2 (e u + a)/g, where u is the approach speed;
-    during 2 a/g of it friction acts too late, so that the slip is wrong by up to 2 µ a until the next landing compensates.
-    """
-    if scene.floor is None or isinstance(scene.floor.friction, str):
-        return
-    before, after = states[:-1], states[1:]
-    arms = rotate(before[:, None, ORIENTATION], scene.body.vertices) - [0.0, scene.body.rounding, 0.0]
-    touching = before[:, None, 1] + arms[..., 1] <= 0.0
-    velocities = after[:, None, VELOCITY] + cross(after[:, None, SPIN], arms)
-    slip = float(np.hypot(velocities[..., 0], velocities[..., 2])[touching].max(initial=0.0))
-    if slip <= NO_SLIP:
-        return
-    friction, g = scene.floor.friction, float(np.linalg.norm(scene.acceleration))
-    added = friction * slip
-    late, e, fastest = 2.0 * friction * added, scene.floor.restitution, float(-states[:, 8].min())
-    hop = 2.0 * (e * max(0.0, fastest) + added) / g if g else 0.0
-    sizes = {
-        "position_error": (late + added) * hop,
-        "orientation_error": (late + added) * hop / scene.body.size,
-        "angular_momentum_error": (late + added) / slip,
-        "energy_error": (2.0 * slip * late + added**2) / slip**2,
-        "energy_gain": (added / slip) ** 2,
-    }
-    if fastest > added:
-        sizes |= {"restitution_error": added / fastest, "bounce_height_error": (2.0 * e * added * fastest + added**2) / fastest**2}
-    yield KnownLimitation(
-        f"contacts slip at up to {slip:.3g} m/s; MuJoCo's friction cone adds up to µ times that, {added:.3g} m/s, to the rebound", sizes
-    )
 
 
 def _to_world(rows: Array) -> Array:

@@ -88,7 +88,7 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
         tolerance = math.nan if found.cause == "unresolved" else found.upper - found.lower
         limit = Judgement(found.asymptotic_error, "measured", found.lower, found.upper, found.cause, found.reason, tolerance)
         limit = judge_asymptotic_error(scene, claim.label, float(np.min(dts)), metric, limit)
-        limit = with_limitations(limit, metric.name, claim.limitations)
+        limit = with_limitations(limit, metric.name, claim.limitations, least=max(found.lower, -found.upper))
     is_open = found.cause == "unresolved" and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
     return ConvergenceStudy(found.cause, order, limit, is_open)
 

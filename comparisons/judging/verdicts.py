@@ -88,11 +88,19 @@ def judge_asymptotic_error(scene: Scenario, label: str, dt: float, metric: Metri
     return replace(limit, verdict="passed")
 
 
-def with_limitations(judgement: Judgement, metric: str, limitations: Iterable[KnownLimitation]) -> Judgement:
-    """A failure as `limited`, where a known limitation that the engine met explains an error of that size; others unchanged."""
+def with_limitations(judgement: Judgement, metric: str, limitations: Iterable[KnownLimitation], least: float | None = None) -> Judgement:
+    """A failure as `limited`, where a known limitation that the engine met explains an error of that size; others unchanged.
+
+    Args:
+        judgement: Of a value, or of an asymptotic error.
+        metric: Name of the metric.
+        limitations: Those that the engine met.
+        least: The least size of the error, where it has an interval; by default the size of the value.
+    """
     if judgement.verdict != "failed":
         return judgement
-    reasons = [one.message for one in limitations if abs(judgement.value) <= one.explained_errors.get(metric, -1.0)]
+    size = abs(judgement.value) if least is None else least
+    reasons = [one.message for one in limitations if size <= one.explained_errors.get(metric, -1.0)]
     if not reasons:
         return judgement
     return replace(judgement, verdict="limited", reason="; ".join(dict.fromkeys(filter(None, [*reasons, judgement.reason]))))

@@ -62,7 +62,7 @@ def measure(
     if breakdown is not None:
         return [Measured(case.remark(breakdown.verdict, breakdown.reason), None)]
     perturbed = [compare(motions, phases, exact) for motions in engine_run.perturbed]
-    rows = [Measured(case.remark("limited", one.message), None) for one in engine_run.limitations]
+    rows = [Measured(case.remark("limited", one.message), None) for one in engine_run.limitations if not one.is_minor]
     for metric in metrics_for(scene, truth):
         average, judgement = _judge_metric(scene, truth, dt, engine_run.label, metric, cases)
         moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))

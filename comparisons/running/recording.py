@@ -69,7 +69,8 @@ def simulate(scene: Scenario | str, engine: Engine | str, dt: float, every: int 
         raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
     recording = record(chosen, scene, dt, every)
     for limitation in recording.limitations:
-        warnings.warn(limitation.message, stacklevel=2)
+        if not limitation.is_minor:
+            warnings.warn(limitation.message, stacklevel=2)
     return recording.motion
 
 

@@ -40,7 +40,7 @@ def run_single(jobs: Jobs, index: int, outcomes: Outcomes, metrics: tuple[str, .
         Setup.of(scene).as_batch(), states, np.array([dt]), np.array([motion.velocity_lag]), np.array([steps]), UNIT_TOLERANCE
     )
     outcomes.set_measured(np.array([index]), states, motions)
-    outcomes.reason[index] = "; ".join(limitation.message for limitation in recording.limitations)
+    outcomes.reason[index] = "; ".join(limitation.message for limitation in recording.limitations if not limitation.is_minor)
     if metrics:
         outcomes.metrics[index] = requested_metrics(scene, motion, metrics)
 

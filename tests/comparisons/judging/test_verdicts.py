@@ -127,6 +127,8 @@ def test_known_limitation_excuses_failures_of_its_metric_and_size_only():
     assert (excused(-0.02).verdict, excused(0.02).reason) == ("limited", "contacts slip; too large")
     assert [excused(0.021).verdict, excused(math.nan).verdict, excused(0.01, "energy_error").verdict] == ["failed"] * 3
     assert excused(0.01, verdict="passed").reason == "too large"
+    uncertain = Judgement(0.021, "failed", 0.0195, 0.0225)
+    assert with_limitations(uncertain, "position_error", [limitation], least=uncertain.lower).verdict == "limited"
 
 
 @pytest.mark.parametrize(

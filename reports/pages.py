@@ -6,7 +6,6 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from reports.plots.svg import with_ids_of
 from reports.views import numbers
 
 
@@ -26,7 +25,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted")}
-    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code, "ids_of": with_ids_of}
+    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": numbers.MARKS}
     return environment
 

@@ -4,7 +4,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -13,8 +13,9 @@ from comparisons.results.store import load_results, save
 from reports.html.report import html_report
 from reports.junit import junit_xml
 from reports.markdown import run_markdown
-from reports.plots.figures import FIGURES, report_figures
-from reports.plots.svg import save_png, svg
+from reports.plots.chart import figure_of
+from reports.plots.figures import CHARTS, report_charts
+from reports.plots.svg import save_png, save_svg
 from reports.sections import Section
 from reports.views.run import overview
 from scenarios import DropspinError
@@ -26,7 +27,7 @@ OURS = frozenset(
 
 
 def write_report(results: Results, folder: str | Path, sections: Sequence[Section] = ()) -> Path:
-    """Write a run: its data, the reports and the plots. An earlier run in the same folder is replaced.
+    """Write a run: its data and the reports. An earlier run in the same folder is replaced.
 
     Args:
         results: The run.
@@ -44,21 +45,25 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Sectio
     return Path(folder) / "report.html"
 
 
-def fill(results: Results, folder: Path, sections: Sequence[Section] = (), png: bool = False) -> None:
-    """Write the data, the reports and the plots of a run into an empty folder."""
+def fill(results: Results, folder: Path, sections: Sequence[Section] = (), plots: Collection[str] = ()) -> None:
+    """Write the data and the reports of a run into an empty folder, and its plots as files of these kinds, `svg` or `png`."""
     summary = overview(results)
     save(results, folder)
     results.table.to_csv(folder / "results.csv", index=False)
-    (folder / "plots").mkdir()
-    plots = {}
-    for name, figure in report_figures(results):
-        plots[name] = svg(figure, f"s{name}")
-        (folder / "plots" / f"{name}.svg").write_text(plots[name], encoding="utf-8")
-        if png:
-            save_png(figure, folder / "plots" / f"{name}.png")
-    (folder / "report.html").write_text(html_report(results, summary, plots, sections), encoding="utf-8")
+    (folder / "report.html").write_text(html_report(results, summary, sections), encoding="utf-8")
     (folder / "report.md").write_text(run_markdown(results, summary), encoding="utf-8")
     (folder / "junit.xml").write_bytes(junit_xml(results))
+    if plots:
+        _write_plots(results, folder / "plots", plots)
+
+
+def _write_plots(results: Results, folder: Path, kinds: Collection[str]) -> None:
+    folder.mkdir()
+    charts_of = report_charts(results)
+    for number, scene in enumerate(results.scenes):
+        for name, charts in charts_of.get(scene, {}).items():
+            for kind in kinds:
+                {"svg": save_svg, "png": save_png}[kind](figure_of(charts), folder / f"{number:02d}-{name}.{kind}")
 
 
 @contextmanager
@@ -169,5 +174,5 @@ def _files_of_run(folder: Path) -> set[str]:
         arrays, scenes = {*content["trajectories"], *content["ensembles"]}, content["scenes"]
     except (OSError, ValueError, TypeError, KeyError):
         return set()
-    plots = {f"plots/{number:02d}-{kind}.{ending}" for number in range(len(scenes)) for kind in FIGURES for ending in ("svg", "png")}
+    plots = {f"plots/{number:02d}-{kind}.{ending}" for number in range(len(scenes)) for kind in CHARTS for ending in ("svg", "png")}
     return {*OURS, *arrays, *plots}

@@ -4,15 +4,14 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from reports.plots.svg import svg
+from reports.plots.chart import Chart, figure_of
+from reports.plots.chart_data import chart_data
+from reports.plots.svg import save_svg
 from scenarios import DropspinError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FILE = "section.json"
 
@@ -25,12 +24,14 @@ class Section:
 
     Attributes:
         title: The title.
-        parts: Each with its `kind`: `heading` and `text` (content), `list` (items), `table` (rows: texts by column) or `picture` (name, and
-            svg, an element).
+        parts: Each with its `kind`: `heading` and `text` (content), `list` (items), `table` (rows: texts by column) or `charts` (name, and
+            charts, the data of each).
+        pictures: The charts of each picture, by name, as long as they are not from a file.
     """
 
     title: str
     parts: list[Part] = field(default_factory=list)
+    pictures: dict[str, Sequence[Chart]] = field(default_factory=dict)
 
     def add_heading(self, content: str) -> None:
         """Add a heading."""
@@ -50,16 +51,16 @@ class Section:
         if rows:
             self.parts.append({"kind": "table", "rows": [dict(row) for row in rows]})
 
-    def add_picture(self, name: str, figure: "Figure") -> None:
-        """Add a figure."""
-        self.parts.append({"kind": "picture", "name": name, "svg": svg(figure, name)})
+    def add_charts(self, name: str, charts: Sequence[Chart]) -> None:
+        """Add a picture of charts."""
+        self.parts.append({"kind": "charts", "name": name, "charts": [chart_data(chart) for chart in charts]})
+        self.pictures[name] = charts
 
     def write(self, folder: Path, stem: str) -> None:
         """Write the Markdown page, its pictures, and `section.json`, from which a report takes the section."""
         (folder / FILE).write_text(json.dumps({"title": self.title, "parts": self.parts}, indent=1), encoding="utf-8")
-        pictures = [part for part in self.parts if part["kind"] == "picture"]
-        for picture in pictures:
-            (folder / f"{picture['name']}.svg").write_text(picture["svg"], encoding="utf-8")
+        for name, charts in self.pictures.items():
+            save_svg(figure_of(charts), folder / f"{name}.svg")
         page = "\n\n".join([f"# {self.title}", *map(_markdown, self.parts)])
         (folder / f"{stem}.md").write_text(f"{page}\n", encoding="utf-8")
 
@@ -79,15 +80,15 @@ class _Table(BaseModel):
     rows: Annotated[list[dict[str, str]], Field(min_length=1)]
 
 
-class _Picture(BaseModel):
-    kind: Literal["picture"]
+class _Charts(BaseModel):
+    kind: Literal["charts"]
     name: str
-    svg: str
+    charts: list[dict[str, Any]]
 
 
 class _File(BaseModel):
     title: str
-    parts: list[Annotated[_Prose | _List | _Table | _Picture, Field(discriminator="kind")]]
+    parts: list[Annotated[_Prose | _List | _Table | _Charts, Field(discriminator="kind")]]
 
 
 def read_section(folder: str) -> Section:
@@ -113,6 +114,6 @@ def _markdown(part: Part) -> str:
         heads = list(part["rows"][0])
         lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row.values()] for row in part["rows"])]
         return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    if part["kind"] == "picture":
+    if part["kind"] == "charts":
         return f"![{part['name']}]({part['name']}.svg)"
     return str(part["content"])

@@ -8,7 +8,8 @@ from comparisons.robustness.study import RobustnessStudy
 from comparisons.tradeoff.points import TradeOff
 from reports.markdown import history_markdown
 from reports.output import write_table
-from reports.plots import history_figure, limits_figure, tradeoff_figure
+from reports.plots.figures import history_figure, limits_charts, tradeoff_charts
+from reports.plots.svg import save_svg
 from reports.sections import Section
 from reports.views import history, limits, tradeoff
 
@@ -24,7 +25,7 @@ def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
         section.add_heading(one.scene.name)
         section.add_text(limits.nominal(one))
         if one.scans:
-            section.add_picture(one.scene.name, limits_figure(one))
+            section.add_charts(one.scene.name, limits_charts(one))
             section.add_table(limits.range_rows(one))
         section.add_list(limits.sentences(one))
     section.write(folder, "limits")
@@ -36,7 +37,7 @@ def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: P
     section = Section("What accuracy costs")
     for one in found:
         section.add_heading(one.scene.name)
-        section.add_picture(one.scene.name, tradeoff_figure(one))
+        section.add_charts(one.scene.name, tradeoff_charts(one))
         section.add_table(tradeoff.pareto_front_rows(one))
         section.add_list(tradeoff.sentences(one, within))
     section.write(folder, "tradeoff")
@@ -51,5 +52,5 @@ def write_history(found: History, folder: Path) -> None:
     write_table(folder, "history", [str(name) for name in table], records)
     scenes = list(dict.fromkeys(found.results["scene"]))
     for scene in scenes:
-        history_figure(found, scene).savefig(folder / f"{scene}.svg")
+        save_svg(history_figure(found, scene), folder / f"{scene}.svg")
     (folder / "history.md").write_text(history_markdown(len(found.names), history.sentences(found), scenes), encoding="utf-8")

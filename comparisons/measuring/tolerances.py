@@ -39,20 +39,20 @@ OF_TWO_DRAWS = math.sqrt(2.0)
 
 def rounding(scene: Scenario, unit: str, precision: type, steps: Array) -> Array:
     """The largest error that rounding, solvers' residuals included, may cause in a number of steps, in a metric's unit."""
-    rounded: Array = _scale(scene, unit) * (NEGLIGIBLE + ULPS_PER_STEP * float(np.finfo(precision).eps) * steps)
+    rounded: Array = scale(scene, unit) * (NEGLIGIBLE + ULPS_PER_STEP * float(np.finfo(precision).eps) * steps)
     return rounded
 
 
 def negligible(scene: Scenario, unit: str) -> float:
     """The largest error that does not matter, in a metric's unit: the same share of the metric's scale for every engine."""
-    return MATTERS * _scale(scene, unit)
+    return MATTERS * scale(scene, unit)
 
 
 def tolerance(scene: Scenario, unit: str, precision: type, steps: int, sampling_noise: float) -> float:
     """How far a metric may move: by sampling noise, and by rounding of random sign; without a floor no solver leaves a residual."""
     residual = 0.0 if scene.floor is None else NEGLIGIBLE
     rounded = ULPS_PER_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
-    return sampling_noise + _scale(scene, unit) * (residual + TRUTH_ACCURACY + rounded)
+    return sampling_noise + scale(scene, unit) * (residual + TRUTH_ACCURACY + rounded)
 
 
 def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
@@ -76,7 +76,7 @@ def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:
     return scene.starting_at(start * (1.0 + sizes * signs))
 
 
-def _scale(scene: Scenario, unit: str) -> float:
+def scale(scene: Scenario, unit: str) -> float:
     """The scale of rounding errors: the scene's lengths, speeds and duration; 1 for ratios and angles."""
     length = scene.body.size + float(np.linalg.norm(scene.start.position))
     if unit == "m/s":

@@ -30,8 +30,7 @@ def replay_command(
     """
     from comparisons.results.store import load_results
     from reports.html.replay import replay_page
-    from reports.plots import time_figure
-    from reports.plots.svg import svg
+    from reports.plots.figures import time_charts
     from reports.replay import replay_of
     from reports.replay.clip import write_clip
     from reports.terminal.progress import share_bar
@@ -58,13 +57,12 @@ def replay_command(
             write_clip(shown[0], gif, speed, on_progress)
         click.echo(f"Written: {gif}")
         return
-    plots: dict[str, str] = {}
+    charts = []
     for one in shown:
         at_this_step = {key: motion for key, motion in results.trajectories.items() if key[2] == one.dt}
-        figure = time_figure(replace(results, trajectories=at_this_step), one.scene.name)
-        plots[one.scene.name] = svg(figure, f"s{len(plots):02d}-time")
+        charts.append(time_charts(replace(results, trajectories=at_this_step), one.scene.name))
     file = str(Path(run) / "replay.html") if output is None else output
-    write_text(file, replay_page(shown, plots))
+    write_text(file, replay_page(shown, charts))
     click.echo(f"Written: {file}")
     if opens:
         click.launch(file)

@@ -15,11 +15,11 @@ import click
     metavar="FOLDER",
     help="Add the study that dropspin tradeoff or limits wrote to this folder; repeat for more.",
 )
-@click.option("--png", is_flag=True, help="Write the plots as PNG too.")
-def report_command(run: str, studies: tuple[str, ...], png: bool) -> None:
-    """Write the report of a run again: with other studies, with plots as PNG, or after an update of dropspin.
+@click.option("--plots", multiple=True, type=click.Choice(["svg", "png"]), help="Write the plots as files too; repeat for both.")
+def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -> None:
+    """Write the report of a run again: with other studies, with plots as files, or after an update of dropspin.
 
-    The new report has only the studies and PNGs of this call. A replay in the folder stays.
+    The new report has only the studies and plots of this call. A replay in the folder stays.
     """
     from comparisons.results.store import load_results
     from reports.run_folder import fill, run_folder
@@ -28,7 +28,7 @@ def report_command(run: str, studies: tuple[str, ...], png: bool) -> None:
     sections = [read_section(folder) for folder in dict.fromkeys(studies)]
     results = load_results(Path(run))
     with run_folder(run) as unfinished:
-        fill(results, unfinished, sections, png)
+        fill(results, unfinished, sections, plots)
         if (Path(run) / "replay.html").exists():
             shutil.copy2(Path(run) / "replay.html", unfinished)
     click.echo(f"Report: {Path(run) / 'report.html'}")

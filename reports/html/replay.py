@@ -1,16 +1,19 @@
 """The replay as an HTML page."""
 
-from markupsafe import Markup
+from collections.abc import Sequence
 
 from reports.pages import page
+from reports.plots.chart import Chart
+from reports.plots.chart_data import chart_data
 from reports.replay import Replay, as_data
 
 
-def replay_page(replays: list[Replay], plots: dict[str, str]) -> str:
+def replay_page(replays: Sequence[Replay], charts: Sequence[Sequence[Chart]]) -> str:
     """The page: a viewer for each scene, with its plots over time.
 
     Args:
         replays: One per scene.
-        plots: SVG element of each scene, by its name.
+        charts: The plots of each.
     """
-    return page("replay.html", replays=[(replay, as_data(replay), Markup(plots[replay.scene.name])) for replay in replays])
+    shown = [(one, as_data(one), [chart_data(chart) for chart in of_scene]) for one, of_scene in zip(replays, charts, strict=True)]
+    return page("replay.html", replays=shown)

@@ -1,10 +1,9 @@
 """The report: one HTML file that needs no network."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from markupsafe import Markup
 
 from comparisons.judging.convergence import STUDIES
 from comparisons.measuring.metrics import METRICS
@@ -12,37 +11,37 @@ from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.provenance import first_settings
 from comparisons.results.results import NEGLIGIBLE, Results
 from reports.pages import page
+from reports.plots.chart import Chart
+from reports.plots.chart_data import chart_data
 from reports.plots.colours import engine_colours
-from reports.plots.figures import FIGURES
+from reports.plots.figures import CHARTS, report_charts
 from reports.plots.spins import wobbles_freely
-from reports.plots.svg import with_shared_styles
 from reports.replay import as_data, replay_of
 from reports.sections import Section
 from reports.views import numbers
 from reports.views.error_budget import error_budgets
-from reports.views.findings import Counts
 from reports.views.leading_errors import leading_errors, step_costs
 from reports.views.run import Overview
 from reports.views.scene import left_out, modelled
 from scenarios import truth_for
 
 
-def html_report(results: Results, summary: Overview, plots: dict[str, str], sections: Sequence[Section] = ()) -> str:
+def html_report(results: Results, summary: Overview, sections: Sequence[Section] = ()) -> str:
     """The page.
 
     Args:
         results: The run.
         summary: Its overview.
-        plots: SVG elements, by the names of `report_figures`.
         sections: Sections of other studies.
     """
-    styles, drawn = with_shared_styles(plots)
     words = sorted({status.words for by_engine in summary.statuses.values() for status in by_engine.values()})
-    details = _details(results, summary.counts, drawn)
-    return page("report.html", **vars(summary), **details, words=words, sections=sections, styles=Markup(styles))
+    return page("report.html", **vars(summary), **_details(results, summary), words=words, sections=sections)
 
 
-def _details(results: Results, tally: Counts, plots: dict[str, str]) -> dict[str, Any]:
+def _details(results: Results, summary: Overview) -> dict[str, Any]:
+    tally, charts = summary.counts, report_charts(results)
+    finest = results.table.groupby("scene")["dt"].min().dropna().unique()
+    failing = {one.scene for one in summary.failures}
     return {
         "engines": results.engines,
         "provenance": results.provenance,
@@ -50,16 +49,17 @@ def _details(results: Results, tally: Counts, plots: dict[str, str]) -> dict[str
         "colours": engine_colours(results.engines),
         "negligible": NEGLIGIBLE,
         "leading": leading_errors(results),
+        "steps": numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
         "costs": step_costs(results),
-        "plotted": len({name.split("-")[0] for name in plots}),
-        "scenes": [_scene(results, number, name, plots) for number, name in enumerate(results.scenes)],
+        "plotted": len(charts),
+        "scenes": [_scene(results, number, name, charts.get(name, {}), name in failing) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,
         "settings": first_settings(results.provenance),
     }
 
 
-def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> dict[str, Any]:
+def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:
     scene = results.scenes[name]
     truth = truth_for(scene)
     frame = results.table[results.table["scene"] == name]
@@ -67,9 +67,11 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
     own = results.measurements[results.measurements["scene"] == name]
     studies = frame[frame["kind"].isin(STUDIES)]
     motions = replay_of(results, name)
+    budgets = error_budgets(results, name)
     return {
         "id": f"scene-{number:02d}",
         "name": name,
+        "failed": has_failed,
         "scene": scene,
         "modelled": modelled(scene),
         "left_out": left_out(scene),
@@ -78,41 +80,43 @@ def _scene(results: Results, number: int, name: str, plots: dict[str, str]) -> d
         "metrics": list(own["metric"].unique()),
         "cells": {(row.metric, row.engine, row.dt): _row(row) for row in own.itertuples()},
         "trends": _trends(studies),
-        "budgets": error_budgets(results, name),
-        "rows": _sorted_rows(pd.concat([own, studies])),
+        "budgets": [one for one in budgets if one.cause != "discretisation"],
+        "converging": sum(one.cause == "discretisation" for one in budgets),
+        "rows": _all_results(results, name, pd.concat([own, studies])),
         "replay": None if motions is None else as_data(motions),
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
         "agreement": _agreement(frame, min(dts)),
         "ensemble": _ensemble(frame, min(dts)),
         "wobbles": wobbles_freely(scene),
-        # SVG of reports.plots, whose text matplotlib has escaped.
-        **{f"{kind}_plot": Markup(plots.get(f"{number:02d}-{kind}", "")) for kind in FIGURES},
+        "charts": {kind: [chart_data(chart) for chart in charts.get(kind, ())] for kind in CHARTS},
     }
 
 
-def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, Any]]:
-    """The behaviour of each metric of each engine as dt → 0: a few words, the worse of the two verdicts, and the reasons."""
+def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, str]]:
+    """The behaviour of each metric of each engine as dt → 0 in a few words, its cause, and the worse of the two verdicts."""
     trends = {}
     for (metric, engine), rows in studies.groupby(["metric", "engine"]):
         order, asymptotic = (rows[rows["kind"] == kind] for kind in STUDIES)
         p, m = (float(part["value"].iloc[0]) if len(part) else float("nan") for part in (order, asymptotic))
-        reasons = [f"order {p:.3f}, {reason}" for reason in order["reason"]]
-        reasons += [f"{m:.3g} ({row.lower:.3g} … {row.upper:.3g}) as dt → 0, {row.reason}" for row in asymptotic.itertuples()]
         cause = str(rows["cause"].iloc[0])
         verdict = "failed" if (rows["verdict"] == "failed").any() else str(rows["verdict"].iloc[-1])
-        trends[str(metric), str(engine)] = {
-            "text": numbers.trend(p, m, cause),
-            "cause": cause,
-            "verdict": verdict,
-            "reason": "; ".join(reasons),
-        }
+        trends[str(metric), str(engine)] = {"text": numbers.trend(p, m, cause), "cause": cause, "verdict": verdict}
     return trends
 
 
-def _sorted_rows(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    """The rows by metric, then by engine, those for dt → 0 last."""
+def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[str, Any]:
+    """All results by metric, then by engine, those for dt → 0 last: the number of the engine, whether it failed, and numbers of texts."""
     metrics = {metric: number for number, metric in enumerate(dict.fromkeys(rows["metric"]))}
-    return [_row(row) for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).itertuples()]
+    engines = {engine: number for number, engine in enumerate(results.engines)}
+    texts: dict[str, int] = {}
+    found = []
+    for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).to_dict("records"):
+        name = numbers.subject(row["metric"], row["kind"]) + numbers.unit(row["unit"])
+        values = [row["engine"], numbers.in_ms(row["dt"]), numbers.formatted(row["value"]), numbers.bound(row["lower"], row["upper"])]
+        judged = [f"{numbers.MARKS[row['verdict']]} {numbers.word(row['verdict'])}", row["cause"], row["reason"]]
+        listed = (texts.setdefault(text, len(texts)) for text in [name, *values, *judged])
+        found.append([engines[row["engine"]], int(row["verdict"] == "failed"), *listed])
+    return {"scene": scene_name, "rows": found, "texts": list(texts)}
 
 
 def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:

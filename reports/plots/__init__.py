@@ -1,41 +1,43 @@
-"""Plots: each `plot_` function draws results into axes, for the report and for notebooks alike.
+"""Plots: each function returns a `Chart`, and each `plot_` function draws one into axes, for notebooks and papers.
 
 A plot function makes no figure and no legend; it labels what it draws, so that `axes.legend()` makes one. docs/examples.md shows every
 picture and the lines that draw it.
 """
 
-from reports.plots.bounces import plot_bounce_ladder
-from reports.plots.convergence import plot_error_over_dt
-from reports.plots.ensembles import plot_angular_momentum_of_ensemble, plot_energy_of_ensemble, plot_rest_of_ensemble
-from reports.plots.figures import (
-    bounce_figure,
-    convergence_figure,
-    ensemble_figure,
-    flight_figure,
-    history_figure,
-    time_figure,
-    tradeoff_figure,
+from reports.plots.bounces import bounce_ladder, plot_bounce_ladder
+from reports.plots.chart import Chart, Line, draw, figure_of
+from reports.plots.convergence import error_over_dt, plot_error_over_dt
+from reports.plots.ensembles import (
+    angular_momentum_of_ensemble,
+    energy_of_ensemble,
+    plot_angular_momentum_of_ensemble,
+    plot_energy_of_ensemble,
+    plot_rest_of_ensemble,
+    rest_of_ensemble,
 )
-from reports.plots.growth import plot_error_growth
+from reports.plots.growth import error_growth, plot_error_growth
 from reports.plots.history import plot_history
-from reports.plots.limits import limits_figure, plot_failure_modes
-from reports.plots.over_time import Quantity, angular_momentum_length, height, plot_over_time, quantities, tilt
-from reports.plots.spins import plot_polhode
-from reports.plots.style import FAINT, INK
-from reports.plots.tradeoff import plot_tradeoff
+from reports.plots.limits import failure_modes, plot_failure_modes
+from reports.plots.over_time import Quantity, angular_momentum_length, height, over_time, plot_over_time, quantities, tilt
+from reports.plots.spins import plot_polhode, polhode
+from reports.plots.tradeoff import error_over_cost, plot_tradeoff
 
 __all__ = [
-    "FAINT",
-    "INK",
+    "Chart",
+    "Line",
     "Quantity",
     "angular_momentum_length",
-    "bounce_figure",
-    "convergence_figure",
-    "ensemble_figure",
-    "flight_figure",
+    "angular_momentum_of_ensemble",
+    "bounce_ladder",
+    "draw",
+    "energy_of_ensemble",
+    "error_growth",
+    "error_over_cost",
+    "error_over_dt",
+    "failure_modes",
+    "figure_of",
     "height",
-    "history_figure",
-    "limits_figure",
+    "over_time",
     "plot_angular_momentum_of_ensemble",
     "plot_bounce_ladder",
     "plot_energy_of_ensemble",
@@ -47,8 +49,8 @@ __all__ = [
     "plot_polhode",
     "plot_rest_of_ensemble",
     "plot_tradeoff",
+    "polhode",
     "quantities",
+    "rest_of_ensemble",
     "tilt",
-    "time_figure",
-    "tradeoff_figure",
 ]

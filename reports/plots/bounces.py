@@ -6,7 +6,9 @@ import numpy as np
 
 from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison
 from comparisons.results.results import Results
-from reports.plots.style import Array, at_one_step, exact_style, label_powers, step_of
+from reports.plots.chart import Chart, Line, draw
+from reports.plots.colours import EXACT
+from reports.plots.style import Array, at_one_step, step_of
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import apex
 
@@ -14,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
-    """Draw the apex after each bounce relative to the drop height, logarithmic: engines at the finest step, and the exact e²ᵏ as stairs.
+def bounce_ladder(results: Results, scene_name: str) -> Chart:
+    """The apex after each bounce relative to the drop height, logarithmic: engines at the finest step, and the exact e²ᵏ.
 
     The flights of an engine lie between the steps in which the floor changes its velocity. The first flight shorter than 16 steps ends the
     ladder.
@@ -23,7 +25,6 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
     Args:
         results: The run.
         scene_name: One of its scenes; its exact solution must have an impact.
-        axes: The axes to draw into.
 
     Raises:
         DropspinError: The exact solution of the scene has no impact, or there is no exact solution.
@@ -33,17 +34,20 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
     if truth is None or not truth.events or not scene.starts_above_floor:
         raise DropspinError(f"{scene_name}: the exact solution has no bounces; choose a scene that has some, such as drop-ball.")
     exact, lasting = _exact_apexes(scene, truth, SHORTEST_FLIGHT * step_of(results.trajectories, scene_name, min))
-    shown = [lasting]
-    for motion, style in at_one_step(results, results.trajectories, scene_name, min, least_marker=4.0):
+    lines = []
+    for motion, style in at_one_step(results, results.trajectories, scene_name, min):
         heights = apexes(scene, motion) / exact[0]
-        axes.semilogy(range(len(heights)), heights, linestyle="none", **style)
-        shown.append(len(heights))
-    stairs = exact[: max(shown)] / exact[0]
-    axes.step(range(len(stairs)), stairs, where="mid", **exact_style())
-    axes.set_xticks(np.arange(0, max(shown), 1 + max(shown) // 8))
-    label_powers(axes, "y")
-    axes.set_xlabel("bounce")
-    axes.set_ylabel("apex / drop height")
+        lines.append(Line(x=np.arange(len(heights), dtype=float), y=heights, **style | {"width": 0.0}))
+    shown = max([lasting, *(len(line.x) for line in lines)])
+    stairs = exact[:shown] / exact[0]
+    lines.append(Line(EXACT, np.arange(len(stairs), dtype=float), stairs, width=1.0, dashes="dashed"))
+    ticks = [(float(bounce), str(bounce)) for bounce in range(0, shown, 1 + shown // 8)]
+    return Chart("bounce", "apex / drop height", lines, y_log=True, ticks=ticks)
+
+
+def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw `bounce_ladder` into axes."""
+    draw(bounce_ladder(results, scene_name), axes)
 
 
 @np.errstate(all="ignore")  # an engine may return 1e300

@@ -1,65 +1,75 @@
 """Errors over the time step."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from comparisons.measuring.metrics import METRICS
+from comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
 from comparisons.results.results import Results
-from reports.plots.colours import engine_colours, engine_markers
-from reports.plots.style import ROUNDING, Array, ink, label_powers, metric_label, thinner
+from reports.plots.chart import Chart, Line, draw
+from reports.plots.colours import engine_styles
+from reports.plots.style import Array, metric_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+FINER = 0.25
+"""Finest step of the fits and place of the asymptotic errors, relative to the finest time step."""
 
-def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
-    """Draw the absolute value of an error over the time step, logarithmic.
+
+def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
+    """The absolute value of an error over the time step, logarithmic.
 
     A dotted line has order 1, dashed lines are the fits that the order and the asymptotic error come from, crosses are predicted errors.
+    Bars at the left end are the 95 % intervals of asymptotic errors that exclude 0.
 
     Args:
         results: The run.
         scene_name: One of its scenes.
         metric: One of its metrics.
-        axes: The axes to draw into.
     """
-    colours, markers = engine_colours(results.engines), engine_markers(results.engines)
-    frame = results.measurements
-    mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric)]
-    largest, is_labelled = 0.0, False
-    for number, engine in enumerate(results.engines):
-        rows = mine[(mine["engine"] == engine) & mine["value"].notna()].sort_values("dt")
-        sizes = np.maximum(rows["value"].abs().to_numpy(), ROUNDING)
-        largest = max([largest, *sizes])
-        style: Any = {"marker": markers[engine], "markerfacecolor": "none", "linewidth": 1.5, "color": colours[engine]}
-        axes.loglog(rows["dt"], sizes, markersize=thinner(8.0, 4.0, number, len(results.engines)), label=engine, **style)
-        predicted = results.table[(results.table["kind"] == "prediction") & (results.table["engine"] == engine)]
-        predicted = predicted[(predicted["scene"] == scene_name) & (predicted["metric"] == metric) & (predicted["value"].abs() > ROUNDING)]
-        if not predicted.empty:
-            label = None if is_labelled else "predicted"
-            is_labelled = True
-            axes.loglog(predicted["dt"], predicted["value"].abs(), color=ink(), linestyle="none", marker="x", markersize=5.0, label=label)
-        _draw_fit(results, scene_name, metric, engine, rows["dt"].to_numpy(), rows["value"].to_numpy(), axes)
-    dts = np.sort(mine["dt"].unique())
+    frame = results.table[(results.table["scene"] == scene_name) & (results.table["metric"] == metric)]
+    values = frame[frame["kind"].isin(["truth", "invariant"])]
+    lines, largest = [], 0.0
+    for engine, (colour, marker) in engine_styles(results.engines).items():
+        mine = frame[frame["engine"] == engine]
+        rows = values[(values["engine"] == engine) & values["value"].notna()].sort_values("dt")
+        dts, errors = rows["dt"].to_numpy(), rows["value"].to_numpy()
+        largest = max(largest, np.abs(errors).max(initial=0.0))
+        lines.append(Line(engine, dts, np.abs(errors), colour, marker=marker))
+        predicted = mine[(mine["kind"] == "prediction") & (mine["value"] != 0.0)]
+        if len(predicted):
+            lines.append(Line("predicted", predicted["dt"].to_numpy(), predicted["value"].abs().to_numpy(), width=0.0, marker="x"))
+        order, asymptotic = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))
+        m = 0.0
+        if len(asymptotic) and asymptotic["cause"].iloc[0] in ("model", "setting"):
+            m = float(asymptotic["value"].iloc[0])
+            ends = sorted(abs(float(asymptotic[side].iloc[0])) for side in ("lower", "upper"))
+            lines.append(Line(engine, np.full(2, FINER * dts.min()), np.array(ends), colour, width=4.0))
+        if len(order) and len(asymptotic):
+            lines.append(_fit(engine, dts, errors, float(order["value"].iloc[0]), m, colour))
+    dts = np.sort(values["dt"].unique())
     if len(dts) > 1 and largest > 0.0:
         # Above the data, so that it hides no line.
-        axes.loglog(dts, 2.0 * largest * dts / dts[-1], color=ink(), linewidth=1.0, linestyle=":", label="order 1")
-    axes.set_xticks(dts, [f"{1e3 * dt:g}" for dt in dts])
-    axes.minorticks_off()
-    label_powers(axes, "y")
-    axes.set_xlabel("time step [ms]")
-    axes.set_ylabel(metric_label(metric))
+        lines.append(Line("order 1", dts, 2.0 * largest * dts / dts[-1], width=1.0, dashes="dotted"))
+    return Chart(
+        "time step [ms]",
+        metric_label(metric),
+        lines,
+        x_log=True,
+        y_log=True,
+        ticks=[(float(dt), f"{1e3 * dt:g}") for dt in dts],
+        rounding=TRUTH_ACCURACY * scale(results.scenes[scene_name], METRICS[metric].unit),
+    )
 
 
-def _draw_fit(results: Results, scene_name: str, metric: str, engine: str, dts: Array, errors: Array, axes: "Axes") -> None:
-    """Draw |m + C hᵖ|, dashed, through the error at the finest step, from the coarsest step to a quarter of the finest."""
-    frame = results.table
-    mine = frame[(frame["scene"] == scene_name) & (frame["metric"] == metric) & (frame["engine"] == engine)]
-    fitted, asymptotic = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))
-    if fitted.empty or asymptotic.empty:
-        return
-    order = float(fitted["value"].iloc[0])
-    m = float(asymptotic["value"].iloc[0]) if asymptotic["cause"].iloc[0] in ("model", "setting") else 0.0
-    h = np.geomspace(dts.max(), 0.25 * dts.min(), 50)
-    curve = np.abs(m + (errors[0] - m) * (h / dts[0]) ** order)
-    axes.loglog(h, np.maximum(curve, ROUNDING), color=engine_colours(results.engines)[engine], linewidth=0.8, linestyle=(0, (4, 3)))
+def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
+    """Draw `error_over_dt` into axes."""
+    draw(error_over_dt(results, scene_name, metric), axes)
+
+
+def _fit(engine: str, dts: Array, errors: Array, order: float, m: float, colour: str) -> Line:
+    """|m + C hᵖ| through the error at the finest step, from the coarsest step to a quarter of the finest."""
+    h = np.geomspace(dts.max(), FINER * dts.min(), 50)
+    return Line(engine, h, np.abs(m + (errors[0] - m) * (h / dts[0]) ** order), colour, width=0.8, dashes="dashed")

@@ -5,42 +5,56 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from comparisons.results.results import Results
-from reports.plots.style import TIME, Array, at_one_step
+from reports.plots.chart import Chart, Line, draw
+from reports.plots.style import TIME, Array, at_one_step, stride
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
-    """Draw the energy over time: median and 10th–90th percentile of each engine."""
-    for outcome, style in at_one_step(results, results.ensembles, scene_name, min):
-        _draw_spread(outcome.t, outcome.energy, style, axes)
-    axes.set_xlabel(TIME)
-    axes.set_ylabel("energy / energy of the scene")
+def energy_of_ensemble(results: Results, scene_name: str) -> Chart:
+    """The energy over time: median and 10th–90th percentile of each engine."""
+    found = at_one_step(results, results.ensembles, scene_name, min)
+    return Chart(TIME, "energy / energy of the scene", [_spread(outcome.t, outcome.energy, style) for outcome, style in found])
 
 
-def plot_angular_momentum_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
-    """Draw the magnitude of the angular momentum L over time: median and 10th–90th percentile of each engine.
+def angular_momentum_of_ensemble(results: Results, scene_name: str) -> Chart:
+    """The magnitude of the angular momentum L over time: median and 10th–90th percentile of each engine.
 
     It is divided by r √(2 E M), with the energy E of the scene and the size r of the body: the angular momentum of a ring of radius r whose
     spin has all of E. This scale is defined for starts without spin too.
     """
+    found = at_one_step(results, results.ensembles, scene_name, min)
+    return Chart(TIME, "|L| / (r √(2 E M))", [_spread(outcome.t, outcome.angular_momentum, style) for outcome, style in found])
+
+
+def rest_of_ensemble(results: Results, scene_name: str) -> Chart:
+    """The fraction of members at rest over time; those that are in motion at the end are not."""
+    duration, lines = results.scenes[scene_name].duration, []
     for outcome, style in at_one_step(results, results.ensembles, scene_name, min):
-        _draw_spread(outcome.t, outcome.angular_momentum, style, axes)
-    axes.set_xlabel(TIME)
-    axes.set_ylabel("|L| / (r √(2 E M))")
+        rested = np.sort(outcome.rest_time[outcome.rest_time < outcome.t[-1]])
+        x = np.concatenate([[0.0], rested, [duration]])
+        share = np.arange(len(rested) + 1) / len(outcome.rest_time)
+        lines.append(Line(x=x, y=np.append(share, share[-1]), **style | {"marker": ""}, is_step=True))
+    return Chart(TIME, "fraction at rest", lines, x_range=(0.0, duration))
+
+
+def plot_energy_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw `energy_of_ensemble` into axes."""
+    draw(energy_of_ensemble(results, scene_name), axes)
+
+
+def plot_angular_momentum_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw `angular_momentum_of_ensemble` into axes."""
+    draw(angular_momentum_of_ensemble(results, scene_name), axes)
 
 
 def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> None:
-    """Draw the fraction of members at rest over time."""
-    for outcome, style in at_one_step(results, results.ensembles, scene_name, min):
-        axes.ecdf(outcome.rest_time, **style)
-    axes.set_xlim(0.0, results.scenes[scene_name].duration)
-    axes.set_xlabel(TIME)
-    axes.set_ylabel("fraction at rest")
+    """Draw `rest_of_ensemble` into axes."""
+    draw(rest_of_ensemble(results, scene_name), axes)
 
 
-def _draw_spread(t: Array, values: Array, style: dict[str, Any], axes: "Axes") -> None:
-    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9], axis=0)
-    axes.fill_between(t, low, high, color=style["color"], alpha=0.15, linewidth=0.0)
-    axes.plot(t, middle, **style)
+def _spread(t: Array, values: Array, style: dict[str, Any]) -> Line:
+    every = stride(len(t))
+    low, middle, high = np.quantile(values[:, ::every], [0.1, 0.5, 0.9], axis=0)
+    return Line(x=t[::every], y=middle, low=low, high=high, **style | {"marker": ""})

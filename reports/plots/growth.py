@@ -6,16 +6,19 @@ import numpy as np
 
 from comparisons.measuring.comparison import Comparison, Unresolved
 from comparisons.measuring.errors_over_time import ERRORS
+from comparisons.measuring.metrics import METRICS
+from comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
 from comparisons.results.results import Results
-from reports.plots.style import ROUNDING, TIME, Array, at_one_step, label_powers, metric_label, stride
+from reports.plots.chart import Chart, Line, draw
+from reports.plots.style import ROUNDING, TIME, Array, at_one_step, metric_label, stride
 from scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
-    """Draw the absolute value of an error over time, logarithmic, for each engine at its finest step.
+def error_growth(results: Results, scene_name: str, metric: str) -> Chart:
+    """The absolute value of an error over time, logarithmic, for each engine at its finest step.
 
     The maximum of a line is the value of the metric for one start. Velocities are compared as in the metrics, in the inner half of each
     flight: an impact one step late is an error in time and would be a spike in energy. Lines have gaps around impacts, and end where the
@@ -25,7 +28,6 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
         results: The run.
         scene_name: One of its scenes; it must have an exact solution.
         metric: A key of `comparisons.measuring.errors_over_time.ERRORS`, such as `orientation_error`.
-        axes: The axes to draw into.
 
     Raises:
         DropspinError: The scene has no exact solution.
@@ -37,11 +39,16 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
         raise DropspinError(f"{scene_name} has no exact solution to compare with; choose a scene that has one, see dropspin list.")
     if metric not in ERRORS:
         raise UnknownName("metric over time", metric, list(ERRORS))
+    lines = []
     for motion, style in at_one_step(results, results.trajectories, scene_name, min):
-        axes.semilogy(*_sizes(scene, motion, truth, metric), **style)
-    label_powers(axes, "y")
-    axes.set_xlabel(TIME)
-    axes.set_ylabel(metric_label(metric))
+        t, sizes = _sizes(scene, motion, truth, metric)
+        lines.append(Line(x=t, y=sizes, **style | {"marker": ""}))
+    return Chart(TIME, metric_label(metric), lines, y_log=True, rounding=TRUTH_ACCURACY * scale(scene, METRICS[metric].unit))
+
+
+def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
+    """Draw `error_growth` into axes."""
+    draw(error_growth(results, scene_name, metric), axes)
 
 
 @np.errstate(all="ignore")  # an engine may return 1e300

@@ -6,15 +6,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from comparisons.results.results import Results
-from reports.plots.style import TIME, Array, at_one_step, exact_motion, exact_style, thinned
-from scenarios import Scenario, Trajectory, truth_for
+from reports.plots.chart import FLAT, Chart, Line, draw
+from reports.plots.colours import EXACT
+from reports.plots.style import MOST_POINTS, TIME, Array, at_one_step, stride
+from scenarios import Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import angular_momentum, energy
-from scenarios.rotations import rotate
+from scenarios.rotations import angle_between_orientations, rotate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Quantity = Callable[[Scenario, Trajectory], Array]
+
+RESOLVED, MOST_MISSED = 0.05, 0.1
+"""Straight lines between the points that are drawn miss a curve where they are off by this share of its range; a curve of which they miss a
+tenth is not resolved. An impact is missed at one point alone."""
+POINTS_A_TURN = 32
+MOST_SAMPLES = 200_000
 
 
 def height(scene: Scenario, motion: Trajectory) -> Array:
@@ -49,23 +57,59 @@ def quantities(scene: Scenario) -> dict[str, Quantity]:
     return {LABELS[quantity]: quantity for quantity in shown}
 
 
-def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: "Axes") -> None:
-    """Draw a quantity over time: each engine at the coarsest time step, where engines differ most, and the exact solution.
+@np.errstate(all="ignore")  # an engine may return 1e300
+def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
+    """A quantity over time: each engine at the coarsest time step, where engines differ most, and the exact solution.
+
+    A curve that oscillates too fast to be drawn is an envelope: the least and the largest value around each point.
 
     Args:
         results: The run.
         scene_name: One of its scenes.
         quantity: A function of a scene and a motion, shape (n,).
-        axes: The axes to draw into.
     """
     scene = results.scenes[scene_name]
     truth = truth_for(scene)
+    lines, times = [], np.linspace(0.0, scene.duration, MOST_POINTS)
     for motion, style in at_one_step(results, results.trajectories, scene_name, max):
-        shown = thinned(motion)
-        axes.plot(shown.t, quantity(scene, shown), **style)
+        times = motion.t[:: stride(len(motion))]
+        lines.append(_drawn(Line(x=motion.t, y=quantity(scene, motion), **style | {"marker": ""}), times))
     if truth is not None:
-        exact = exact_motion(scene, truth)
-        axes.plot(exact.t, quantity(scene, exact), **exact_style())
-    axes.set_xlabel(TIME)
-    axes.set_ylabel(LABELS.get(quantity, ""))
-    axes.ticklabel_format(axis="y", useOffset=False)
+        exact = _sampled(truth, times, min(scene.duration, truth.horizon))
+        lines.append(_drawn(Line(EXACT, exact.t, quantity(scene, exact), width=1.0, dashes="dashed"), times))
+    envelopes = any(line.is_fill for line in lines)
+    remark = "Oscillates faster than can be drawn: the bands are the least and the largest values." if envelopes else ""
+    comparable = truth is not None and len(lines) > 1 and not envelopes
+    return Chart(TIME, LABELS.get(quantity, ""), lines, reference=EXACT if comparable else "", remark=remark)
+
+
+def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: "Axes") -> None:
+    """Draw `over_time` into axes."""
+    draw(over_time(results, scene_name, quantity), axes)
+
+
+def _sampled(truth: Truth, times: Array, end: float) -> Trajectory:
+    """The exact solution at these times up to its end, and so often between them that no turn is missed."""
+    coarse = truth(times[times <= end])
+    fastest = float(np.linalg.norm(coarse.angular_velocity, axis=1).max(initial=0.0))
+    turned = angle_between_orientations(coarse.orientation[:-1], coarse.orientation[1:]).max(initial=0.0)
+    if len(coarse) < 2 or (fastest * np.diff(coarse.t).max() < 1.0 and turned < 1.0):
+        return coarse
+    between = int(min(np.ceil(fastest / (2.0 * np.pi) * POINTS_A_TURN * end), MOST_SAMPLES)) // len(coarse) + 1
+    return truth(np.interp(np.arange(between * (len(coarse) - 1) + 1) / between, np.arange(len(coarse)), coarse.t))
+
+
+def _drawn(line: Line, times: Array) -> Line:
+    """A line at these times, as far as it goes; an envelope if it is not resolved there."""
+    shown = np.searchsorted(line.x, times[times <= line.x[-1] * (1.0 + 1e-12)])
+    shown = np.minimum(shown, len(line.x) - 1)
+    x, y = line.x[shown], line.y[shown]
+    finite = np.isfinite(line.y)
+    reach = float(np.ptp(line.y[finite])) if finite.any() else 0.0
+    missed = np.abs(np.interp(line.x, x, y) - line.y)[finite] > RESOLVED * reach
+    constant = reach <= FLAT * float(np.abs(line.y[finite]).max(initial=0.0))
+    if constant or not finite.any() or missed.mean() <= MOST_MISSED:
+        return Line(line.label, x, y, line.colour, line.width, line.dashes)
+    parts = np.split(line.y, shown[1:])
+    low, high = (np.array([reduce(part) for part in parts]) for reduce in (np.nanmin, np.nanmax))
+    return Line(line.label, x, 0.5 * (low + high), line.colour, line.width, line.dashes, low=low, high=high, is_fill=True)

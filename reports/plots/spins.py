@@ -8,14 +8,19 @@ Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37.
 """
 
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from comparisons.results.results import Results
-from reports.plots.style import Array, at_one_step, exact_motion, exact_style, ink, thinned
+from reports.plots.chart import Chart, Line, draw
+from reports.plots.colours import EXACT
+from reports.plots.style import MOST_POINTS, Array, at_one_step, stride
 from scenarios import DropspinError, Scenario, Trajectory, truth_for
 from scenarios.rotations import cross, unrotate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FARTHEST = 1.6
 """A path is drawn up to this multiple of the half axes, so that the ellipsoid does not become too small to see."""
@@ -25,41 +30,82 @@ NEARLY_PARALLEL = 1e-9
 """A body whose ω and L enclose an angle with a smaller sine counts as spinning about a principal axis."""
 VIEWS = tuple(product((-40, -20, 20, 40), range(-165, 180, 30)))
 """Elevations and azimuths [degrees], none along an axis."""
-LABEL_POSITIONS, CLEARANCE = (1.35, 1.6, 1.9, 2.2), 0.12
-"""Possible positions of the name of a half axis, as multiples of it; its least distance from any path, relative to the largest extent."""
+LABEL_POSITION = 1.2
+"""Position of the name of a half axis, as a multiple of it."""
+LATITUDES, LONGITUDES = np.radians([-60.0, -30.0, 0.0, 30.0, 60.0]), np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0])
+GREY = "#8C8C8C"
 SUBSCRIPTS = "₁₂₃"
 
 
-@np.errstate(all="ignore")  # an engine may return 1e300
-def plot_polhode(results: Results, scene_name: str, axes: Any) -> None:
-    """Draw the path of the angular velocity in the body frame, on the energy ellipsoid of the start.
+def polhode(results: Results, scene_name: str) -> Chart:
+    """The path of the angular velocity in the body frame, on the energy ellipsoid of the start, seen from the side that shows most of it.
 
-    Engines are drawn at the coarsest time step, with the exact solution.
-
-    A marker shows the end of each path. Without a gyroscopic term the path is a point; with an explicit one it leaves the ellipsoid.
+    Engines are drawn at the coarsest time step, with the exact solution. A marker shows the end of each path. Without a gyroscopic term the
+    path is a point; with an explicit one it leaves the ellipsoid.
 
     Args:
         results: The run.
         scene_name: One of its scenes; it must start with a spin.
-        axes: The axes to draw into, made with `projection="3d"`.
 
     Raises:
         DropspinError: The scene starts without spin.
     """
-    scene = results.scenes[scene_name]
-    half_axes = energy_ellipsoid(scene)
+    half_axes = energy_ellipsoid(results.scenes[scene_name])
     if not half_axes.any():
         raise DropspinError(f"{scene_name} starts without spin: its polhode is a point; choose a scene with start.angular_velocity.")
-    _draw_ellipsoid(half_axes, axes)
-    paths = []
-    for motion, style in at_one_step(results, results.trajectories, scene_name, max, least_marker=5.0):
-        paths.append(_in_sight(principal_spin(scene, thinned(motion)), half_axes))
-        axes.plot(*paths[-1].T, markevery=[-1], **style)
-    truth = truth_for(scene)
+    paths = polhode_paths(results, scene_name)
+    reference = paths[-1][0] if paths else half_axes[None]
+    view = View(facing(reference, half_axes) if len(reference) > 1 else VIEWS[0], half_axes, [path for path, _ in paths])
+    lines = [Line("energy ellipsoid", *view(_wireframe(half_axes)), GREY, 0.5)]
+    for path, style in paths:
+        x, y = view(path)
+        lines.append(Line(x=x, y=y, **style | {"marker": ""}))
+        if style.get("marker"):
+            lines.append(Line(x=x[-1:], y=y[-1:], **style | {"width": 0.0}))
+    texts = [_name_of_axis(axis, view, half_axes) for axis in range(3)]
+    remark = "Half axes of the energy ellipsoid: {:.3g}, {:.3g}, {:.3g} rad/s.".format(*half_axes)
+    return Chart("", "", lines, is_map=True, texts=texts, remark=remark)
+
+
+@np.errstate(all="ignore")  # an engine may return 1e300
+def polhode_paths(results: Results, scene_name: str) -> list[tuple[Array, dict[str, Any]]]:
+    """The angular velocity along the principal axes [rad/s], shape (n, 3), of engines and the exact solution; with styles of lines."""
+    scene = results.scenes[scene_name]
+    half_axes, truth = energy_ellipsoid(scene), truth_for(scene)
+    paths = [
+        (_in_sight(principal_spin(scene, motion[:: stride(len(motion))]), half_axes), style)
+        for motion, style in at_one_step(results, results.trajectories, scene_name, max)
+    ]
     if truth is not None:
-        paths.append(principal_spin(scene, exact_motion(scene, truth)))
-        axes.plot(*paths[-1].T, **exact_style())
-    _frame(half_axes, paths, axes)
+        exact = truth(np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS))
+        paths.append((principal_spin(scene, exact), {"label": EXACT, "width": 1.0, "dashes": "dashed"}))
+    return paths
+
+
+def plot_polhode(results: Results, scene_name: str, axes: "Axes") -> None:
+    """Draw `polhode` into axes."""
+    draw(polhode(results, scene_name), axes)
+
+
+class View:
+    """A parallel projection of angular velocities [rad/s]; a flat ellipsoid is stretched.
+
+    Attributes:
+        towards: The direction towards the viewer.
+    """
+
+    def __init__(self, view: tuple[float, float], half_axes: Array, paths: list[Array]) -> None:
+        azimuth = np.radians(view[1])
+        drawn = np.vstack([half_axes, *(np.abs(path) for path in paths)]).max(axis=0)
+        self.towards = _towards(view)
+        right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+        self._screen = np.array([right, cross(self.towards[None], right[None])[0]])
+        self._stretch = np.maximum(1.0, FLATTEST * drawn.max() / drawn)
+
+    def __call__(self, points: Array) -> tuple[Array, Array]:
+        """Points, shape (n, 3), on the screen: x to the right and y upwards, shape (n,) each."""
+        x, y = self._screen @ (points * self._stretch).T
+        return x, y
 
 
 def principal_spin(scene: Scenario, motion: Trajectory) -> Array:
@@ -122,38 +168,19 @@ def _in_sight(path: Array, half_axes: Array) -> Array:
     return path[: int(np.argmax(is_far))] if is_far.any() else path
 
 
-def _draw_ellipsoid(half_axes: Array, axes: Any) -> None:
-    longitude, latitude = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), np.linspace(0.0, np.pi, 13))
-    ball = np.array([np.cos(longitude) * np.sin(latitude), np.sin(longitude) * np.sin(latitude), np.cos(latitude)])
-    axes.plot_wireframe(*(half_axes[:, None, None] * ball), color=ink(), alpha=0.15, linewidth=0.5, rstride=2, cstride=2)
+def _name_of_axis(axis: int, view: View, half_axes: Array) -> tuple[float, float, str]:
+    """Position on the screen and name of the near end of a half axis."""
+    sign = -1.0 if view.towards[axis] < 0.0 else 1.0
+    x, y = view(LABEL_POSITION * sign * half_axes[axis] * np.eye(3)[[axis]])
+    return float(x[0]), float(y[0]), f"{'−' if sign < 0.0 else ''}ω{SUBSCRIPTS[axis]}"
 
 
-def _frame(half_axes: Array, paths: list[Array], axes: Any) -> None:
-    """Set the view and the limits; label the half axes on the near side instead of axes with ticks, which would overlap."""
-    if paths and len(paths[-1]) > 1:
-        axes.view_init(*facing(paths[-1], half_axes))
-    drawn = np.vstack([half_axes, *(np.abs(path) for path in paths)]).max(axis=0)
-    towards = _towards((axes.elev, axes.azim))
-    near = np.where(towards < 0.0, -1.0, 1.0)
-    for number, tip in enumerate(np.diag(near * half_axes)):
-        position = _label_position(np.vstack(paths), tip, towards) if paths else LABEL_POSITIONS[0] * tip
-        axes.plot(*np.array([tip, 0.9 * position]).T, color=ink(), linewidth=0.8)
-        axes.text(*position, f"{'−' if near[number] < 0.0 else ''}ω{SUBSCRIPTS[number]}", ha="center", va="center")
-    axes.text2D(0.5, -0.1, "half axes {:.3g}, {:.3g}, {:.3g} rad/s".format(*half_axes), ha="center", transform=axes.transAxes)
-    axes.set(xlim=(-drawn[0], drawn[0]), ylim=(-drawn[1], drawn[1]), zlim=(-drawn[2], drawn[2]))
-    axes.set_box_aspect(np.maximum(drawn, FLATTEST * drawn.max()), zoom=1.25)
-    axes.set_axis_off()
-
-
-def _label_position(points: Array, tip: Array, towards: Array) -> Array:
-    """The first position along a half axis where its name hides none of the points in this view; the last if there is none."""
-    for multiple in LABEL_POSITIONS:
-        offsets = points - multiple * tip
-        distances = np.linalg.norm(offsets - (offsets @ towards)[:, None] * towards, axis=1)
-        if distances.min() > CLEARANCE * np.linalg.norm(points, axis=1).max():
-            break
-    position: Array = multiple * tip
-    return position
+def _wireframe(half_axes: Array) -> Array:
+    """Circles of latitude and longitude on the ellipsoid, with NaN between them, shape (n, 3)."""
+    around, gap = np.linspace(0.0, 2.0 * np.pi, 49), np.full((1, 3), np.nan)
+    circles = [np.stack([np.cos(around) * np.cos(at), np.sin(around) * np.cos(at), np.full(49, np.sin(at))], axis=1) for at in LATITUDES]
+    circles += [np.stack([np.sin(around) * np.cos(at), np.sin(around) * np.sin(at), np.cos(around)], axis=1) for at in LONGITUDES]
+    return half_axes * np.concatenate([part for circle in circles for part in (circle, gap)])
 
 
 def _towards(view: tuple[float, float]) -> Array:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.results import Results
-from reports.plots.colours import EXACT, engine_colours, engine_markers
-from scenarios import Scenario, Trajectory, Truth
+from reports.plots.colours import engine_styles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +40,7 @@ REPORT: Any = {
     "legend.frameon": False,
 }
 TIME = "time [s]"
-"""Label of every time axis; a replay finds the axes by it and marks its time there."""
+"""Label of every time axis; the replay marks its time in plots with it."""
 MOST_POINTS = 400
 ROUNDING = 1e-17
 """Value at which exact zeros are drawn on logarithmic axes."""
@@ -57,11 +56,6 @@ def ink() -> str:
     from matplotlib import rcParams
 
     return str(rcParams["text.color"])
-
-
-def thinned(motion: Trajectory) -> Trajectory:
-    """A motion at no more than `MOST_POINTS` times."""
-    return motion[:: stride(len(motion))]
 
 
 def stride(length: int) -> int:
@@ -80,29 +74,16 @@ def step_of(kept: ByStep[Kept], scene_name: str, which: Callable[..., float]) ->
 
 
 def at_one_step(
-    results: Results, kept: ByStep[Kept], scene_name: str, which: Callable[..., float], least_marker: float | None = None
+    results: Results, kept: ByStep[Kept], scene_name: str, which: Callable[..., float]
 ) -> Iterator[tuple[Kept, dict[str, Any]]]:
-    """The entry of each engine at the time step of `step_of`, and the style of its line; with markers if their least size is given."""
+    """The entry of each engine at the time step of `step_of`; and label, colour, marker and width of its line."""
     dt, count = step_of(kept, scene_name, which), len(results.engines)
-    colours, markers = engine_colours(results.engines), engine_markers(results.engines)
+    styles = engine_styles(results.engines)
     for number, engine in enumerate(results.engines):
         found = kept.get((scene_name, engine, dt))
         if found is not None:
-            style: dict[str, Any] = {"color": colours[engine], "linewidth": thinner(3.8, 1.2, number, count), "label": engine}
-            if least_marker is not None:
-                size = thinner(9.0, least_marker, number, count)
-                style |= {"marker": markers[engine], "markerfacecolor": "none", "markersize": size}
-            yield found, style
-
-
-def exact_style() -> dict[str, Any]:
-    """The line style of the exact solution: thin, dashed, in the text colour."""
-    return {"color": ink(), "linewidth": 1.0, "linestyle": (0, (3, 3)), "label": EXACT}
-
-
-def exact_motion(scene: Scenario, truth: Truth) -> Trajectory:
-    """The exact solution at `MOST_POINTS` times, up to the duration of the scene or its horizon, whichever is shorter."""
-    return truth(np.linspace(0.0, min(scene.duration, truth.horizon), MOST_POINTS))
+            colour, marker = styles[engine]
+            yield found, {"label": engine, "colour": colour, "marker": marker, "width": thinner(3.8, 1.2, number, count)}
 
 
 def metric_label(metric: str) -> str:

@@ -3,9 +3,12 @@
 from math import isfinite
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from comparisons.tradeoff.costs import BATCH
-from reports.plots.colours import engine_colours, engine_markers
-from reports.plots.style import ROUNDING, ink, label_powers, metric_label
+from reports.plots.chart import Chart, Line, draw
+from reports.plots.colours import engine_styles
+from reports.plots.style import metric_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -13,35 +16,27 @@ if TYPE_CHECKING:
     from comparisons.tradeoff.points import CostPoint, TradeOff
 
 
-def plot_tradeoff(found: "TradeOff", axes: "Axes", batch: bool = False) -> None:
-    """Draw error over cost, both logarithmic: each engine's time steps joined, and the Pareto front.
+def error_over_cost(found: "TradeOff", batch: bool = False) -> Chart:
+    """Error over cost, both logarithmic: each engine's time steps joined, and the Pareto front.
 
     Args:
         found: The trade-off.
-        axes: The axes to draw into.
-        batch: Whether to draw the cost per world in a batch, of the engines that can step batches.
+        batch: Whether the cost is that per world in a batch, of the engines that can step batches.
     """
-    front = found.batch_pareto_front if batch else found.pareto_front
 
     def cost(point: "CostPoint") -> float:
         return point.cost_per_world if batch else point.typical_cost
 
-    engines = list(dict.fromkeys(point.engine for point in found.points))
-    colours, markers = engine_colours(engines), engine_markers(engines)
-    cheapest, best = zip(*((cost(point), max(point.error, ROUNDING)) for point in front), strict=True)
-    axes.loglog(cheapest, best, color=ink(), linewidth=5.0, alpha=0.25, label="Pareto front")
-    for engine in engines:
-        mine = [point for point in found.points if point.engine == engine and isfinite(cost(point))]
-        axes.loglog(
-            [cost(point) for point in mine],
-            [max(point.error, ROUNDING) for point in mine],
-            color=colours[engine],
-            marker=markers[engine],
-            markersize=3.5,
-            linewidth=1.0,
-            label=engine,
-        )
-    label_powers(axes, "x")
-    label_powers(axes, "y")
-    axes.set_xlabel(f"time per simulated second{f', per world (batch of {BATCH})' if batch else ''} [s]")
-    axes.set_ylabel(metric_label(found.metric))
+    def line(label: str, points: "list[CostPoint]", colour: str = "", marker: str = "", width: float = 1.0) -> Line:
+        return Line(label, np.array([cost(one) for one in points]), np.array([one.error for one in points]), colour, width, marker=marker)
+
+    lines = [line("Pareto front", list(found.batch_pareto_front if batch else found.pareto_front), width=5.0)]
+    for engine, (colour, marker) in engine_styles(list(dict.fromkeys(point.engine for point in found.points))).items():
+        lines.append(line(engine, [one for one in found.points if one.engine == engine and isfinite(cost(one))], colour, marker))
+    per_world = f", per world (batch of {BATCH})" if batch else ""
+    return Chart(f"time per simulated second{per_world} [s]", metric_label(found.metric), lines, x_log=True, y_log=True)
+
+
+def plot_tradeoff(found: "TradeOff", axes: "Axes", batch: bool = False) -> None:
+    """Draw `error_over_cost` into axes."""
+    draw(error_over_cost(found, batch), axes)

@@ -1,7 +1,7 @@
-// Filters of the report: they hide elements of scenes and engines that are not selected. For printing, all details are opened.
+// Filters of the report: they hide elements of scenes and engines that are not selected, and the lines of these engines in plots.
 "use strict";
 (() => {
-  const form = document.getElementById("filters"), total = document.querySelectorAll("#scenes > section").length;
+  const form = document.getElementById("filters"), total = document.querySelectorAll("#scenes > details").length;
   const cells = [...document.querySelectorAll("#matrix td[data-status]")];
 
   const apply = () => {
@@ -15,17 +15,10 @@
       const { scene, engine } = element.dataset;
       element.classList.toggle("left-out", (scene !== undefined && !found.has(scene)) || (engine !== undefined && !engines.has(engine)));
     }
+    const unchecked = [...form.querySelectorAll("[name=engine]:not(:checked)")].map((box) => box.dataset.label);
+    document.dispatchEvent(new CustomEvent("dropspin:engines", { detail: unchecked }));
     form.elements.shown.textContent = found.size === total && total > 1 ? `all ${total} scenes` : `${found.size} of ${total} scene${total > 1 ? "s" : ""}`;
   };
-
-  let closed = [];
-  addEventListener("beforeprint", () => {
-    closed = [...document.querySelectorAll("details:not([open])")];
-    for (const details of closed) details.open = true;
-  });
-  addEventListener("afterprint", () => {
-    for (const details of closed) details.open = false;
-  });
 
   form.hidden = false;
   form.addEventListener("input", apply);

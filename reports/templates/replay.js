@@ -98,9 +98,9 @@
       this.strongest = Math.max(0, ...this.motions.flatMap((motion) => motion.strikes.map((strike) => size(strike.impulse))));
       this.time = 0;
       this.running = 0;
+      this.findPlots();
       this.build();
       this.frame();
-      this.findPlots();
       new ResizeObserver(() => this.draw()).observe(this.canvas);
       matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     }
@@ -152,29 +152,13 @@
       return { cells, element: made("tr", {}, made("th", { scope: "row" }, made("label", {}, box, " ", dot, motion.label)), ...cells) };
     }
 
-    // Find the plots over time in the same section.
+    // Plots over time in the same section set the time, and mark it.
     findPlots() {
-      const section = this.home.closest("section") ?? document.body;
-      this.lines = [];
-      for (const svg of section.querySelectorAll("svg[data-over-time]")) {
-        const panels = JSON.parse(svg.dataset.overTime);
-        for (const panel of panels) {
-          const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
-          line.setAttribute("class", "now");
-          line.setAttribute("y1", panel.top);
-          line.setAttribute("y2", panel.bottom);
-          svg.append(line);
-          this.lines.push({ line, panel });
-        }
-        svg.classList.add("clickable");
-        svg.addEventListener("click", (event) => {
-          const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-          const panel = panels.find((one) => point.x >= one.left && point.x <= one.right && point.y >= one.top && point.y <= one.bottom);
-          if (panel === undefined) return;
-          this.stop();
-          this.seek(panel.from + (point.x - panel.left) / (panel.right - panel.left) * (panel.to - panel.from));
-        });
-      }
+      this.section = this.home.closest("section") ?? document.body;
+      this.section.addEventListener("dropspin:seek", (event) => {
+        this.stop();
+        this.seek(event.detail);
+      });
     }
 
     // --- time ---
@@ -517,13 +501,7 @@
         const ended = motion.hasEnded(this.time) ? `ended at ${(motion.last * this.interval).toFixed(3)} s` : null;
         values.forEach((value, k) => { this.rows[i].cells[k].textContent = ended && k === 0 ? ended : ended || value === null ? "–" : rounded(value); });
       });
-      for (const { line, panel } of this.lines ?? []) {
-        const x = panel.left + (this.time - panel.from) / (panel.to - panel.from) * (panel.right - panel.left);
-        const isInside = x >= panel.left - 1e-6 && x <= panel.right + 1e-6;
-        line.setAttribute("x1", x);
-        line.setAttribute("x2", x);
-        line.setAttribute("visibility", isInside ? "visible" : "hidden");
-      }
+      this.section.dispatchEvent(new CustomEvent("dropspin:time", { detail: this.time }));
     }
   }
 

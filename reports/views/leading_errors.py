@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from comparisons.measuring.metrics import METRICS, leading_metric
+from comparisons.measuring.tolerances import scale
 from comparisons.results.results import Results
 from scenarios import truth_for
 
@@ -18,6 +19,7 @@ class Leading:
         unit: Unit of the errors.
         dt: Time step [s].
         sizes: By engine, the size of the error; NaN where it is undefined.
+        levels: By engine, the decade of the error relative to its scale, from 0 (1e-8 or less) to 8 (1 or more); None if undefined.
         least: The engines with the smallest error or one within 1 % of it; where errors are within rounding, all engines with such errors.
     """
 
@@ -26,12 +28,13 @@ class Leading:
     unit: str
     dt: float
     sizes: dict[str, float]
+    levels: dict[str, int | None]
     least: list[str]
 
 
-def leading_errors(results: Results) -> list[Leading]:
-    """The leading error of each scene with an exact solution."""
-    found = []
+def leading_errors(results: Results) -> dict[str, Leading]:
+    """The leading error of each scene with an exact solution, by scene."""
+    found = {}
     for name, scene in results.scenes.items():
         if truth_for(scene) is None:
             continue
@@ -46,7 +49,8 @@ def leading_errors(results: Results) -> list[Leading]:
         sizes = {engine: float(values.get(engine, math.nan)) for engine in results.engines}
         rounded = set(finest.index[finest["cause"] == "rounding"])
         least = [engine for engine, size in sizes.items() if (engine in rounded if rounded else size <= 1.01 * values.min())]
-        found.append(Leading(name, metric, METRICS[metric].unit, dt, sizes, least))
+        levels = {engine: _level(size / scale(scene, METRICS[metric].unit)) for engine, size in sizes.items()}
+        found[name] = Leading(name, metric, METRICS[metric].unit, dt, sizes, levels, least)
     return found
 
 
@@ -56,3 +60,10 @@ def step_costs(results: Results) -> dict[str, float]:
     least = timed.groupby(["scene", "dt"])["time_per_step"].transform("min")
     ratios = (timed["time_per_step"] / least).groupby(timed["engine"]).median()
     return {engine: float(ratios.get(engine, math.nan)) for engine in results.engines}
+
+
+def _level(error: float) -> int | None:
+    """The decade of a relative error, from 0 (1e-8 or less) to 8 (1 or more)."""
+    if math.isnan(error):
+        return None
+    return 0 if error <= 1e-8 else min(8, 8 + math.ceil(math.log10(error) - 1e-9))

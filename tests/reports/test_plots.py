@@ -10,11 +10,12 @@ import dropspin as ds
 from comparisons.results.measurement import as_table
 from comparisons.results.store import save
 from reports import plots
-from reports.plots.colours import EXACT
-from reports.plots.spins import VIEWS, energy_ellipsoid, facing
+from reports.plots.colours import EXACT, engine_styles
+from reports.plots.figures import ensemble_charts
+from reports.plots.spins import VIEWS, energy_ellipsoid, facing, polhode_paths
 from reports.plots.style import power
 from scenarios import Trajectory, members, truth_for
-from scenarios.mechanics import kinetic_energy
+from scenarios.mechanics import energy, kinetic_energy
 from scenarios.rotations import about, multiply, rotate, unrotate
 
 DT = 1e-3
@@ -30,16 +31,20 @@ def exactly(scene, dt=DT):
     return truth_for(scene)(dt * np.arange(scene.steps(dt) + 1))
 
 
-def axes_of(projection=None):
+def axes_of():
     from matplotlib.figure import Figure
 
-    return Figure().add_subplot(projection=projection)
+    return Figure().add_subplot()
 
 
 def line(axes, label):
     """The data of the line with a label."""
-    [found] = [one for one in axes.get_lines() if one.get_label() == label]
-    return found.get_data_3d() if hasattr(found, "get_data_3d") else found.get_data()
+    return next(one.get_data() for one in axes.get_lines() if one.get_label() == label)
+
+
+def spins_of(results, name):
+    """The paths of a polhode, shape (3, n), by label."""
+    return {style["label"]: path.T for path, style in polhode_paths(results, name)}
 
 
 @pytest.mark.parametrize(("name", "e", "drop"), [("drop-ball", 0.5, 1.0), ("drop-ball-lively", None, None), ("bounce-95", 0.95, 1.0)])
@@ -82,11 +87,10 @@ def test_bounce_ladder_without_a_bounce_has_the_drop_only():
 def test_exact_polhode_lies_on_both_ellipsoids(name):
     """2T = Σ I ω² and L² = Σ I² ω² at every point to 1e-12, with the principal moments of the scene."""
     scene = ds.load(name)
-    axes = axes_of("3d")
-    plots.plot_polhode(made(scene, exactly(scene, 1e-2), 1e-2), name, axes)
+    found = spins_of(made(scene, exactly(scene, 1e-2), 1e-2), name)
     moments, start = np.array(scene.body.inertia), np.array(scene.start.angular_velocity)
     for label in (EXACT, "made"):
-        spins = np.array(line(axes, label))
+        spins = found[label]
         assert spins.shape[1] > 100
         np.testing.assert_allclose(moments @ spins**2, moments @ start**2, rtol=1e-12)
         np.testing.assert_allclose(moments**2 @ spins**2, moments**2 @ start**2, rtol=1e-12)
@@ -96,9 +100,8 @@ def test_polhode_shows_a_missing_and_an_explicit_gyroscopic_term():
     """The path of Wang's method is a point, explicit Euler leaves the ellipsoid, the exact rotor stays on it."""
     scene, engines = ds.load("spin-asymmetric"), ["document", "document[rotation=gyroscopic]", "document[rotation=exact]"]
     results = ds.run(scene, engines, dt=0.1)
-    axes = axes_of("3d")
-    plots.plot_polhode(results, scene.name, axes)
-    still, euler, exact = (np.array(line(axes, engine)) for engine in engines)
+    found = spins_of(results, scene.name)
+    still, euler, exact = (found[engine] for engine in engines)
     start, moments = np.array(scene.start.angular_velocity)[:, None], np.array(scene.body.inertia)
     np.testing.assert_allclose(still, np.broadcast_to(start, still.shape), atol=1e-13)
     growth = moments @ euler**2 / (moments @ start**2)
@@ -115,9 +118,7 @@ def test_polhode_in_principal_axes():
         {"name": "turned", "duration": 5.0, "body": {"shape": "vertices", "points": points.tolist(), "mass": 1.0, "inertia": "vertices"}}
     )
     spinning = turned.model_copy(update={"start": turned.start.model_copy(update={"angular_velocity": (1.0, 2.0, 0.5)})})
-    axes = axes_of("3d")
-    plots.plot_polhode(made(spinning, exactly(spinning)), "turned", axes)
-    spins = np.array(line(axes, EXACT))
+    spins = spins_of(made(spinning, exactly(spinning)), "turned")[EXACT]
     energies = (spins / energy_ellipsoid(spinning)[:, None]) ** 2
     np.testing.assert_allclose(energies.sum(axis=0), 1.0, rtol=1e-12)
     assert np.ptp(spins, axis=1).max() > 0.1
@@ -191,7 +192,7 @@ def test_plots_name_a_valid_choice_when_they_cannot_draw():
     with pytest.raises(
         ds.DropspinError, match=r"drop-ball starts without spin: its polhode is a point; choose a scene with start\.angular_velocity\."
     ):
-        plots.plot_polhode(results, "drop-ball", axes_of("3d"))
+        plots.plot_polhode(results, "drop-ball", axes_of())
     spin = ds.load("spin-principal")
     with pytest.raises(
         ds.DropspinError, match=r"spin-principal: the exact solution has no bounces; choose a scene that has some, such as drop-ball\."
@@ -223,6 +224,58 @@ def test_angular_momentum_of_an_ensemble(ensemble):
     np.testing.assert_array_equal(line(axes, "mujoco")[1], np.median(outcome.angular_momentum, axis=0))
 
 
+def test_a_member_in_motion_at_the_end_is_not_at_rest(ensemble):
+    """The fraction at rest ends at that of the members that rested before."""
+    [name] = ensemble.scenes
+    outcome = ensemble.ensembles[name, "mujoco", 4e-3]
+    still_moving = outcome.rest_time == outcome.t[-1]
+    assert still_moving.any()  # after .6 s
+    drawn = next(one for one in plots.rest_of_ensemble(ensemble, name).lines if one.label == "mujoco")
+    assert drawn.y[-1] == 1.0 - still_moving.mean()
+
+
+def test_a_spin_too_fast_to_draw_is_an_envelope():
+    """500 rad/s for 10 s: the band of the upward component is as wide as its range, and no curve of a period of 4.5 s is drawn."""
+    scene = ds.load("spin-principal-500")
+    found = {one.label: one for one in plots.over_time(made(scene, exactly(scene, 4e-3), 4e-3), scene.name, plots.tilt).lines}
+    assert all(one.is_fill for one in found.values())
+    exact = found[EXACT]
+    axis = np.array(scene.start.angular_velocity) / np.linalg.norm(scene.start.angular_velocity)
+    up = rotate(np.array(scene.start.orientation), np.array([0.0, 1.0, 0.0]))
+    across = np.linalg.norm(up - (up @ axis) * axis) * np.linalg.norm([0.0, 1.0, 0.0] - axis[1] * axis)
+    np.testing.assert_allclose(exact.high[:-1], (up @ axis) * axis[1] + across, atol=0.02 * across)
+    np.testing.assert_allclose(exact.low[:-1], (up @ axis) * axis[1] - across, atol=0.02 * across)
+
+
+def test_rounding_errors_of_a_constant_are_not_magnified():
+    """The energy of a free spin is constant: the axis reaches a tenth of its value up and down."""
+    scene = ds.load("spin-principal")
+    chart = plots.over_time(made(scene, exactly(scene)), scene.name, energy)
+    assert chart.is_flat
+    axes = axes_of()
+    plots.draw(chart, axes)
+    low, high = axes.get_ylim()
+    assert high - low == pytest.approx(0.2 * chart.lines[0].y[0], rel=1e-6)
+
+
+def test_impacts_are_drawn_as_lines_and_not_as_envelopes():
+    scene = ds.load("drop-ball")
+    chart = plots.over_time(made(scene, exactly(scene)), scene.name, energy)
+    assert not any(one.is_fill for one in chart.lines)
+
+
+@pytest.mark.parametrize("count", [3, 9, 20, 40])
+def test_engines_have_colours_and_markers_of_their_own(count):
+    """Up to 40 engines differ in the pair, up to 8 besides the built-in ones in the colour; another set gives an engine the same style."""
+    labels = [f"document[rotation={number}]" for number in range(count - 1)]
+    styles = engine_styles(["mujoco", *labels])
+    assert len(set(styles.values())) == count
+    if count <= 9:
+        assert len({colour for colour, _ in styles.values()}) == count
+    assert engine_styles(["mujoco"])["mujoco"] == engine_styles(["pybullet", "mujoco"])["mujoco"] == styles["mujoco"]
+    assert engine_styles([labels[0]])[labels[0]] == engine_styles(["mujoco", labels[0]])[labels[0]]
+
+
 def test_ensembles_are_saved_and_drawn_in_three_panels(ensemble, tmp_path):
     [name] = ensemble.scenes
     save(ensemble, tmp_path)
@@ -231,7 +284,7 @@ def test_ensembles_are_saved_and_drawn_in_three_panels(ensemble, tmp_path):
     for key, outcome in loaded.ensembles.items():
         for part in vars(outcome):
             np.testing.assert_array_equal(getattr(outcome, part), getattr(ensemble.ensembles[key], part))
-    assert len(plots.ensemble_figure(loaded, name).axes) == 3
+    assert len(plots.figure_of(ensemble_charts(loaded, name)).axes) == 3
 
 
 def test_powers_of_ten_are_plain_text():
@@ -241,16 +294,16 @@ def test_powers_of_ten_are_plain_text():
 @pytest.mark.parametrize("invalid", [np.nan, np.inf, 1e300])
 def test_plots_draw_a_motion_up_to_its_first_invalid_state(invalid):
     """Velocities are invalid from 0.1 s on: no warning, and the part before is drawn."""
-    for name, plot, projection in [
-        ("drop-ball", plots.plot_bounce_ladder, None),
-        ("spin-asymmetric", plots.plot_polhode, "3d"),
-        ("fall-spin", lambda results, name, axes: plots.plot_error_growth(results, name, "energy_error", axes), None),
+    for name, plot in [
+        ("drop-ball", plots.plot_bounce_ladder),
+        ("spin-asymmetric", plots.plot_polhode),
+        ("fall-spin", lambda results, name, axes: plots.plot_error_growth(results, name, "energy_error", axes)),
     ]:
         scene = ds.load(name)
         states = exactly(scene).states.copy()
         states[100:, 7:] = invalid
         motion = Trajectory.from_states(DT * np.arange(len(states)), states)
-        axes = axes_of(projection)
+        axes = axes_of()
         plot(made(scene, motion), name, axes)
         axes.figure.savefig(io.BytesIO())
         if name != "drop-ball":

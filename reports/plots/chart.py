@@ -1,0 +1,185 @@
+"""A chart as data: the lines of a plot with their labels, scales and remarks. matplotlib draws it, and so does the script of the report."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Dashes = Literal["", "dashed", "dotted"]
+DASHES: dict[Dashes, Any] = {"": "-", "dashed": (0, (3, 3)), "dotted": ":"}
+MARKER = 5.0  # points
+FLAT = 1e-9
+"""Values that vary by less than this share of the largest are constant: the axis shows them as such, not their rounding errors."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a chart.
+
+    Attributes:
+        label: Label in the legend; lines with the same label are shown and hidden together.
+        x: Where the values are, shape (n,).
+        y: The values, shape (n,); NaN is a gap.
+        colour: A colour; empty for the colour of the text.
+        width: Width [points]; 0 for markers alone.
+        dashes: How the line is broken.
+        marker: A marker of matplotlib, or none.
+        low, high: A band around the values, shape (n,) each.
+        is_step: Whether a value holds until the next one.
+        is_fill: Whether only the band is drawn: an envelope.
+    """
+
+    label: str
+    x: Array
+    y: Array
+    colour: str = ""
+    width: float = 1.5
+    dashes: Dashes = ""
+    marker: str = ""
+    low: Array | None = None
+    high: Array | None = None
+    is_step: bool = False
+    is_fill: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A plot as data.
+
+    Attributes:
+        x_label, y_label: Labels of the axes, with units.
+        lines: The lines, in the order they are drawn.
+        x_log, y_log: Whether an axis is logarithmic.
+        ticks: Positions and texts of the ticks of the x axis; empty for automatic ones.
+        reference: Label of the line that others may be subtracted from; empty if there is none at the same times.
+        rounding: Values below this are rounding errors.
+        remark: A sentence below the plot.
+        x_range: The ends of the x axis; None for those of the data.
+        rows: Texts of the rows, where y is the number of a row, the first on top; empty for a scale.
+        is_map: Whether both axes have the same scale, and no ticks.
+        texts: Texts with their positions x and y.
+    """
+
+    x_label: str
+    y_label: str
+    lines: Sequence[Line]
+    x_log: bool = False
+    y_log: bool = False
+    ticks: Sequence[tuple[float, str]] = ()
+    reference: str = ""
+    rounding: float = 0.0
+    remark: str = ""
+    x_range: tuple[float, float] | None = None
+    rows: Sequence[str] = ()
+    is_map: bool = False
+    texts: Sequence[tuple[float, float, str]] = ()
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether all values are one, up to rounding."""
+        drawn = [values[np.isfinite(values)] for line in self.lines for values in (line.y, line.low, line.high) if values is not None]
+        values = np.concatenate([np.empty(0), *drawn])
+        return (
+            not (self.y_log or self.rows or self.is_map) and len(values) > 0 and float(np.ptp(values)) <= FLAT * float(np.abs(values).max())
+        )
+
+
+def draw(chart: Chart, axes: "Axes") -> None:
+    """Draw a chart with matplotlib."""
+    axes.set(xscale="log" if chart.x_log else "linear", yscale="log" if chart.y_log else "linear")
+    for line in chart.lines:
+        _draw_line(chart, line, axes)
+    if chart.is_flat:
+        low, high = axes.get_ylim()
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.1 * abs(middle) - ROUNDING, middle + 0.1 * abs(middle) + ROUNDING)
+    if chart.ticks:
+        axes.set_xticks(*zip(*chart.ticks, strict=True))
+        axes.minorticks_off()
+    elif chart.x_log:
+        label_powers(axes, "x")
+    if chart.y_log:
+        label_powers(axes, "y")
+    elif chart.rows:
+        axes.set_yticks(range(len(chart.rows)), [_in_lines(row) for row in chart.rows], fontsize=7)
+        axes.set_ylim(len(chart.rows) - 0.5, -0.5)
+        axes.grid(visible=False)
+    else:
+        axes.ticklabel_format(axis="y", useOffset=False)
+    if chart.is_map:
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        for x, y, text in chart.texts:
+            axes.text(x, y, text, ha="center", va="center")
+    if chart.x_range is not None:
+        axes.set_xlim(*chart.x_range)
+    axes.set_xlabel(chart.x_label)
+    axes.set_ylabel(chart.y_label)
+
+
+def _draw_line(chart: Chart, line: Line, axes: "Axes") -> None:
+    colour = line.colour or ink()
+    if line.low is not None and line.high is not None:
+        label = line.label if line.is_fill else None
+        axes.fill_between(line.x, line.low, line.high, color=colour, linewidth=0.0, alpha=0.3 if line.is_fill else 0.15, label=label)
+    if line.is_fill:
+        return
+    y = np.maximum(line.y, ROUNDING) if chart.y_log else line.y
+    style: dict[str, Any] = {"linestyle": DASHES[line.dashes] if line.width else "none", "linewidth": line.width, "color": colour}
+    if line.marker:
+        style |= {"marker": line.marker, "markerfacecolor": "none", "markersize": MARKER}
+    if line.is_step:
+        style["drawstyle"] = "steps-post"
+    if chart.rows:
+        style["solid_capstyle"] = "butt"
+    axes.plot(line.x, y, label=line.label, **style)
+
+
+def _in_lines(label: str) -> str:
+    """The label of an engine, two options per line."""
+    name, _, listed = label.partition("[")
+    options = listed.removesuffix("]").split(",")
+    lines = [",".join(options[first : first + 2]) for first in range(0, len(options), 2)]
+    return name if not listed else f"{name}[" + ",\n".join(lines) + "]"
+
+
+def figure_of(charts: Iterable[Chart], title: str = "") -> "Figure":
+    """A figure with a panel for each chart, at most three in a row, and one legend."""
+    charts = list(charts)
+    with panels(len(charts), 3, (3.7, 2.9)) as (figure, axes):
+        for one, chart in zip(axes, charts, strict=True):
+            draw(chart, one)
+        axes[0].set_title(title)
+        add_legend(figure, axes)
+    return figure
+
+
+@contextmanager
+def panels(count: int, across: int, size: tuple[float, float]) -> "Iterator[tuple[Figure, list[Axes]]]":
+    """A figure in the style of the report with `count` panels of this size [inches], at most `across` in a row."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    across = min(count, across)
+    down = -(-count // across)
+    with rc_context(REPORT):
+        figure = Figure(figsize=(size[0] * across, size[1] * down), layout=ConstrainedLayoutEngine(w_pad=0.12))
+        yield figure, [figure.add_subplot(down, across, place) for place in range(1, count + 1)]
+
+
+def add_legend(figure: "Figure", axes: "Sequence[Axes]") -> None:
+    """Add one legend of all labels in a figure's axes."""
+    named: dict[str, Any] = {}
+    for one in axes:
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=min(len(named), 5), fontsize=9)

@@ -1,0 +1,85 @@
+"""A chart as JSON for the script of the report, which draws it."""
+
+import base64
+from typing import Any
+
+import numpy as np
+
+from reports.plots.chart import Chart, Line
+from reports.plots.style import Array
+
+DIGITS = 6
+"""Of positions along an axis."""
+
+
+def chart_data(chart: Chart) -> dict[str, Any]:
+    """The data of a chart, ready for JSON.
+
+    Values are float32. Those at the same times as the reference line are stored as differences from it, so that these keep seven digits.
+    """
+    reference = next((line for line in chart.lines if chart.reference and line.label == chart.reference), None)
+    xs: list[Array] = []
+    lines = [_line(line, reference, xs) for line in chart.lines if len(line.x)]
+    content = {
+        "xLabel": chart.x_label,
+        "yLabel": chart.y_label,
+        "xLog": chart.x_log,
+        "yLog": chart.y_log,
+        "flat": chart.is_flat,
+        "map": chart.is_map,
+        "reference": chart.reference,
+        "rounding": chart.rounding,
+        "remark": chart.remark,
+        "ticks": chart.ticks,
+        "rows": chart.rows,
+        "texts": chart.texts,
+        "xRange": chart.x_range,
+        "x": [_positions(x) for x in xs],
+        "lines": lines,
+    }
+    return {key: value for key, value in content.items() if value not in ("", 0.0, False, None) and value not in ((), [])}
+
+
+def _line(line: Line, reference: Line | None, xs: list[Array]) -> dict[str, Any]:
+    number = next((number for number, x in enumerate(xs) if np.array_equal(x, line.x)), len(xs))
+    if number == len(xs):
+        xs.append(line.x)
+    common = 0 if reference is None or line is reference else int(np.sum(_at_the_same(line.x, reference.x)))
+    y = line.y.copy()
+    if reference is not None and common:
+        y[:common] -= reference.y[:common]
+    content = {
+        "label": line.label,
+        "x": number,
+        "y": None if line.is_fill else _packed(y),
+        "common": common,
+        "colour": line.colour,
+        "width": line.width,
+        "dashes": line.dashes,
+        "marker": line.marker,
+        "low": None if line.low is None else _packed(line.low),
+        "high": None if line.high is None else _packed(line.high),
+        "step": line.is_step,
+    }
+    return {key: value for key, value in content.items() if key == "x" or value not in ("", 0, 0.0, False, None)}
+
+
+def _at_the_same(x: Array, reference: Array) -> Array:
+    """Whether the first positions are those of the reference, up to the first that is not, shape (n,)."""
+    count = min(len(x), len(reference))
+    same = np.isclose(x[:count], reference[:count], rtol=1e-12, atol=0.0)
+    found: Array = np.logical_and.accumulate(same).astype(float)
+    return found
+
+
+def _positions(x: Array) -> Any:
+    """Positions along an axis: first, distance and number if they are evenly spaced, else rounded."""
+    if len(x) > 2 and np.allclose(np.diff(x), x[1] - x[0], rtol=1e-6, atol=0.0):
+        return {"first": float(x[0]), "step": float((x[-1] - x[0]) / (len(x) - 1)), "count": len(x)}
+    return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in x]
+
+
+@np.errstate(over="ignore")  # an engine may return 1e300
+def _packed(values: Array) -> str:
+    """Values as float32 in base 64; NaN and infinity are gaps."""
+    return base64.b64encode(np.where(np.isfinite(values), values, np.nan).astype("<f4").tobytes()).decode()

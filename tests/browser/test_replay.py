@@ -165,13 +165,13 @@ def test_marked_face_has_the_attitude_of_the_run(replay, results):
 
 
 def test_fast_spin_is_played_slowly_and_faster_play_is_announced(replay):
-    """500 rad/s: at a fiftieth a turn takes 2π 60 50 / 500 = 38 pictures, at real time less than one."""
+    """500 rad/s: at a fiftieth a turn takes 2π 60 50 / 500 = 38 frames, at real time less than one."""
     shown = replay("spin-principal-500")
     speed, note = shown.home.get_by_label("speed"), shown.home.locator("p[role=status]")
     assert speed.input_value() == "0.02"
-    assert note.inner_text() == "The body turns 80 times a second; at speed 1/50 a turn takes 38 pictures."
+    assert note.inner_text() == "The body turns 80 times a second; at speed 1/50 a turn takes 38 frames of a 60 Hz screen."
     speed.select_option("1")
-    assert "too few to see it" in note.inner_text()
+    assert "too few to show it" in note.inner_text()
     slow = replay("drop-box-anyhow")
     assert not slow.home.locator("p[role=status]").is_visible()
 

@@ -3,7 +3,7 @@
   const SHORTEST_SHOW = 4;     // seconds that a motion lasts at least at the speed chosen first, if a speed is slow enough
   const FRAME_RATE = 60;       // of a usual screen, per second
   const FRAMES_PER_TURN = 20;  // fewer do not show in which direction a body turns
-  const HINT = "Drag: turn. Right-drag, Shift-drag: move. Wheel after a click: zoom. Keys: arrows, Shift-arrows, + −, 0 reset, Space play, , . frame, P N impact.";
+  const HINT = "Drag: turn. Right-drag, Shift-drag: move. Wheel after a click: zoom. Keys: arrows, Shift-arrows, + −, 0 reset, Space play, comma/period frame, P/N impact.";
 
   const made = (tag, attributes = {}, ...children) => {
     const element = document.createElement(tag);
@@ -37,8 +37,8 @@
   const spinNote = (spin, speed) => {
     if (framesPerTurn(spin, Math.max(1, speed)) >= FRAMES_PER_TURN) return "";
     const frames = framesPerTurn(spin, speed), turns = `The body turns ${rounded(spin / (2 * Math.PI))} times a second`;
-    if (frames < FRAMES_PER_TURN) return `${turns}: at speed ${inWords(speed)} a turn takes ${rounded(frames)} pictures, too few to see it. Play it slower.`;
-    return `${turns}; at speed ${inWords(speed)} a turn takes ${rounded(frames)} pictures.`;
+    if (frames < FRAMES_PER_TURN) return `${turns}: at speed ${inWords(speed)} a turn takes ${rounded(frames)} frames of a ${FRAME_RATE} Hz screen, too few to show it; choose a lower speed.`;
+    return `${turns}; at speed ${inWords(speed)} a turn takes ${rounded(frames)} frames of a ${FRAME_RATE} Hz screen.`;
   };
 
   // The table below the view: the legend, where the filled body is chosen, and the values at the time that is shown.
@@ -48,7 +48,7 @@
       this.viewer = viewer;
       this.rows = motions.map((motion) => this.row(motion, group));
       const heads = ["body (chosen: filled)", "shown", "height [m]", ...(exact ? ["position error [m]", "attitude error [rad]"] : []),
-        ...(hasFloor ? [`largest impulse of the last ${HELD} s [N s]`] : [])];
+        ...(hasFloor ? [`largest impulse in ${HELD} s [N s]`] : [])];
       const table = made("table", {}, made("thead", {}, made("tr", {}, ...heads.map((text) => made("th", { scope: "col" }, text)))),
         made("tbody", {}, ...this.rows.map((row) => row.element)));
       this.box = made("div", { class: "scroll", role: "region", "aria-label": `${scene}: positions of the bodies` }, table);
@@ -77,7 +77,7 @@
         if (motion.hasEnded(time)) texts.fill("–").splice(0, 1, `ended at ${motion.end.toFixed(3)} s`);
         cells.forEach((cell, k) => { cell.textContent = texts[k]; });
         swatch.style.borderColor = motion.colour || "currentColor";
-        swatch.style.background = motion === this.viewer.chosen ? motion.colour : "none";
+        swatch.style.background = this.viewer.isFilled(motion) ? motion.colour : "none";
       });
     }
   }

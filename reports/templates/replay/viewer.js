@@ -81,6 +81,10 @@
       this.draw();
     }
 
+    isFilled(motion) {
+      return !motion.isExact && (motion === this.chosen || this.layout.value === "beside");
+    }
+
     // --- time ---
     toggle() {
       if (this.running) this.stop();

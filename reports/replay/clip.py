@@ -25,12 +25,14 @@ FRAME_RATE = 25
 MOST_FRAMES = 5000
 MERIDIANS = 24
 """Meridians of a drawn sphere."""
+MARK = 0.72
+"""Share of white in the colour of the marked face of a body."""
 EXACT_COLOUR = "#202428"
 """Colour of the exact solution, which is drawn dashed."""
 
 
 def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Callable[[float], None] = lambda _: None) -> None:
-    """Write an animated GIF of a scene, engines overlaid, the exact solution dashed.
+    """Write an animated GIF of a scene, the first engine filled, the others as outlines, the exact solution dashed.
 
     Args:
         replay: The scene.
@@ -89,13 +91,15 @@ def _add_axes(figure: "Figure", replay: Replay) -> "Axes3D":
     if replay.scene.floor is not None:
         across, along = np.meshgrid(np.linspace(*x, 9), np.linspace(-z[1], -z[0], 9))
         axes.plot_wireframe(across, along, np.zeros_like(across), color=EXACT_COLOUR, alpha=0.2, linewidth=0.7)
-    handles = [axes.plot([], [], [], color=motion.colour or EXACT_COLOUR, label=motion.label)[0] for motion in replay.motions]
+    lines = [(motion.label, motion.colour or EXACT_COLOUR, "-" if motion.colour else "--") for motion in replay.motions]
+    handles = [axes.plot([], [], [], color=colour, linestyle=style, label=label)[0] for label, colour, style in lines]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9)
     return axes
 
 
 def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: float) -> list[Any]:
     """Draw the body and its trail at a time [s]; draw nothing if its motion has ended or it is out of sight."""
+    from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     if time > motion.frames.t[-1] + 1e-9:
@@ -103,10 +107,15 @@ def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: 
     position, orientation = motion.pose(time)
     if not replay.in_sight(position[None])[0]:
         return []
-    faces = [_y_up(position + rotate(orientation, face)) for face in _faces(shape)]
-    style: dict[str, Any] = {"facecolor": motion.colour, "alpha": 0.55, "edgecolor": motion.colour}
-    if not motion.colour:
-        style = {"facecolor": "none", "edgecolor": EXACT_COLOUR, "linestyle": "--"}
+    own = _faces(shape)
+    faces = [_y_up(position + rotate(orientation, face)) for face in own]
+    style: dict[str, Any] = {"facecolor": "none", "edgecolor": motion.colour or EXACT_COLOUR, "linestyle": "-" if motion.colour else "--"}
+    if motion is replay.motions[0] and motion.colour:
+        # As in the page, the face along the body's axis z is light.
+        marked = [] if shape.radius else [np.argmax([face[:, 2].min() for face in own])]
+        colours = np.tile(to_rgb(motion.colour), (len(own), 1))
+        colours[marked] += MARK * (1.0 - colours[marked])
+        style = {"facecolors": colours, "edgecolor": EXACT_COLOUR}
     trail = _y_up(np.vstack([motion.frames.position[motion.frames.t <= time], position]))
     [line] = axes.plot(*trail.T, color=motion.colour or EXACT_COLOUR, linewidth=0.8, alpha=0.6)
     return [axes.add_collection3d(Poly3DCollection(faces, linewidth=0.7, **style)), line]

@@ -306,7 +306,7 @@ def test_page_is_as_wide_as_the_window(opened, name, width):
 
 
 def test_data_of_replays_is_smaller_than_20_kb_a_scene(results):
-    """On average; measured MEASURED kB."""
+    """On average; measured 14 kB."""
     sizes = [len(json.dumps(as_data(replay_of(results, name)))) for name in results.scenes]
     assert np.mean(sizes) < 20e3
 

@@ -63,9 +63,12 @@
       return [...this.position.slice(0, this.row(time) + 1), this.at(time).position];
     }
 
-    // The impact with the largest impulse within the last HELD seconds.
+    // The impacts within the last HELD seconds, and the one of them with the largest impulse.
+    recent(time) {
+      return this.impacts.filter((impact) => impact.time <= time + 1e-9 && impact.time >= time - HELD - 1e-9);
+    }
+
     held(time) {
-      const recent = this.impacts.filter((impact) => impact.time <= time + 1e-9 && impact.time >= time - HELD - 1e-9);
-      return recent.reduce((best, impact) => (best && best.size >= impact.size ? best : impact), null);
+      return this.recent(time).reduce((best, impact) => (best && best.size >= impact.size ? best : impact), null);
     }
   }

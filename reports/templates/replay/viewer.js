@@ -233,9 +233,10 @@
       for (const motion of [...others, ...(motions.includes(filled) ? [filled] : [])]) {
         this.drawContacts(pen, view, motion, colour(motion));
         const held = motion.held(this.time);
-        if (!held) continue;
-        const tip = plus(held.point, held.impulse, metresPerImpulse);
-        drawArrow(pen, view.seen(held.point), view.seen(tip), colour(motion), motion === filled ? 3 : 1.5, this.colours.page, motion.isExact ? DASHES : []);
+        for (const impact of motion === filled ? motion.recent(this.time) : held ? [held] : []) {
+          const tip = plus(impact.point, impact.impulse, metresPerImpulse), width = motion === filled && impact === held ? 3 : 1.5;
+          drawArrow(pen, view.seen(impact.point), view.seen(tip), colour(motion), width, this.colours.page, motion.isExact ? DASHES : []);
+        }
       }
       drawScales(pen, view, this.colours, this.hasFloor, metresPerImpulse);
     }

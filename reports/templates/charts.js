@@ -358,7 +358,8 @@
     all.forEach((raw, i) => {
       const figure = made("div", { class: "chart" });
       home.append(figure);
-      charts.push(new Chart(figure, { ...raw, id: `${home.dataset.charts}-${i}` }, section, engines));
+      figure.chart = new Chart(figure, { ...raw, id: `${home.dataset.charts}-${i}` }, section, engines);
+      charts.push(figure.chart);
     });
     const mine = charts.slice(-all.length);
     section.addEventListener("dropspin:time", (event) => { for (const chart of mine) chart.seek(event.detail); });

@@ -29,7 +29,8 @@ class Page:
         self.tab.goto(file.as_uri())
 
     def start_replays(self):
-        """Open every viewer, the last first, since a button disappears when it is pressed."""
+        """Open every scene and its viewer, the last first, since a button disappears when it is pressed."""
+        self.tab.locator("#scenes > details").evaluate_all("all => { for (const one of all) one.open = true; }")
         for button in reversed(self.tab.get_by_role("button", name="Replay in 3D").all()):
             button.click()
         return self.tab.locator("[data-replay]").count()

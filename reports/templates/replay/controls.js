@@ -64,7 +64,16 @@
       choose.checked = motion === viewer.chosen;
       const name = motion.isExact ? made("span", { class: "exact" }, swatch, motion.label) : made("label", {}, choose, " ", swatch, motion.label);
       const cells = Array.from({ length: 1 + (viewer.exact ? 2 : 0) + (viewer.hasFloor ? 1 : 0) }, () => made("td"));
-      return { cells, swatch, element: made("tr", {}, made("th", { scope: "row" }, name), made("td", {}, show), ...cells) };
+      return { cells, swatch, show, element: made("tr", {}, made("th", { scope: "row" }, name), made("td", {}, show), ...cells) };
+    }
+
+    // Show the engines that the filter of the page leaves.
+    filter(labels) {
+      this.viewer.motions.forEach((motion, i) => {
+        const { element, show } = this.rows[i];
+        element.hidden = labels.includes(motion.label);
+        motion.shown = show.checked && !element.hidden;
+      });
     }
 
     // Values are those of the nearest state of the run: no interpolation.
@@ -79,39 +88,5 @@
         swatch.style.borderColor = motion.colour || "currentColor";
         swatch.style.background = this.viewer.isFilled(motion) ? motion.colour : "none";
       });
-    }
-  }
-
-  // The lines in the plots over time of the same section; a click into a plot goes to its time.
-  class PlotLines {
-    constructor(viewer) {
-      this.lines = [];
-      for (const svg of (viewer.home.closest("section") ?? document.body).querySelectorAll("svg[data-over-time]")) {
-        const panels = JSON.parse(svg.dataset.overTime);
-        for (const panel of panels) {
-          const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
-          line.setAttribute("class", "now");
-          line.setAttribute("y1", panel.top);
-          line.setAttribute("y2", panel.bottom);
-          svg.append(line);
-          this.lines.push({ line, panel });
-        }
-        svg.classList.add("clickable");
-        svg.addEventListener("click", (event) => {
-          const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-          const panel = panels.find((one) => point.x >= one.left && point.x <= one.right && point.y >= one.top && point.y <= one.bottom);
-          if (panel !== undefined) viewer.go(panel.from + (point.x - panel.left) / (panel.right - panel.left) * (panel.to - panel.from));
-        });
-      }
-    }
-
-    update(time) {
-      for (const { line, panel } of this.lines) {
-        const x = panel.left + (time - panel.from) / (panel.to - panel.from) * (panel.right - panel.left);
-        const isInside = x >= panel.left - 1e-6 && x <= panel.right + 1e-6;
-        line.setAttribute("x1", x);
-        line.setAttribute("x2", x);
-        line.setAttribute("visibility", isInside ? "visible" : "hidden");
-      }
     }
   }

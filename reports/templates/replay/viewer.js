@@ -21,7 +21,13 @@
       this.running = 0;
       this.camera = new Camera(data.size);
       this.build();
-      this.plotLines = new PlotLines(this);
+      // Plots of the same section set the time, and mark it.
+      this.section = home.closest("section");
+      this.section.addEventListener("dropspin:seek", (event) => this.go(event.detail));
+      document.addEventListener("dropspin:engines", (event) => {
+        this.readout.filter(event.detail);
+        this.draw();
+      });
       this.choose(this.chosen);
       this.reset();
       new ResizeObserver(() => this.draw()).observe(this.canvas);
@@ -208,7 +214,7 @@
       this.slider.setAttribute("aria-valuetext", `${this.time.toFixed(3)} s`);
       this.clock.textContent = `${this.time.toFixed(3)} s of ${this.duration.toFixed(3)}`;
       this.readout.update(this.time);
-      this.plotLines.update(this.time);
+      this.section.dispatchEvent(new CustomEvent("dropspin:time", { detail: this.time }));
     }
 
     // One body is filled; the others and the exact solution are outlines over it, in their own colours.

@@ -68,6 +68,15 @@ def angle_between_orientations(a: Array, b: Array) -> Array:
     return 2.0 * np.arctan2(length(difference[..., :3]), np.abs(difference[..., 3]))
 
 
+def rotation_vector(a: Array, b: Array) -> Array:
+    """The rotation from orientation a to b as its axis, in the world frame, times its angle of up to π [rad], shape (..., 3)."""
+    difference = multiply(b, conjugate(a))
+    difference = np.where(difference[..., 3:] < 0.0, -difference, difference)
+    sine = length(difference[..., :3])[..., None]
+    with np.errstate(invalid="ignore"):
+        return np.where(sine > 0.0, difference[..., :3] * (2.0 * np.arctan2(sine, difference[..., 3:]) / sine), 0.0)
+
+
 def angle_between_vectors(a: Array, b: Array) -> Array:
     """The angle [rad] between vectors, (..., 3)."""
     return np.arctan2(length(cross(a, b)), dot(a, b))

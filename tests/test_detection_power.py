@@ -28,6 +28,20 @@ def test_a_parameter_wrong_by_three_per_mille_is_detected(title, name, scene):
     assert failures(name, FAULT[title], 3e-3, scene)
 
 
+@pytest.mark.parametrize(
+    ("title", "name", "s", "scene", "metric"),
+    [
+        ("Coulomb coefficient", SEQUENTIAL, -3e-3, "slide-box", "position_error"),
+        ("Coulomb coefficient", SEQUENTIAL, -3e-3, "turn-box-rough", "orientation_error"),
+        ("linear damping", "pybullet", 3e-3, "fall-damped", "position_error"),
+        ("moment of inertia about y", "document", -3e-3, "drop-box-corner", "contact_momentum_error"),
+    ],
+)
+def test_a_fault_that_opposes_the_discretisation_error_is_detected(title, name, s, scene, metric):
+    """The length of the error has a minimum between two of the default time steps; its components do not."""
+    assert ("asymptotic_error", metric, "nan") in failures(name, FAULT[title], s, scene)
+
+
 @pytest.mark.parametrize("name", ["document", "mujoco", "pybullet"])
 def test_a_fault_of_size_zero_changes_no_bit(name):
     """After the start, whose quaternion an engine may report with length 1 to rounding only."""

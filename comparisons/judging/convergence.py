@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import KnownLimitation
-from comparisons.judging.error_budget import ErrorBudget, error_budget
+from comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget
 from comparisons.judging.verdicts import Cause, Judgement, Verdict, judge_asymptotic_error, with_limitations
 from comparisons.measuring.metric import Average, Metric
 from comparisons.measuring.tolerances import negligible, rounding
@@ -47,11 +47,12 @@ class Claim(NamedTuple):
 
 
 class SeriesPoint(NamedTuple):
-    """A metric at one time step: dt [s], number of steps, its average over start phases, and its tolerance."""
+    """A metric at one time step: dt [s], number of steps, its average over start phases, that of its components, and its tolerance."""
 
     dt: float
     steps: int
     average: Average
+    components: Average | None
     tolerance: float
 
 
@@ -80,6 +81,10 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
         resolutions = np.maximum(resolutions, np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
     floor = negligible(scene, metric.unit)
     found = error_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, rounded, signed=metric.signed, negligible=floor)
+    vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded)
+    if vector is not None and vector.cause == "model" and found.cause in ("discretisation", "unresolved"):
+        # The length is largest at another time than that of the components, so it may be larger than they are.
+        found = replace(vector, upper=max(vector.upper, found.upper), reason=f"{vector.reason}, in a component")
     order, limit = _judge_order(claim, metric, found), None
     if order is not None:
         order = replace(order, tolerance=_order_tolerance(found, dts, errors, np.array([point.tolerance for point in series])))
@@ -89,7 +94,8 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
         limit = Judgement(found.asymptotic_error, "measured", found.lower, found.upper, found.cause, found.reason, tolerance)
         limit = judge_asymptotic_error(scene, claim.label, float(np.min(dts)), metric, limit)
         limit = with_limitations(limit, metric.name, claim.limitations, least=max(found.lower, -found.upper))
-    is_open = found.cause == "unresolved" and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
+    is_undecided = found.cause == "unresolved" or (found.cause == "discretisation" and vector is not None and vector.cause == "unresolved")
+    is_open = is_undecided and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
     return ConvergenceStudy(found.cause, order, limit, is_open)
 
 
@@ -149,6 +155,25 @@ def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
     if metric.name == "position_error" and scene.starts_above_floor:
         errors[np.abs(errors) > DESYNCHRONISED * scene.clearance] = math.nan
     return dts, errors, resolutions, rounded
+
+
+def _budget_of_components(
+    scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint], usable: NDArray[np.bool_], rounded: Array
+) -> ErrorBudget | None:
+    """The error budget of the components, of the flight in which they are longest at the finest step; None if there are too few."""
+    kept = [
+        (point.dt, point.components, most)
+        for point, is_usable, most in zip(series, usable, rounded, strict=True)
+        if is_usable and point.components is not None
+    ]
+    if not is_sufficient([dt for dt, _, _ in kept]):
+        return None
+    flights = min(len(components.parts) for _, components, _ in kept)
+    _, finest, _ = min(kept, key=lambda one: one[0])
+    longest = int(np.argmax(np.linalg.norm(finest.parts[:flights], axis=1)))
+    errors, resolutions = (np.array([components[field][longest] for _, components, _ in kept]) for field in range(2))
+    dts, largest = (np.array([one[field] for one in kept]) for field in (0, 2))
+    return vector_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, largest, negligible(scene, metric.unit))
 
 
 def _order_tolerance(found: ErrorBudget, dts: Array, errors: Array, tolerances: Array) -> float:

@@ -15,7 +15,7 @@ The interval excludes 0 under a model error, contains 0 otherwise, and reaches u
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -89,6 +89,7 @@ def error_budget(
     *,
     signed: bool = True,
     negligible: float = 0.0,
+    judged_together: int = 1,
 ) -> ErrorBudget:
     """The asymptotic value, the order and the cause of one error.
 
@@ -100,6 +101,7 @@ def error_budget(
         rounding: The largest error that rounding alone may cause, at each step or for all.
         signed: Whether the error can be negative; one that cannot is taken for the norm of one that can.
         negligible: An asymptotic error up to this size is no model error.
+        judged_together: How many errors are judged together, each with this fraction of the risks of one (C. E. Bonferroni, 1936).
 
     Raises:
         DropspinError: The time steps or the errors are not what is described above.
@@ -118,12 +120,44 @@ def error_budget(
         return ErrorBudget("rounding", "as small as rounding at every step", value, value - reach, value + reach)
     small = np.hypot(noise, floor)
     found = extrapolate(h, e, small, claimed_order, signed=signed)
-    cause, median, lower, upper = _attributed(e, found, max(negligible, float(floor[-1])), float(noise[-1]))
+    cause, median, lower, upper = _attributed(e, found, max(negligible, float(floor[-1])), float(noise[-1]), judged_together)
     order, fitted = _fitted_order(h, e, 0.0 if cause == "discretisation" else median, small)
     if cause == "unresolved" or math.isnan(order):
         return ErrorBudget(cause, _reason(cause, e, small, order), median, lower, upper)
     orders = min(found.order_lower, order), max(found.order_upper, order)
     return ErrorBudget(cause, _reason(cause, e, small, order), median, lower, upper, order, *orders, fitted)
+
+
+def vector_budget(
+    dts: Array, components: Array, claimed_order: float | None, resolution: Array, rounding: Array, negligible: float
+) -> ErrorBudget:
+    """The budget of the length of an error vector, from its components, which have signs where the length has none.
+
+    The length is a model error if a component is one, at more than three steps: with three, kinks look like one too often. It vanishes if
+    all components do. Its interval contains the lengths of all vectors whose components are in their intervals, and 0 unless it is a
+    model error. The order is that of the component with the largest asymptotic error.
+
+    Args:
+        dts: Time steps [s], shape (n,).
+        components: At each step, shape (n, k); NaN where the step was too coarse.
+        claimed_order: As for `error_budget`, as all that follows.
+        resolution: Shape (n, k).
+        rounding: Shape (n,).
+        negligible: The same for each component.
+    """
+    found = [
+        error_budget(dts, errors, claimed_order, noise, rounding, negligible=negligible, judged_together=components.shape[1])
+        for errors, noise in zip(components.T, resolution.T, strict=True)
+    ]
+    causes = {one.cause for one in found}
+    if np.isfinite(components).all(axis=1).sum() <= FEWEST_TIME_STEPS and "model" in causes:
+        causes = {"unresolved"}
+    cause = next(cause for cause in ("model", "unresolved", "discretisation", "rounding") if cause in causes)
+    most = max(found, key=lambda one: (one.cause == cause, abs(one.asymptotic_error)))
+    nearest = math.hypot(*(max(one.lower, -one.upper, 0.0) for one in found)) if cause == "model" else 0.0
+    farthest = math.hypot(*(max(-one.lower, one.upper) for one in found))
+    length = math.hypot(*(one.asymptotic_error for one in found))
+    return replace(most, cause=cause, asymptotic_error=length, lower=nearest, upper=farthest)
 
 
 def _verify(h: Array, e: Array, signed: bool) -> None:
@@ -135,16 +169,16 @@ def _verify(h: Array, e: Array, signed: bool) -> None:
         raise DropspinError(f"an error without a sign is not negative; got {float(np.nanmin(e)):g}. Say signed=True if it has one.")
 
 
-def _attributed(e: Array, found: Posterior, floor: float, noise: float) -> tuple[Cause, float, float, float]:
+def _attributed(e: Array, found: Posterior, floor: float, noise: float, judged_together: int) -> tuple[Cause, float, float, float]:
     """The cause that the posterior of the asymptotic error implies, and its median and interval; errors coarsest first."""
     coarsest, finest = float(np.min(np.abs(e[[0, -FEWEST_TIME_STEPS]]))), abs(float(e[-1]))
     large = max(LARGEST_SHARE_OF_COARSEST * coarsest, floor)
     allowed = min(max(finest, SHARE_OF_COARSEST * coarsest, floor), large)
     above, below = found.beyond(floor)
-    median, lower, upper = found.interval()
+    median, lower, upper = found.interval(judged_together)
     if not found.has_sign:  # one part that is smaller than another does not show
         upper = max(upper, finest)
-    if max(above, below) > 1.0 - MODEL_RISK:
+    if max(above, below) > 1.0 - MODEL_RISK / judged_together:
         lower, upper = (lower, min(upper, -floor)) if found.has_sign and below > above else (max(lower, floor), upper)
         return "model", median, lower, upper
     lower, upper = min(lower, 0.0), max(upper, 0.0)

@@ -100,17 +100,21 @@ class Posterior:
         low, high = self._below(np.array([-reach, reach]))
         return float(1.0 - self.zero - high), float(low)
 
-    def interval(self) -> tuple[float, float, float]:
-        """Median, lower and upper end of m, given that it is not 0; of |m|, where m has no sign."""
+    def interval(self, judged_together: int = 1) -> tuple[float, float, float]:
+        """Median, lower and upper end of m, given that it is not 0; of |m|, where m has no sign.
+
+        Of several intervals that are judged together each is wider, so that all are right with the same probability as one.
+        """
+        credible = 1.0 - (1.0 - CREDIBLE) / judged_together
         roots = np.where(self.squares, np.sqrt(np.abs(self.centres) + 1e4 * self.widths), np.abs(self.centres) + 1e4 * self.widths)
         unit, reach = float(np.min(np.where(self.squares, np.sqrt(self.widths), self.widths))), float(np.max(roots))
-        outside, other = 0.5 * (1.0 - CREDIBLE), 1.0 - self.zero
+        outside, other = 0.5 * (1.0 - credible), 1.0 - self.zero
         low, median, high = _quantiles(self._below, (other * outside, other * 0.5, other * (1.0 - outside)), unit, reach)
         if self.has_sign:
             return median, low, high
         # A norm that extrapolates below 0 has a limit above 0, after a minimum at finer steps.
         lower = max(low, -high, 0.0)
-        wanted = other * (CREDIBLE if lower == 0.0 else 1.0 - outside)
+        wanted = other * (credible if lower == 0.0 else 1.0 - outside)
         [upper] = _quantiles(lambda x: self._below(x) - self._below(-x), (wanted,), unit, reach)
         return abs(median), lower, upper
 

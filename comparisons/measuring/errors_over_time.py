@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from comparisons.measuring.comparison import Comparison, Unresolved
 from scenarios.mechanics import energy
-from scenarios.rotations import angle_between_orientations, angle_between_vectors, length
+from scenarios.rotations import angle_between_orientations, angle_between_vectors, length, rotation_vector
 
 Array = NDArray[np.float64]
 
@@ -21,12 +21,17 @@ def energy_error(case: Comparison, synchronised: bool = True) -> Array:
 
 def angular_momentum_error(case: Comparison) -> Array:
     """Difference of angular momentum from the truth, over the truth's largest."""
+    return length(angular_momentum_difference(case))
+
+
+def angular_momentum_difference(case: Comparison) -> Array:
+    """The same as a vector in the world frame, shape (n, 3)."""
     exact = case.exact_angular_momentum
     scale = np.max(length(exact))
     if scale == 0.0:
         raise Unresolved("the angular momentum is 0 in double precision")
-    sizes: Array = length(case.angular_momentum - exact) / scale
-    return sizes
+    difference: Array = (case.angular_momentum - exact) / scale
+    return difference
 
 
 def angular_momentum_direction_error(case: Comparison) -> Array:
@@ -36,12 +41,22 @@ def angular_momentum_direction_error(case: Comparison) -> Array:
 
 def position_error(case: Comparison) -> Array:
     """Distance of the centre of mass from the truth's [m]."""
-    return length(case.compared.position - case.exact.position)
+    return length(position_difference(case))
+
+
+def position_difference(case: Comparison) -> Array:
+    """From the truth's centre of mass to the engine's [m], shape (n, 3)."""
+    return case.compared.position - case.exact.position
 
 
 def orientation_error(case: Comparison) -> Array:
     """Angle of the rotation from the truth's attitude to the engine's [rad]."""
     return angle_between_orientations(case.compared.orientation, case.exact.orientation)
+
+
+def orientation_difference(case: Comparison) -> Array:
+    """The rotation from the truth's attitude to the engine's as a vector in the world frame [rad], shape (n, 3)."""
+    return rotation_vector(case.exact.orientation, case.compared.orientation)
 
 
 @dataclass(frozen=True)

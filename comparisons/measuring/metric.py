@@ -15,6 +15,7 @@ from scenarios import Scenario, Truth
 
 Array = NDArray[np.float64]
 Measure = Callable[[Comparison], float | Array]
+Components = Callable[[Comparison], Array]
 Applies = Callable[[Scenario, Truth | None], bool]
 
 
@@ -32,6 +33,8 @@ class Metric:
         applies: Whether a scene, with its exact solution, has that.
         measure: The function from a comparison to the value, or to those of each flight; it raises `Unresolved` where the time step is too
             coarse.
+        components: Where the value is the length of a vector, the function from a comparison to that vector at the end of the inner half
+            of each flight, shape (flights, 3); else None.
         agreement: Whether two engines are compared with each other by it.
         first_flight: Whether it depends only on the first impact and the flight after it.
     """
@@ -44,6 +47,7 @@ class Metric:
     needs: str
     applies: Callable[[Scenario, Truth | None], bool]
     measure: Measure
+    components: Components | None = None
     agreement: bool = False
     first_flight: bool = False
 
@@ -53,7 +57,18 @@ class Metric:
         Raises:
             Unresolved: The time step is too coarse.
         """
-        measured = [np.atleast_1d(self.measure(case)) for case in cases]
+        return self._average(self.measure, cases)
+
+    def average_components(self, cases: Sequence[Comparison]) -> "Average | None":
+        """The average of the components over start phases, parts of shape (flights, 3); None for a metric that has none.
+
+        Raises:
+            Unresolved: The time step is too coarse.
+        """
+        return None if self.components is None else self._average(self.components, cases)
+
+    def _average(self, measure: Measure, cases: Sequence[Comparison]) -> "Average":
+        measured = [np.atleast_1d(measure(case)) for case in cases]
         flights = min(map(len, measured))
         phases = np.array([values[:flights] for values in measured])
         # Each quarter of the phases, which are evenly spread too, gives a mean.
@@ -77,7 +92,7 @@ class Metric:
 class Average(NamedTuple):
     """A metric's means over start phases, their sampling noise, and how far one phase may move them.
 
-    One for each flight, shape (flights,), or the largest and the least of each flight, shape (flights, 2).
+    One for each flight, shape (flights,), or the largest and the least of each, (flights, 2), or the components at its end, (flights, 3).
     """
 
     parts: Array

@@ -8,7 +8,7 @@ import numpy as np
 from comparisons.measuring import errors_over_time as errors
 from comparisons.measuring import requirements
 from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
-from comparisons.measuring.metric import Applies, Array, Measure, Metric
+from comparisons.measuring.metric import Applies, Array, Components, Measure, Metric
 from comparisons.measuring.motions import Motions, at_rows
 from scenarios import Scenario, Trajectory, Truth, truth_for
 from scenarios.mechanics import angular_momentum, apex, lowest_height
@@ -34,6 +34,7 @@ def _metric(
     applies: Applies,
     *,
     signed: bool = False,
+    components: Components | None = None,
     agreement: bool = False,
     first_flight: bool = False,
 ) -> Callable[[AnyMeasure], AnyMeasure]:
@@ -41,10 +42,19 @@ def _metric(
 
     def register(measure: AnyMeasure) -> AnyMeasure:
         name, definition = measure.__name__, " ".join((measure.__doc__ or "").split())
-        METRICS[name] = Metric(name, unit, kind, signed, definition, needs, applies, measure, agreement, first_flight)
+        METRICS[name] = Metric(name, unit, kind, signed, definition, needs, applies, measure, components, agreement, first_flight)
         return measure
 
     return register
+
+
+def _at_end_of_each_flight(at_each_row: Components) -> Components:
+    """Components at the last row of the inner half of each flight, shape (flights, 3).
+
+    That time is the same at every time step but for less than a step, and far from impacts, near which an error is one of time. The time
+    at which an error is largest moves with the step, and then its components do not follow a power of it.
+    """
+    return lambda case: at_each_row(case)[[rows[-1] for rows in case.flights]]
 
 
 @_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True, agreement=True)
@@ -107,12 +117,8 @@ def restitution_error(case: Comparison) -> float:
     return -separation / approach - expected
 
 
-@_metric("1", "invariant", "an exact solution with an impact", requirements.has_impact, first_flight=True)
-def contact_momentum_error(case: Comparison) -> float:
-    """Change of angular momentum about the contact point in the first impact, over M times that point's distance times the speed before.
-
-    No impulse at that point has a moment about it; gravity's impulse is subtracted.
-    """
+def _moment_in_first_impact(case: Comparison) -> Array:
+    """Change of angular momentum about the contact point in the first impact, as in `contact_momentum_error`, shape (1, 3)."""
     if case.first_contact is None:
         raise Unresolved("no impact was detected")
     before, after = case.first_contact
@@ -122,7 +128,18 @@ def contact_momentum_error(case: Comparison) -> float:
     turned = np.diff(angular_momentum(case.scene, case.motion[np.array([before, after])]), axis=0)[0]
     pushed = case.motion.velocity[after] - case.motion.velocity[before] - (after - before) * case.dt * case.scene.acceleration
     scale = mass * float(np.linalg.norm(r) * np.linalg.norm(case.motion.velocity[before]))
-    return float(np.linalg.norm(turned - np.cross(r, mass * pushed))) / scale
+    return np.array([turned - np.cross(r, mass * pushed)]) / scale
+
+
+@_metric(
+    "1", "invariant", "an exact solution with an impact", requirements.has_impact, components=_moment_in_first_impact, first_flight=True
+)
+def contact_momentum_error(case: Comparison) -> float:
+    """Change of angular momentum about the contact point in the first impact, over M times that point's distance times the speed before.
+
+    No impulse at that point has a moment about it; gravity's impulse is subtracted.
+    """
+    return float(np.linalg.norm(_moment_in_first_impact(case)))
 
 
 @_metric("1", "truth", "an exact solution that comes to rest", requirements.comes_to_rest, signed=True)
@@ -164,7 +181,14 @@ def desync_rate(case: Comparison) -> float:
     return 1.0 / case.desynchronised_from
 
 
-@_metric("1", "truth", "an exact solution with spin", requirements.spins, agreement=True)
+@_metric(
+    "1",
+    "truth",
+    "an exact solution with spin",
+    requirements.spins,
+    components=_at_end_of_each_flight(errors.angular_momentum_difference),
+    agreement=True,
+)
 def angular_momentum_error(case: Comparison) -> Array:
     """Largest difference of angular momentum from the exact solution in flight, over the largest exact value."""
     return _largest_of_each_flight(errors.angular_momentum_error(case), case)
@@ -184,13 +208,13 @@ def horizontal_momentum_error(case: Comparison) -> float:
     return float(np.max(length(sideways)) / speed)
 
 
-@_metric("m", "truth", "an exact solution", requirements.has_truth)
+@_metric("m", "truth", "an exact solution", requirements.has_truth, components=_at_end_of_each_flight(errors.position_difference))
 def position_error(case: Comparison) -> float:
     """Largest distance of the centre of mass from the exact one."""
     return float(np.max(errors.position_error(case)))
 
 
-@_metric("rad", "truth", "an exact solution", requirements.has_truth)
+@_metric("rad", "truth", "an exact solution", requirements.has_truth, components=_at_end_of_each_flight(errors.orientation_difference))
 def orientation_error(case: Comparison) -> float:
     """Largest angle of the rotation from the exact attitude to the engine's."""
     return float(np.max(errors.orientation_error(case)))

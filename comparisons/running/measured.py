@@ -20,10 +20,14 @@ from scenarios import Scenario, Trajectory, Truth
 
 
 class Measured(NamedTuple):
-    """A measurement, and the average over start phases that its value is the largest part of; None for a remark."""
+    """A measurement, the average over start phases that its value is the largest part of, and that of its components.
+
+    A remark has neither; a metric that is not the length of a vector, or is not resolved, has no components.
+    """
 
     measurement: Measurement
-    average: Average | None
+    average: Average | None = None
+    components: Average | None = None
 
 
 def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[Trajectory | None]]:
@@ -60,11 +64,12 @@ def measure(
     case = Case(scene.name, engine_run.label, dt, scene.steps(dt), engine_run.time_per_step)
     breakdown = breakdown_of(engine_run)
     if breakdown is not None:
-        return [Measured(case.remark(breakdown.verdict, breakdown.reason), None)]
+        return [Measured(case.remark(breakdown.verdict, breakdown.reason))]
     perturbed = [compare(motions, phases, exact) for motions in engine_run.perturbed]
-    rows = [Measured(case.remark("limited", one.message), None) for one in engine_run.limitations if not one.is_minor]
+    rows = [Measured(case.remark("limited", one.message)) for one in engine_run.limitations if not one.is_minor]
     for metric in metrics_for(scene, truth):
         average, judgement = _judge_metric(scene, truth, dt, engine_run.label, metric, cases)
+        components = None if np.isnan(average.value) else metric.average_components(cases)
         moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))
         sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
         allowed = tolerance(scene, metric.unit, engine_run.precision, case.steps, sampling_noise)
@@ -73,9 +78,9 @@ def measure(
             rounded = float(rounding(scene, metric.unit, engine_run.precision, np.array(case.steps)))
             judgement = with_precision(judgement, max(rounded, allowed))
         name = truth.name if metric.kind == "truth" and truth is not None else ""
-        rows.append(Measured(case.measurement(metric.kind, metric.name, metric.unit, judgement, name), average))
+        rows.append(Measured(case.measurement(metric.kind, metric.name, metric.unit, judgement, name), average, components))
     if truth is None:
-        rows.append(Measured(case.remark("no_truth", "no closed form is known for this scene"), None))
+        rows.append(Measured(case.remark("no_truth", "no closed form is known for this scene")))
     return rows
 
 

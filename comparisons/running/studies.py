@@ -46,7 +46,8 @@ def study_engine(own: StartPhase, entry: EngineEntry, claim: Claim, measured: Se
         for name, points in coarser.items():
             if name in studies and studies[name].is_open:
                 longer = study_convergence(own.scene, claim, METRICS[name], [*points, *series[name]])
-                studies[name] = _with_remark(longer, f"with {' and '.join(f'{point.dt:g}' for point in points)} s added")
+                if studies[name].cause == "unresolved" or longer.cause == "model":
+                    studies[name] = _with_remark(longer, f"with {' and '.join(f'{point.dt:g}' for point in points)} s added")
     if entry.engine is not None and entry.engine.accuracy and any(study.cause in ("model", "unresolved") for study in studies.values()):
         return _with_accuracy_options(studies, own, claim, entry.engine, dts, processes)
     return studies
@@ -94,7 +95,7 @@ def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: Engi
 def _series(measured: Sequence[Measured]) -> Mapping[str, list[SeriesPoint]]:
     """The errors at each time step, by metric."""
     series: dict[str, list[SeriesPoint]] = {}
-    for row, average in measured:
+    for row, average, components in measured:
         if average is not None and row.metric not in ARTEFACTS:
-            series.setdefault(row.metric, []).append(SeriesPoint(row.dt, row.steps, average, row.tolerance))
+            series.setdefault(row.metric, []).append(SeriesPoint(row.dt, row.steps, average, components, row.tolerance))
     return series

@@ -88,7 +88,10 @@ def series_of(
         if metric.name in JUMPING | ARTEFACTS:
             continue
         try:
-            points = [SeriesPoint(dt, scene.steps(dt), metric.average(cases), 0.0) for dt, cases in measured.items()]
+            points = [
+                SeriesPoint(dt, scene.steps(dt), metric.average(cases), metric.average_components(cases), 0.0)
+                for dt, cases in measured.items()
+            ]
             coarse, fine = (np.atleast_1d(metric.measure(limit)) for limit in limits)
         except Unresolved:
             continue

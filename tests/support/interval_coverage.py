@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.judging.error_budget import error_budget
+from comparisons.judging.error_budget import error_budget, vector_budget
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,10 @@ LARGE = 0.5
 
 
 class Series(NamedTuple):
-    """Errors at steps that halve, coarsest first; their noise, whether they have a sign, and the asymptotic error."""
+    """Errors at each step, coarsest first; their noise, whether they have a sign, and the asymptotic error.
+
+    Errors of shape (n, 3) are vectors, which are judged by their components; the asymptotic error is that of their length.
+    """
 
     errors: Array
     noise: float
@@ -126,6 +129,17 @@ def norm(rng: np.random.Generator, h: Array, least: float) -> Series:
     return Series(np.linalg.norm([part + powers(1.0)(rng, h) for part in m], axis=0), 0.0, False, abs(share))
 
 
+def vector(part: Vanishing) -> Draw:
+    """A vector with three components, each with an asymptotic error of its own, half of them all 0."""
+
+    def draw(rng: np.random.Generator, h: Array, least: float) -> Series:
+        limits, share = rng.normal(size=3), limit(rng, least)
+        components = [share * one / np.linalg.norm(limits) + part(rng, h) for one in limits]
+        return Series(np.transpose(components), 0.0, True, abs(share))
+
+    return draw
+
+
 def maximum(rng: np.random.Generator, h: Array, least: float) -> Series:
     """The largest of three errors, each with a limit and an order of its own."""
     limits = [limit(rng, least) if rng.random() < 0.5 else 0.0 for _ in range(3)]
@@ -168,6 +182,8 @@ def random_powers(rng: np.random.Generator, h: Array) -> Array:
 
 
 OTHERS: dict[str, Draw] = {
+    "vectors by their components": vector(lambda rng, h: powers(float(rng.choice([1.0, 2.0])))(rng, h)),
+    "vectors with kinks by their components": vector(kinked),
     "order 1/2": plain(powers(0.5, 0.5)),
     "order 0.7": plain(powers(0.7)),
     "order 1, ten times as large powers": plain(powers(1.0, most=10.0)),
@@ -221,10 +237,14 @@ HELD_OUT: dict[str, Draw] = {
 
 def outcome(series: Series, dts: Array) -> Outcome:
     """What the error budget says about a series."""
-    found = error_budget(dts, series.errors, resolution=series.noise, signed=series.signed)
-    usable = series.errors[np.isfinite(series.errors)]
-    coarsest, finest = (abs(float(usable[end])) for end in (0, -1)) if len(usable) else (math.nan, math.nan)
-    slack = 1e-9 * float(np.nanmax(np.abs(series.errors), initial=0.0))
+    if series.errors.ndim == 1:
+        found, sizes = error_budget(dts, series.errors, resolution=series.noise, signed=series.signed), np.abs(series.errors)
+    else:
+        found = vector_budget(dts, series.errors, None, np.full_like(series.errors, series.noise), np.zeros_like(dts), 0.0)
+        sizes = np.linalg.norm(series.errors, axis=1)
+    usable = sizes[np.isfinite(sizes)]
+    coarsest, finest = (float(usable[end]) for end in (0, -1)) if len(usable) else (math.nan, math.nan)
+    slack = 1e-9 * float(np.nanmax(sizes, initial=0.0))
     is_covered = found.lower - slack <= series.asymptotic <= found.upper + slack
     width = (found.upper - found.lower) / finest if finest else math.nan
     return Outcome(series.asymptotic, is_covered, found.cause, width, abs(series.asymptotic) > LARGE * coarsest)

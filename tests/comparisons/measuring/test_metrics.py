@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support.engines import QUICK
 
 import scenarios
@@ -62,6 +63,37 @@ def test_planted_position_energy_and_momentum_errors_are_measured():
         assert found["angular_momentum_error"] == pytest.approx(1e-6, rel=1e-5)
         assert found["angular_momentum_direction_error"] <= 1e-12
         assert found["energy_error"] == pytest.approx(sign * 2e-6, rel=1e-5)
+
+
+def components(name, metric, motion):
+    scene = scenarios.load(name)
+    return METRICS[metric].average_components([Comparison.with_truth(scene, motion, truth_for(scene))]).parts
+
+
+@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [1e-12, 0.0, 0.0], [0.0, -3e-6, 4e-6], [0.6, 0.8, -2.4], [0.0, 3.1, 0.0]])
+def test_planted_attitude_error_has_its_components(turn):
+    """The rotation vector, as scipy has it, whatever the sign of the quaternion."""
+    _, motion = exact_motion("spin-asymmetric")
+    turned = multiply(Rotation.from_rotvec(turn).as_quat()[None], motion.orientation)
+    for sign in (1, -1):
+        planted = exact_motion("spin-asymmetric", orientation=sign * turned)[1]
+        [found] = components("spin-asymmetric", "orientation_error", planted)
+        np.testing.assert_allclose(found, turn, rtol=1e-12, atol=1e-15)
+
+
+def test_planted_position_and_momentum_errors_have_their_components():
+    """One vector in the only flight of a spin, and one in each of two flights of a drop, at the end of its inner half."""
+    _, motion = exact_motion("spin-asymmetric")
+    aside = exact_motion("spin-asymmetric", position=motion.position + np.array([3e-9, 0, -4e-9]))[1]
+    np.testing.assert_allclose(components("spin-asymmetric", "position_error", aside), [[3e-9, 0.0, -4e-9]], rtol=1e-6)
+    faster = exact_motion("spin-asymmetric", angular_velocity=motion.angular_velocity * (1 + 1e-6))[1]
+    [found] = components("spin-asymmetric", "angular_momentum_error", faster)
+    assert np.linalg.norm(found) == pytest.approx(1e-6, rel=1e-5)
+    scene, motion = exact_motion("drop-box-corner")
+    drifting = exact_motion("drop-box-corner", position=motion.position + motion.t[:, None] * np.array([1e-9, 0.0, 0.0]))[1]
+    found = components("drop-box-corner", "position_error", drifting)
+    landing = truth_for(scene).events[0].time
+    np.testing.assert_allclose(found[:, 0], [1e-9 * (0.75 * landing), 1e-9 * scene.duration], rtol=2.0 * DT / landing)
 
 
 def test_planted_direction_of_angular_momentum_is_measured():
@@ -179,6 +211,8 @@ def test_planted_moment_about_the_contact_point_is_measured():
         _, planted = exact_motion("drop-ball", angular_velocity=spin)
         expected = 0.4 * 0.1**2 * 1e-6 / (0.1 * 9.8 * DT * int(landing.time / DT))  # I ω over R and the last speed before
         assert measure(scene, planted)["contact_momentum_error"] == pytest.approx(expected, rel=1e-9)
+        [found] = components("drop-ball", "contact_momentum_error", planted)
+        np.testing.assert_allclose(found, np.array(push) / 1e-6 * expected, rtol=1e-9, atol=1e-9 * expected)
     # A force at the contact itself, in any direction, is none.
     sideways = np.where(motion.t[:, None] > landing.time, [0.3, 0.0, 0.4], 0.0)
     spin = np.cross([0.0, -0.1, 0.0], sideways) / (0.4 * 0.1**2)

@@ -10,11 +10,11 @@ from comparisons.results.provenance import versions_behind
 from comparisons.results.results import Results
 from reports.pages import page
 from reports.views import check, compare
-from reports.views.failures import Failure
+from reports.views.failures import Failure, grouped
 from reports.views.run import Overview
 
-MOST_FAILURES = 100
-"""Failures that a summary lists; JUnit and JSON have all."""
+MOST_SENTENCES = 24
+"""Sentences on the failures of one engine in a summary; JUnit and JSON have all."""
 
 
 def run_markdown(results: Results, summary: Overview) -> str:
@@ -28,9 +28,8 @@ def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Seq
     return page(
         "check.md",
         sentences=check.sentences(checked, file),
-        failing=found[:MOST_FAILURES],
-        more=max(0, len(found) - MOST_FAILURES),
-        shown=check.MOST_FAILURES,
+        groups=grouped(results, found, None if file is None else file.path),
+        most=MOST_SENTENCES,
         engines=results.engines,
         tallies={engine: _tally(results.table[results.table["engine"] == engine]) for engine in results.engines},
         versions=versions_behind(results.provenance),

@@ -52,11 +52,12 @@ def check_command(run: str, baseline: str | None, junit: str | None, summary: st
 
 def print_checked(checked: "Checked", file: "BaselineFile | None", found: "list[Failure]") -> None:
     """Print what failed, then the outcome of the check; in GitHub's runners annotations too."""
-    from reports.terminal.run_table import print_failures
+    from reports.terminal.rows import print_sentences
+    from reports.terminal.summary import print_failures
     from reports.views import check as view
+    from reports.views.failures import grouped
 
-    print_failures(found, view.MOST_FAILURES)
-    for sentence in view.sentences(checked, file):
-        click.echo(sentence)
+    print_failures(grouped(checked.results, found, None if file is None else file.path))
+    print_sentences(view.sentences(checked, file))
     for command in view.annotations(found):
         click.echo(command)

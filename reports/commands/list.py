@@ -14,4 +14,4 @@ def list_command(what: str, json_output: bool) -> None:
     from reports.views import listings
 
     rows = {"scenes": listings.scene_rows, "engines": listings.engine_rows, "metrics": listings.metric_rows}[what]
-    print_rows(rows(), json_output)
+    print_rows(rows(), json_output, listings.LEFT_OUT_FIRST[what])

@@ -41,6 +41,7 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
 @time_limit_option(300.0, "an engine may take for one scene at one step")
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that were measured are not run again.")
+@click.option("-v", "--verbose", is_flag=True, help="Print every metric of every scene too, in a table for each scene.")
 @as_json
 def run_command(
     scenes: tuple[str, ...],
@@ -52,6 +53,7 @@ def run_command(
     time_limit: float,
     baseline: str | None,
     resume: bool,
+    verbose: bool,
     json_output: bool,
 ) -> int:
     """Run scenes with engines, side by side, and write the report.
@@ -66,6 +68,7 @@ def run_command(
     from reports.commands.check import print_checked
     from reports.terminal.rows import json_rows
     from reports.terminal.run_table import print_table
+    from reports.terminal.summary import print_summary
     from reports.views.check import BaselineFile
     from reports.views.failures import failures
     from scenarios import load
@@ -81,7 +84,8 @@ def run_command(
         loaded += draw(count, drawn["seed"])
         click.echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
     file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
-    results = _run(loaded, drawn, engines, dts, output, time_limit, resume, None if json_output else print_table)
+    show = None if json_output else print_table if verbose else print_summary
+    results = _run(loaded, drawn, engines, dts, output, time_limit, resume, show)
     checked = _checked(results, file, json_output)
     if json_output:
         click.echo(json_rows(checked.results.table))

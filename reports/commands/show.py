@@ -17,4 +17,4 @@ def show_command(scene: str, engine_name: str | None, dt: float, json_output: bo
     from scenarios import load
 
     loaded = load(scene)
-    print_rows(show.scene_rows(loaded) if engine_name is None else show.built_rows(loaded, engine_name, dt), json_output)
+    print_rows(show.scene_rows(loaded) if engine_name is None else show.built_rows(loaded, engine_name, dt), json_output, ["why"])

@@ -48,6 +48,6 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, t
     if json_output:
         click.echo(json.dumps(view.summary_rows(found), indent=1, ensure_ascii=False))
     else:
-        print_rows(view.formatted_rows(found), json_output=False)
+        print_rows(view.formatted_rows(found), json_output=False, left_out_first=view.LEFT_OUT_FIRST)
         click.echo(f"Written: {output}, {asked.size:,} jobs; from Python: dropspin.read_sweep({output!r})")
     return view.exit_code(found)

@@ -59,7 +59,7 @@ def tradeoff_command(
 
                 found.append(tradeoff(load(name), engines, metric, budget=budget, on_progress=on_progress))
             if not json_output:
-                print_rows(view.pareto_front_rows(found[-1]), json_output=False)
+                print_rows(view.pareto_front_rows(found[-1]), json_output=False, left_out_first=view.LEFT_OUT_FIRST)
                 print_sentences(view.sentences(found[-1], within))
         write_tradeoff(found, within, folder)
     if json_output:

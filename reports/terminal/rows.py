@@ -1,4 +1,4 @@
-"""Rows as a table on a terminal, or as JSON."""
+"""Rows as a table on a terminal, one line a row elsewhere, or as JSON; sentences."""
 
 import json
 import math
@@ -20,29 +20,74 @@ PIECES = re.compile(r"(?<=\s)(?!(?<=\d\s)\S{1,4}\b)|(?:(?<=\w[\[=])|(?<=\w,))(?=
 """Where a line of a cell may end: at a space, but not between a number and its unit; and between the options of an engine."""
 GAP = 3
 """Characters between two columns of a table."""
+NARROWEST = 24
+"""Characters to which a column of text is narrowed before a column is left out."""
 
 
-def print_rows(rows: list[dict[str, str]], json_output: bool) -> None:
-    """Print rows with the same keys as a table, or as JSON."""
+def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Sequence[str] = ()) -> None:
+    """Print rows with the same keys: as a table as wide as the terminal, one line a row where the output is no terminal, or as JSON.
+
+    Args:
+        rows: The rows.
+        json_output: Whether to print JSON.
+        left_out_first: The columns that are left out of a table that is wider than the terminal, in this order.
+    """
     if json_output:
         click.echo(json.dumps(rows, indent=1, ensure_ascii=False))
         return
-    console = Console()
-    cells = [list(rows[0]), *(list(row.values()) for row in rows)]
+    console, head = Console(), list(rows[0])
+    has_head = head not in (["what", "is"], ["what", "found"])
+    if not console.is_terminal:
+        for line in aligned([head] * has_head + [list(row.values()) for row in rows]):
+            print_sentence(line, console)
+        return
+    left_out: list[str] = []
+    while _narrowest(rows, head) > console.width and len(left_out) < len(left_out_first):
+        left_out.append(left_out_first[len(left_out)])
+        head.remove(left_out[-1])
+    cells = [head, *([row[key] for key in head] for row in rows)]
     widths = _widths(cells, console.width)
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_header=cells[0] not in (["what", "is"], ["what", "found"]))
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_header=has_head)
     for column, width in zip(cells[0], widths, strict=True):
         table.add_column(Text(_wrapped(column, width)), overflow="fold")
     for row in cells[1:]:
         table.add_row(*(Text(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
     console.print(table)
+    if left_out:
+        print_sentence(f"Not shown at this width: {', '.join(left_out)}; shown on a wider terminal or with --json.", console)
+
+
+def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
+    """Rows as lines, with their columns under each other; a cell is one line."""
+    flat = [[" ".join(cell.split()) for cell in row] for row in cells]
+    widths = [max(map(cell_len, column)) for column in zip(*flat, strict=True)]
+    return ["  ".join(cell + " " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)).rstrip() for row in flat]
+
+
+def print_sentence(sentence: str, console: Console, style: str = "") -> None:
+    """Print a sentence, with line breaks between words on a terminal and as one line elsewhere."""
+    console.print(Text(sentence, style=style), soft_wrap=not console.is_terminal)
 
 
 def print_sentences(sentences: Iterable[str]) -> None:
-    """Print sentences, one after the other, with line breaks between words."""
+    """Print sentences, one after the other."""
     console = Console()
     for sentence in sentences:
-        console.print(Text(sentence))
+        print_sentence(sentence, console)
+
+
+def _narrowest(rows: Sequence[dict[str, str]], head: Sequence[str]) -> int:
+    """The width of a table whose columns are no narrower than is readable: their cells, or `NARROWEST` where these are text."""
+    widths = []
+    for key in head:
+        longest = max(cell_len(row[key]) for row in rows)
+        widths.append(max(min(longest, NARROWEST), _longest_piece([key, *(row[key] for row in rows)])))
+    return sum(widths) + GAP * len(widths) - 1
+
+
+def _longest_piece(cells: Iterable[str]) -> int:
+    """The length of the longest piece of some cells that stays on one line."""
+    return max(cell_len(piece.rstrip()) for cell in cells for piece in PIECES.split(cell))
 
 
 def _widths(cells: Sequence[Sequence[str]], available: int) -> list[int]:
@@ -52,7 +97,7 @@ def _widths(cells: Sequence[Sequence[str]], available: int) -> list[int]:
     """
     columns = list(zip(*cells, strict=True))
     widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) for column in columns]
-    longest = [max(cell_len(piece.rstrip()) for cell in column for piece in PIECES.split(cell)) for column in columns]
+    longest = [_longest_piece(column) for column in columns]
     while sum(widths) + GAP * len(widths) - 1 > available and max(widths) > 1:
         widest = max(
             range(len(widths)), key=lambda number: (widths[number] > longest[number], number > 0 or len(widths) == 2, widths[number])

@@ -11,10 +11,9 @@ from rich.text import Text
 from comparisons.judging.agreement import NO_EVIDENCE
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.results import Results
-from reports.views.failures import Failure
+from reports.terminal.summary import print_summary
 from reports.views.findings import orders
 from reports.views.numbers import MARKS, formatted, trend, word
-from reports.views.run import overview
 
 NUMBER_WIDTH = 9  # of -1.23e-04; a narrow terminal folds names and splits the table, but never cuts a number
 NAME_WIDTH, GAP = 20, 3
@@ -22,7 +21,7 @@ STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diver
 
 
 def print_table(results: Results, console: Console | None = None) -> None:
-    """Print a run at its finest time step: every metric of every engine, and the spread between independent engines."""
+    """Print a run at its finest time step: every metric of every engine, and the spread between independent engines; then the summary."""
     out = console or Console()
     at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
     for name, scene in results.scenes.items():
@@ -33,12 +32,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
         _print_ensemble(results, name, out)
         _print_remarks(results, name, out)
         out.print()
-    summary = overview(results)
-    found = [one for one in summary.failures if not one.broke_down]
-    print_failures(found, len(found), out)
-    for sentence in summary.findings:
-        out.print(Text(sentence))
-    out.print(Text(summary.verdict, style="bold"))
+    print_summary(results, out)
 
 
 def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
@@ -105,12 +99,3 @@ def _print_remarks(results: Results, name: str, out: Console) -> None:
     frame = results.table[(results.table["scene"] == name) & (results.table["metric"] == "")]
     for row in frame.drop_duplicates(["engine", "verdict", "reason"]).to_dict("records"):
         out.print(Text(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))
-
-
-def print_failures(found: Sequence[Failure], at_most: int, console: Console | None = None) -> None:
-    """Print failures, one line each, with the command that reproduces them."""
-    out = console or Console()
-    for one in found[:at_most]:
-        out.print(Text(f"✗ {one.sentence.rstrip('.')}. Reproduce: {one.reproduce}", style="red"), soft_wrap=True)  # a command is one line
-    if len(found) > at_most:
-        out.print(Text(f"✗ and {len(found) - at_most} more", style="red"))

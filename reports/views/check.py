@@ -17,8 +17,6 @@ from comparisons.results.results import Results
 from reports.views.failures import Failure
 from reports.views.findings import counts, verdict_sentence
 
-MOST_FAILURES = 12
-"""Failures that are printed; JUnit and JSON have all."""
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 MOST_ANNOTATIONS = 10
 """The number that GitHub shows for one step."""
@@ -46,23 +44,18 @@ def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
         return [verdict]
     table = checked.results.table
     failed_rows = table[(table["kind"] == "baseline") & (table["verdict"] == "failed")]
-    listed = [_of_engine(str(engine), some, checked.changes) for engine, some in failed_rows.groupby("engine", sort=False)]
-    if len(failed_rows):
-        listed += _changed_versions(checked, file.baseline)
-    if not (broke_down(failed_rows, checked.results) & (failed_rows["metric"] == "")).all():
-        listed.append(f"If this change is intended: {file.accept_command}")
-    listed += _notes(checked, file, known)
+    listed = [*(_changed_versions(checked, file.baseline) if len(failed_rows) else []), *_notes(checked, known)]
+    better, new = (int((checked.changes["change"] == change).sum()) for change in ("better", "new"))
+    acceptable = bool((~(broke_down(failed_rows, checked.results) & (failed_rows["metric"] == ""))).any())
+    if acceptable or better or new:
+        listed.append(f"If the changes are intended: {file.accept_command}")
     return [*listed, _verdict(checked, failed_rows, verdict)]
 
 
-def _notes(checked: Checked, file: BaselineFile, known: int) -> list[str]:
+def _notes(checked: Checked, known: int) -> list[str]:
     """Improvements, new results, accepted results that were not run, and known failures."""
-    better, new = (checked.changes[checked.changes["change"] == change] for change in ("better", "new"))
-    notes = []
-    if len(better):
-        notes.append(f"{_results(len(better))} better than accepted; to accept the improvement: {file.accept_command}")
-    if len(new):
-        notes.append(f"{_results(len(new))} new and not yet accepted: {file.accept_command}")
+    better, new = (int((checked.changes["change"] == change).sum()) for change in ("better", "new"))
+    notes = [f"{_results(better)} better than accepted."] * bool(better) + [f"{_results(new)} new and not yet accepted."] * bool(new)
     if len(checked.not_run):
         pairs = len(checked.not_run.drop_duplicates(["scene", "engine"]))
         counted = f"{pairs} scene–engine {'pair' if pairs == 1 else 'pairs'}"
@@ -114,19 +107,6 @@ def annotations(found: Sequence[Failure]) -> list[str]:
 
 def _without_baseline(results: Results) -> Results:
     return replace(results, table=results.table[results.table["kind"] != "baseline"])
-
-
-def _of_engine(engine: str, rows: pd.DataFrame, changes: pd.DataFrame) -> str:
-    """The scenes in which accepted results of an engine fail, and the largest change."""
-    scenes = rows["scene"].nunique()
-    total = len({*changes.loc[changes["engine"] == engine, "scene"], *rows["scene"]})
-    measured = rows[rows["value"].notna()]
-    largest = ""
-    if len(measured):
-        metric = measured["metric"].iloc[0]
-        where = measured.loc[measured["metric"] == metric, "scene"].unique()
-        largest = f"; the largest change is in {metric.replace('_', ' ')} ({', '.join(where[:3])}{', …' if len(where) > 3 else ''})"
-    return f"{engine}: accepted results fail in {scenes} of {total} scenes{largest}."
 
 
 def _changed_versions(checked: Checked, baseline: Baseline) -> list[str]:

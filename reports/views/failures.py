@@ -1,4 +1,4 @@
-"""The failures of a run in words: where, what, by how much, and the command that reproduces each."""
+"""The failures of a run in words: where, what, by how much, and the command that reproduces each or all of an engine."""
 
 import math
 import shlex
@@ -13,6 +13,8 @@ from comparisons.running.processes import ResourceLimits
 from reports.views.numbers import bound, formatted, step, subject, word
 
 Row = Mapping[Hashable, Any]
+MOST_NAMES = 4
+"""Names that a sentence lists."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,7 @@ class Failure:
         engine: Label of the engine.
         where: The time step, in words.
         what: What is wrong, with value, bound and reason.
+        result: The result that is wrong, such as `order of attitude error`; empty if there is none.
         others: How many other rows, at other time steps, fail in the same way.
         reproduce: The command, or the call, that reproduces it.
         broke_down: Whether the engine crashed, hung, diverged, or is missing.
@@ -34,6 +37,7 @@ class Failure:
     engine: str
     where: str
     what: str
+    result: str
     others: int
     reproduce: str
     broke_down: bool
@@ -46,15 +50,32 @@ class Failure:
         return f"{self.scene} · {self.engine}{self.where}: {self.what}{others}"
 
 
+@dataclass(frozen=True)
+class FailureGroup:
+    """The failures of one engine: a sentence for each scene, which has one cause as far as can be seen, and one command for all.
+
+    Attributes:
+        engine: Label of the engine.
+        sentences: For each scene its first failure, and how many other results fail; for a breakdown the scenes that share it.
+        reproduce: The command, or the call, that reproduces them.
+    """
+
+    engine: str
+    sentences: list[str]
+    reproduce: str
+
+
 def failures(results: Results, baseline: str | None = None) -> list[Failure]:
-    """The failures: breakdowns first, then accepted results that moved, the largest changes first, then expectations.
+    """The failures: breakdowns first, then accepted results that moved, the largest changes first, then asymptotic errors, then others.
 
     Args:
         results: The run, with the rows of a check if there was one.
         baseline: The baseline file it was compared with, for the commands.
     """
     rows = results.table[results.breakdowns | results.table["verdict"].isin(FAILURES)]
-    urgency = rows["kind"].ne("baseline").astype(int).where(rows["verdict"].isin(FAILURES), -1)
+    of_kind = rows["kind"].map({"baseline": 0.0, "asymptotic_error": 1.0}).astype(float).fillna(2.0)
+    gone = (rows["value"].isna() & rows["metric"].ne("")).astype(float)
+    urgency = (of_kind + 0.5 * gone).where(rows["verdict"].isin(FAILURES), -1.0)
     grouped: dict[tuple[str, ...], list[Row]] = {}
     for row in rows.assign(urgency=urgency).sort_values("urgency", kind="stable").to_dict("records"):
         accepted = row["truth"] if row["kind"] == "baseline" else ""
@@ -70,11 +91,48 @@ def _failure(results: Results, group: list[Row], baseline: str | None) -> Failur
         engine=row["engine"],
         where=where,
         what=what_fails(row),
+        result=subject(row["metric"], row["kind"], row["truth"]) if row["metric"] else "",
         others=len(group) - 1,
         reproduce=reproduce(results, row, baseline),
         broke_down=row["verdict"] not in FAILURES,
         accepted=row["kind"] == "baseline",
     )
+
+
+def grouped(results: Results, found: Sequence[Failure], baseline: str | None = None) -> list[FailureGroup]:
+    """Failures, as `failures` gives them, by engine and scene; equal breakdowns of an engine in several scenes are one."""
+    by_engine: dict[str, dict[tuple[bool, str], list[Failure]]] = {}
+    broken = {(one.scene, one.engine) for one in found if one.broke_down}
+    for one in found:
+        if one.accepted and not one.result and (one.scene, one.engine) in broken:
+            continue  # its accepted results are gone because it broke down
+        cause = one.what if one.broke_down else one.scene
+        by_engine.setdefault(one.engine, {}).setdefault((one.broke_down, cause), []).append(one)
+    return [_group(results, engine, list(causes.values()), baseline) for engine, causes in by_engine.items()]
+
+
+def _group(results: Results, engine: str, causes: Sequence[Sequence[Failure]], baseline: str | None) -> FailureGroup:
+    scenes = list(dict.fromkeys(one.scene for some in causes for one in some))
+    accepted = any(one.accepted for some in causes for one in some)
+    command = _command(results, scenes, engine, results.provenance["asked"]["dts"], baseline if accepted else None)
+    return FailureGroup(engine, [_of_one_cause(some) for some in causes], command)
+
+
+def _of_one_cause(some: Sequence[Failure]) -> str:
+    """The first of some failures, and the others counted."""
+    first = some[0]
+    if first.broke_down:
+        others = list(dict.fromkeys(one.scene for one in some[1:]))
+        return first.sentence.rstrip(".") + (f"; likewise in {_listed(others)}" if others else "") + "."
+    rows = sum(1 + one.others for one in some[1:])
+    results = [name for name in dict.fromkeys(one.result for one in some[1:]) if name not in ("", first.result)]
+    others_too = f" ({_listed(results)})" if results else ""
+    return first.sentence.rstrip(".") + (f"; {rows} other results of this scene fail{others_too}" if rows else "") + "."
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names with commas, the first few of many."""
+    return ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
 
 
 def what_fails(row: Row) -> str:
@@ -92,15 +150,21 @@ def what_fails(row: Row) -> str:
 
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
     """The command that measures a row again, or the call if its scene or its engine was given as an object."""
-    scene, asked = results.scenes[row["scene"]], results.provenance["asked"]
-    steps = sorted(asked["dts"], reverse=True) if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
-    engine = results.provenance["names"].get(row["engine"])  # my_module:MyEngine has a name of its own in results
-    if not scene.origin or engine is None:
-        named_scene = repr(scene.origin) if scene.origin else f"<scene {scene.name!r}>"
-        named_engine = f"<engine {row['engine']!r}>" if engine is None else repr(engine)
-        return f"dropspin.run({named_scene}, {named_engine}, dt={[float(dt) for dt in steps]})"
-    options = [] if baseline is None or row["kind"] != "baseline" else ["--baseline", baseline]
-    return shlex.join(["dropspin", "run", scene.origin, "-e", engine, *_options(steps, asked["time_limit"]), *options, "-o", "out/again"])
+    steps = results.provenance["asked"]["dts"] if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
+    return _command(results, [row["scene"]], row["engine"], steps, baseline if row["kind"] == "baseline" else None)
+
+
+def _command(results: Results, names: Sequence[str], label: str, dts: Sequence[float], baseline: str | None) -> str:
+    """The command that runs some scenes of a run with one of its engines again, or the call if one of them was given as an object."""
+    scenes, steps = [results.scenes[name] for name in names], sorted(dts, reverse=True)
+    engine = results.provenance["names"].get(label)  # my_module:MyEngine has a name of its own in results
+    if engine is None or not all(scene.origin for scene in scenes):
+        named = [repr(scene.origin) if scene.origin else f"<scene {scene.name!r}>" for scene in scenes]
+        named_scenes = named[0] if len(named) == 1 else f"[{', '.join(named)}]"
+        named_engine = f"<engine {label!r}>" if engine is None else repr(engine)
+        return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]})"
+    options = [*_options(steps, results.provenance["asked"]["time_limit"]), *([] if baseline is None else ["--baseline", baseline])]
+    return shlex.join(["dropspin", "run", *(scene.origin for scene in scenes), "-e", engine, *options, "-o", "out/again"])
 
 
 def reproduce_drawn(results: Results) -> list[str]:

@@ -1,18 +1,25 @@
 """The findings of a run, counted and in words; terminal, HTML and Markdown share them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import pandas as pd
 
 from comparisons.engines.base import calibrated_label
-from comparisons.judging.convergence import STUDIES
+from comparisons.judging.convergence import JUMPING, STUDIES
+from comparisons.judging.error_budget import is_sufficient
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, VERDICTS
+from comparisons.measuring.tolerances import negligible
 from comparisons.results.results import NEGLIGIBLE, Results
-from reports.views.numbers import word
+from reports.views.leading_errors import step_costs
+from reports.views.numbers import MARKS, duration, quantity, size, word
 
 STATUS_WORDS = {"limited": "outside the documented range"}
+UNDECIDED = "partly undecided"
+"""The status of an engine that passes in a scene, but of which the time steps leave errors undecided."""
+ENGINE_NAMES = {"document": "document (Wang's method)"}
+"""Engines whose label does not say what they are."""
 
 SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "known", "limited", "no_truth", "passed", "measured")
 """Worst first: the verdict that represents a scene and an engine."""
@@ -59,12 +66,23 @@ class Status(NamedTuple):
     verdict: str
     words: str
 
+    @property
+    def mark(self) -> str:
+        """The status as one character."""
+        return "~" if self.words == UNDECIDED else MARKS[self.verdict]
+
 
 def statuses(results: Results) -> dict[str, dict[str, Status]]:
     """The status of each engine in each scene."""
     own = results.table[results.table["kind"] != "agreement"]
     by_pair = {(str(scene), str(engine)): rows for (scene, engine), rows in own.groupby(["scene", "engine"])}
     return {scene: {engine: _status(by_pair.get((scene, engine))) for engine in results.engines} for scene in results.scenes}
+
+
+def _is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
+    """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated."""
+    reach = rows[["lower", "upper"]].abs().max(axis=1)
+    return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > NEGLIGIBLE)
 
 
 def _status(rows: pd.DataFrame | None) -> Status:
@@ -74,7 +92,8 @@ def _status(rows: pd.DataFrame | None) -> Status:
     worst = min(mentioned["verdict"], key=SEVERITY.index)
     of_model = bool((rows.loc[rows["verdict"] == "known", "cause"] == "model").any())
     studied = worst in ("passed", "measured") and bool((rows["kind"] == "asymptotic_error").any())
-    words = "known model error" if of_model and worst == "known" else "converges" if studied else STATUS_WORDS.get(worst, word(worst))
+    converges = UNDECIDED if (_is_undecided(rows) & ~rows["metric"].isin(JUMPING)).any() else "converges"
+    words = "known model error" if of_model and worst == "known" else converges if studied else STATUS_WORDS.get(worst, word(worst))
     return Status(worst, words)
 
 
@@ -103,14 +122,19 @@ class ProfileComparison:
     rows: list[dict[str, Any]]
 
     @property
-    def sentence(self) -> str:
-        """The comparison in one sentence."""
+    def clause(self) -> str:
+        """The comparison in words, to follow the engine's name."""
         parts = sorted(row["part"] for row in self.rows)
         half = parts[len(parts) // 2]
         return (
-            f"{self.engine}: {sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest time step "
-            f"are mostly setting errors; the median share is {100 * half:.1f} %."
+            f"{sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest time step "
+            f"are mostly setting errors (median share {100 * half:.1f} %)"
         )
+
+    @property
+    def sentence(self) -> str:
+        """The comparison in one sentence."""
+        return f"{self.engine}: {self.clause}."
 
 
 def profile_comparisons(results: Results) -> list[ProfileComparison]:
@@ -164,7 +188,7 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
         set_at_all = any(scene.expect for scene in results.scenes.values())
         none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
         return f"{none}; {len(results.measurements):,} values were measured."
-    kinds = [f"{judged - tally.of_studies} expectations of the scenes", f"{tally.of_studies} orders and asymptotic errors"]
+    kinds = [f"{judged - tally.of_studies} expectations", f"{tally.of_studies} orders and asymptotic errors"]
     both = " and ".join(kind for kind in kinds if not kind.startswith("0 "))
     return f"All {judged} checks pass: {both}{_known(tally)}."
 
@@ -172,56 +196,94 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
 def _known(tally: Counts) -> str:
     """The results that show known faults, those that do no longer, and those within limitations, as the end of a sentence."""
     known = f"; {tally.known} {'result shows' if tally.known == 1 else 'results show'} known faults" if tally.known else ""
-    limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} within known limitations of engines" if tally.limited else ""
+    limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} within known limitations" if tally.limited else ""
     return (
         known + limited + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not show" if tally.fixed else "")
     )
 
 
-def _undecided(limits: pd.DataFrame) -> list[str]:
-    """The metrics, once for each scene, whose interval contains 0 and values that are not negligible, so that no cause is stated."""
-    reach = limits[["lower", "upper"]].abs().max(axis=1)
-    return [metric.replace("_", " ") for metric in limits.loc[(limits["cause"] == "unresolved") & (reach > NEGLIGIBLE), "metric"]]
-
-
-def _known_scenes(results: Results, engine: str) -> list[str]:
-    """The scenes in which results of an engine show a fault that is expected by name, negligible ones left out."""
-    known = (results.table["verdict"] == "known") & (results.table["value"].abs() > NEGLIGIBLE)
-    return list(results.table.loc[known & (results.table["engine"] == engine), "scene"].unique())
-
-
 def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
-    """The main finding about each engine.
+    """One sentence for each engine, and one for all errors that the time steps leave undecided.
+
+    An engine's sentence has the number of scenes in which its errors vanish as dt → 0, the largest error that does not, known faults at
+    these time steps, breakdowns, and the cost of a step. That of a missing engine says why it is missing.
 
     Args:
         results: The run.
         lasting: By cause and engine, the scenes with errors that do not vanish as dt → 0.
         profiles: Engines with default settings compared with the calibrated ones.
     """
-    missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine")
-    sentences = [f"{row.reason}" for row in missing.itertuples()]
-    models, settings = lasting["model"], lasting["setting"]
-    limits = results.table[results.table["kind"] == "asymptotic_error"]
-    studied = limits.groupby("engine")["scene"].nunique()
+    missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine").set_index("engine")["reason"]
+    costs = step_costs(results)
+    sentences, undecided = [], []
     for engine in results.engines:
-        stuck, total = models[engine], int(studied.get(engine, 0))
-        if stuck:
-            sentences.append(
-                f"{engine}: model error in {len(stuck)} of {total} scenes ({', '.join(stuck)}): an error that does not vanish as dt → 0."
-            )
-        known = [scene for scene in _known_scenes(results, engine) if scene not in stuck]
-        if known:
-            sentences.append(f"{engine}: known {'fault' if len(known) == 1 else 'faults'} at these time steps in {', '.join(known)}.")
-        if settings[engine]:
-            sentences.append(
-                f"{engine}: setting error in {len(settings[engine])} of {total} scenes ({', '.join(settings[engine])}): "
-                "an error that does not vanish as dt → 0, but that the calibrated profile does not have."
-            )
-        opened = _undecided(limits[limits["engine"] == engine])
-        if total and not stuck and not settings[engine] and not opened and not known:
-            where = f" in all {total} scenes" if total > 1 else ""
-            sentences.append(f"{engine}: errors above {NEGLIGIBLE:g} vanish as dt → 0{where}.")
-        elif opened:
-            none = "" if stuck or settings[engine] else "no model error; "
-            sentences.append(f"{engine}: {none}undecided by these time steps: {', '.join(dict.fromkeys(opened))}.")
-    return sentences + [comparison.sentence for comparison in profiles]
+        if engine in missing:
+            sentences.append(str(missing[engine]))
+            continue
+        remain = {scene for cause in ("model", "setting") for scene in lasting[cause][engine]}
+        errors = results.table[(results.table["kind"] == "asymptotic_error") & (results.table["engine"] == engine)]
+        opened = errors[_is_undecided(errors) & ~errors["scene"].isin(remain)]
+        opened_errors = opened[~opened["metric"].isin(JUMPING)]
+        parts = [
+            _convergence(results, engine, errors, remain, opened_errors["scene"].nunique()),
+            *_known_faults(results, engine, remain),
+            *_breakdowns(results, engine),
+            *(profile.clause for profile in profiles if profile.engine == engine),
+            *_cost(results, engine, costs),
+        ]
+        sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
+        if len(opened):
+            undecided.append(f"{engine} in {_scenes(opened['scene'].nunique())} ({', '.join(map(quantity, opened['metric'].unique()))})")
+    return [*sentences, *([f"Undecided at these time steps: {', '.join(undecided)}."] if undecided else [])]
+
+
+def _convergence(results: Results, engine: str, errors: pd.DataFrame, remain: Collection[str], opened: int) -> str:
+    """In how many scenes the errors of an engine vanish as dt → 0, and the largest error that does not, relative to its scale."""
+    total = errors["scene"].nunique()
+    if not total:
+        frame = results.measurements
+        measured = _scenes(frame.loc[frame["engine"] == engine, "scene"].nunique())
+        enough = is_sufficient(results.provenance["asked"]["dts"])
+        return f"{measured} measured, no asymptotic errors" + ("" if enough else "; they take three time steps that span a factor of four")
+    vanish = total - len(remain) - opened
+    words = f"errors above {NEGLIGIBLE:g} vanish as dt → 0 in {'all ' if vanish == total > 1 else ''}"
+    words += _scenes(total) if vanish == total else f"{vanish} of {total} scenes"
+    if not remain:
+        return words
+    stay = errors[errors["cause"].isin(["model", "setting"]) & ~errors["metric"].isin(JUMPING)]
+    scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(stay["scene"], stay["unit"], strict=True)]
+    largest = (stay["value"].abs() / scales).sort_values(ascending=False).index[:1]
+    named = [
+        f" ({quantity(row['metric'])} up to {size(row['value'], row['unit'])} in {row['scene']})"
+        for row in stay.loc[largest].to_dict("records")
+    ]
+    return f"{words}, remain in {len(remain)}{''.join(named)}"
+
+
+def _known_faults(results: Results, engine: str, remain: Collection[str]) -> list[str]:
+    """The scenes in which results of an engine show an expected fault, though its errors vanish, negligible ones left out."""
+    known = (results.table["verdict"] == "known") & (results.table["value"].abs() > NEGLIGIBLE) & (results.table["engine"] == engine)
+    scenes = [scene for scene in results.table.loc[known, "scene"].unique() if scene not in remain]
+    return [f"known {'fault' if len(scenes) == 1 else 'faults'} in {', '.join(scenes)}"] if scenes else []
+
+
+def _breakdowns(results: Results, engine: str) -> list[str]:
+    """In how many scenes an engine broke down, by verdict."""
+    table = results.table[(results.table["engine"] == engine) & results.table["verdict"].isin(BREAKDOWNS)]
+    return [f"{word(str(verdict))} in {_scenes(scenes)}" for verdict, scenes in table.groupby("verdict")["scene"].nunique().items()]
+
+
+def _cost(results: Results, engine: str, costs: Mapping[str, float]) -> list[str]:
+    """The median time of a step of the fastest engine; of the others its ratio to that of the fastest in the same scene at the same dt."""
+    timed = {label: cost for label, cost in costs.items() if cost > 0.0}
+    if engine not in timed:
+        return []
+    fastest = min(timed, key=timed.__getitem__)
+    if engine != fastest:
+        return [f"a step takes {float(f'{timed[engine]:.2g}'):g} times that of {fastest}"]
+    seconds = results.table.loc[results.table["engine"] == engine, "time_per_step"].median()
+    return [f"a step takes {duration(float(seconds))}{', the least' if len(timed) > 1 else ''}"]
+
+
+def _scenes(count: int) -> str:
+    return f"{count} {'scene' if count == 1 else 'scenes'}"

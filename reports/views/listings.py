@@ -5,6 +5,8 @@ from scenarios.errors import DropspinError
 from scenarios.loading import load, names
 
 Rows = list[dict[str, str]]
+LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs", "unit")}
+"""Columns of each list that a narrow terminal lacks."""
 
 
 def scene_rows() -> Rows:

@@ -42,6 +42,24 @@ def word(verdict: str) -> str:
     return WORDS.get(verdict, verdict)
 
 
+def quantity(metric: str) -> str:
+    """What a metric is the error of, in words; of one that is no error, its name."""
+    return metric.replace("_", " ").removesuffix(" error")
+
+
+def size(value: float, unit: str) -> str:
+    """The magnitude of a value with its unit, to three significant digits; a ratio below 10 in percent."""
+    if unit != "1":
+        return f"{abs(value):.3g} {unit}"
+    return f"{100.0 * abs(value):.3g} %" if abs(value) < 9.995 else f"{abs(value):.3g}"
+
+
+def duration(seconds: float) -> str:
+    """A time in ms, µs or ns, to three significant digits."""
+    scale, unit = next((scale, unit) for scale, unit in ((1e3, "ms"), (1e6, "µs"), (1e9, "ns")) if seconds * scale >= 1.0 or unit == "ns")
+    return f"{seconds * scale:.3g} {unit}"
+
+
 def step(dt: float) -> str:
     """A time step in seconds; → 0 for an extrapolation of several."""
     return "→ 0" if math.isnan(dt) else f"{dt:g}"

@@ -11,6 +11,8 @@ from comparisons.sweeps.running import read_sweep_parts
 from reports.views.numbers import formatted, word
 
 WORST_OF = ("energy_drift", "energy_gain", "penetration")
+LEFT_OUT_FIRST = tuple(f"worst {name.replace('_', ' ')}" for name in reversed(WORST_OF))
+"""Columns of the summary that a narrow terminal lacks."""
 
 
 @dataclass

@@ -10,11 +10,15 @@ from comparisons.measuring.metrics import METRICS
 from comparisons.tradeoff.costs import BATCH
 from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
+from reports.views.numbers import duration
 
 COLUMNS = (
     *("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "cost_per_world", "on_pareto_front"),
     *("dominated_by", "ladder_ended", "ladder_reason", "left_out"),
 )
+
+LEFT_OUT_FIRST = (f"per world (batch of {BATCH})", "on the Pareto front")
+"""Columns of the table of the Pareto front that a narrow terminal lacks."""
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
@@ -72,8 +76,8 @@ def _row(found: TradeOff, point: CostPoint, on_front: str) -> dict[str, str]:
         "engine": point.engine,
         "step [ms]": f"{1e3 * point.dt:.4g}",
         f"error [{METRICS[found.metric].unit}]": f"{point.error:.2e}",
-        "per simulated second": _time(point.typical_cost),
-        f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else _time(point.cost_per_world),
+        "per simulated second": duration(point.typical_cost),
+        f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else duration(point.cost_per_world),
         "on the Pareto front": on_front,
     }
 
@@ -105,7 +109,7 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
             f"{goal}: no tested configuration reaches it; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}, "
             f"{where} because {_reason(ladder)}."
         )
-    sentence = f"{goal}: {_named(advice.best)}, {_time(advice.best.typical_cost)} per simulated second"
+    sentence = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second"
     if advice.next_best is None:
         sentence += "; no other tested configuration reaches it."
     elif advice.level:
@@ -114,7 +118,7 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         sentence += f"; the next best, {_named(advice.next_best)}, takes {advice.ratio:.1f} times that."
     batched = found.best_in_batch(tolerance)
     if batched is not None:
-        sentence += f" In a batch of {BATCH}, {_named(batched)}: {_time(batched.cost_per_world)} per world."
+        sentence += f" In a batch of {BATCH}, {_named(batched)}: {duration(batched.cost_per_world)} per world."
     return sentence
 
 
@@ -133,8 +137,3 @@ def _named(point: CostPoint) -> str:
 def _unit(found: TradeOff) -> str:
     unit = METRICS[found.metric].unit
     return "" if unit == "1" else f" {unit}"
-
-
-def _time(seconds: float) -> str:
-    scale, unit = next((scale, unit) for scale, unit in ((1e3, "ms"), (1e6, "µs"), (1e9, "ns")) if seconds * scale >= 1.0 or unit == "ns")
-    return f"{seconds * scale:.3g} {unit}"

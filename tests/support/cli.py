@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
+TERMINAL = {"FORCE_COLOR": "1", "TERM": "dumb"}
+"""The environment in which output is that of a terminal of 80 columns, without colours."""
 DROPSPIN = Path(sys.executable).with_name("dropspin")
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from support.cli import TERMINAL
 
 from comparisons.robustness.axes import AXES
 from comparisons.robustness.failure_modes import Diagnosis
@@ -89,7 +90,8 @@ def test_engine_that_is_not_sound_at_the_nominal_values_has_the_smaller_steps_tr
 
 
 def test_table_of_80_columns_keeps_words_and_numbers_whole(study, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+    for name, value in TERMINAL.items():
+        monkeypatch.setenv(name, value)
     long = replace(study.scans[0], engine="pybullet[coordinates=multibody,velocity_clamp=kept]", axis=AXES["inertia-ratio"])
     print_rows(limits.range_rows(replace(study, scans=(*study.scans, long))), json_output=False)
     print_rows(limits.step_rows([replace(study, scans=(replace(long, axis=AXES["step"]),))]), json_output=False)

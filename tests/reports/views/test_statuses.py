@@ -40,5 +40,6 @@ def test_known_faults_are_counted_apart_and_in_the_headline(core):
     assert summary.counts.passed == (core.table["verdict"] == "passed").sum()
     assert f"{len(known)} results show known faults" in summary.verdict
     [sentence] = [one for one in summary.findings if "spin-principal-500" in one]
-    assert sentence.startswith("document: known fault")
+    assert sentence.startswith("document (Wang's method): ")
+    assert "; known faults in drop-ball-dull, spin-principal-500; " in sentence
     assert junit_xml(core).decode().count("known fault: ") == len(known)

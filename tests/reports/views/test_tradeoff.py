@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from support.cli import TERMINAL
 
 from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
@@ -83,7 +84,8 @@ def test_every_engine_has_a_row_with_its_place(found):
 
 
 def test_table_of_80_columns_keeps_words_and_numbers_whole(found, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+    for name, value in TERMINAL.items():
+        monkeypatch.setenv(name, value)
     print_rows(tradeoff.pareto_front_rows(found), json_output=False)
     output = capsys.readouterr().out
     assert max(map(len, output.splitlines())) <= 80

@@ -1,0 +1,55 @@
+"""A run on a terminal in short: the findings, a matrix of scenes and engines, the failures, the verdict."""
+
+from collections.abc import Sequence
+
+from rich.cells import cell_len
+from rich.console import Console
+from rich.text import Text
+
+from comparisons.results.results import Results
+from reports.terminal.rows import aligned, print_sentence
+from reports.views.failures import FailureGroup, grouped
+from reports.views.matrix import Matrix, matrix
+from reports.views.run import overview
+
+MOST_SENTENCES = 6
+"""Sentences on the failures of one engine; JUnit, JSON and the report have all."""
+
+
+def print_summary(results: Results, console: Console | None = None) -> None:
+    """Print the findings, a matrix of scenes and engines, the failures, and the verdict."""
+    out, summary = console or Console(), overview(results)
+    for sentence in summary.findings:
+        print_sentence(sentence, out)
+    _print_matrix(matrix(results, summary.statuses), results.engines, out)
+    print_failures(grouped(results, [one for one in summary.failures if not one.accepted]), out)
+    print_sentence(summary.verdict, out, "bold")
+
+
+def print_failures(groups: Sequence[FailureGroup], console: Console | None = None) -> None:
+    """Print the failures of each engine, with one command that reproduces them."""
+    out = console or Console()
+    for group in groups:
+        for sentence in group.sentences[:MOST_SENTENCES]:
+            print_sentence(f"✗ {sentence}", out, "red")
+        if len(group.sentences) > MOST_SENTENCES:
+            print_sentence(f"✗ {group.engine} fails in {len(group.sentences) - MOST_SENTENCES} more scenes.", out, "red")
+        out.print(Text(f"Reproduce: {group.reproduce}"), soft_wrap=True)  # a command is one line
+
+
+def _print_matrix(found: Matrix, engines: Sequence[str], out: Console) -> None:
+    """Print a matrix: as wide as the terminal, with numbers for the engines where their names are too long, then without errors."""
+    numbers = [str(number + 1) for number in range(len(engines))]
+    complete = [[row.scene, row.quantity, *(f"{mark} {value}" for mark, value in row.cells)] for row in found.rows]
+    marks = [[row.scene, *(mark for mark, _ in row.cells)] for row in found.rows]
+    keys = [f"{number} {engine}" for number, engine in zip(numbers, engines, strict=True)]
+    forms = [
+        ([], aligned([["scene", found.title, *engines], *complete])),
+        (keys, aligned([["scene", found.title, *numbers], *complete])),
+        (["Errors are not shown at this width; a wider terminal shows them.", *keys], aligned([["scene", *numbers], *marks])),
+    ]
+    notes, lines = next((form for form in forms if not out.is_terminal or max(map(cell_len, form[1])) <= out.width), forms[-1])
+    for line, style in zip(lines, ["bold", *("red" if row.fails else "" for row in found.rows)], strict=True):
+        out.print(Text(line, style=style), soft_wrap=True)
+    for note in filter(None, [*notes, found.legend, found.left_out]):
+        print_sentence(note, out, "dim")

@@ -1,0 +1,71 @@
+"""The matrix of a run: a row for each scene, a cell for each engine with its status and the leading error."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES
+from comparisons.results.results import Results
+from reports.views.findings import SEVERITY, UNDECIDED, Status
+from reports.views.leading_errors import leading_errors
+from reports.views.numbers import formatted, in_ms, quantity, unit
+
+MOST_SCENES = 24
+"""Rows at most; of more scenes those are left out in which no engine has a finding, and then the least severe."""
+WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
+
+
+@dataclass(frozen=True)
+class MatrixRow:
+    """A scene: what the leading error is of, and each engine's mark with the size of that error, in the order of the engines."""
+
+    scene: str
+    quantity: str
+    cells: list[tuple[str, str]]
+    fails: bool
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """The rows of a matrix, in the order of the scenes; what their errors are, the meaning of the marks, and which rows are left out."""
+
+    rows: list[MatrixRow]
+    title: str
+    legend: str
+    left_out: str
+
+
+def matrix(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> Matrix:
+    """The matrix of a run, of at most `MOST_SCENES` scenes."""
+    scenes, left_out = _shown(statuses)
+    leading = {one.scene: one for one in leading_errors(results)}
+    rows = []
+    for scene in scenes:
+        one, found = leading.get(scene), statuses[scene]
+        of = "" if one is None else quantity(one.metric) + unit(one.unit)
+        sizes = {} if one is None else {engine: formatted(size) for engine, size in one.sizes.items() if not math.isnan(size)}
+        cells = [(status.mark, sizes.get(engine, "")) for engine, status in found.items()]
+        rows.append(MatrixRow(scene, of, cells, any(status.verdict in FAILURES | BREAKDOWNS for status in found.values())))
+    steps = sorted({in_ms(one.dt) for one in leading.values()})
+    shown = [status for scene in scenes for status in statuses[scene].values()]
+    marks = sorted({(SEVERITY.index(status.verdict), status.mark, status.words) for status in shown}, reverse=True)
+    words: dict[str, dict[str, None]] = {}
+    for _, mark, status in marks:
+        words.setdefault(mark, {})[status] = None
+    legend = ", ".join(f"{mark} {' or '.join(meanings)}" for mark, meanings in words.items())
+    return Matrix(rows, f"error at {' or '.join(steps)}" if steps else "", legend, left_out)
+
+
+def _shown(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:
+    """The scenes that have a row, and a sentence on the others."""
+    if len(statuses) <= MOST_SCENES:
+        return list(statuses), ""
+    found = [scene for scene, by_engine in statuses.items() if any(map(_is_finding, by_engine.values()))]
+    worst = sorted(found, key=lambda scene: min(SEVERITY.index(status.verdict) for status in statuses[scene].values()))[:MOST_SCENES]
+    fine, more = len(statuses) - len(found), len(found) - len(worst)
+    left_out = [f"{fine} in which every engine converges or declines"] * bool(fine) + [f"{more} with less severe findings"] * bool(more)
+    return [scene for scene in statuses if scene in worst], f"Scenes not shown: {', '.join(left_out)}."
+
+
+def _is_finding(status: Status) -> bool:
+    return status.verdict not in WITHOUT_FINDING or status.words == UNDECIDED

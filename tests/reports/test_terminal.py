@@ -1,0 +1,149 @@
+"""The summary of a run on a terminal, and tables as wide as it is."""
+
+import re
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+from support.cli import TERMINAL, dropspin
+
+import dropspin as ds
+from reports.terminal.rows import print_rows
+from reports.terminal.summary import print_summary
+from reports.views.findings import statuses
+from reports.views.matrix import MOST_SCENES, matrix
+from reports.views.run import overview
+
+
+@pytest.fixture(scope="module")
+def core(core_run):
+    """The default run: the scenes of the core catalogue of a stored run."""
+    results = ds.load_results(core_run)
+    scenes = {name: scene for name, scene in results.scenes.items() if "core" in scene.tags}
+    return replace(results, scenes=scenes, table=results.table[results.table["scene"].isin(scenes)])
+
+
+def repeated(results, times):
+    """A run of several times as many scenes."""
+    names = {f"{name}-{number}": (name, scene) for number in range(times) for name, scene in results.scenes.items()}
+    tables = [results.table[results.table["scene"] == name].assign(scene=new) for new, (name, _) in names.items()]
+    return replace(results, table=pd.concat(tables, ignore_index=True), scenes={new: scene for new, (_, scene) in names.items()})
+
+
+def printed(results, capsys, width=80):
+    from rich.console import Console
+
+    print_summary(results, Console(width=width, force_terminal=True, color_system=None))
+    return capsys.readouterr().out.splitlines()
+
+
+def test_summary_of_the_default_run_has_at_most_39_lines_of_80_columns(core, capsys):
+    """One line less than 40: the path of the report follows."""
+    lines = printed(core, capsys)
+    assert len(core.scenes) == 24
+    assert len(lines) <= 39
+    assert max(map(len, lines)) <= 80
+    assert [line.split()[0] for line in lines if line.split()[0] in core.scenes] == list(core.scenes)
+
+
+def test_summary_of_many_scenes_shows_those_with_findings_and_counts_the_others(core, capsys):
+    many = repeated(core, 5)
+    lines = printed(many, capsys)
+    assert len(lines) <= 45
+    shown = [line.split()[0] for line in lines if line.split()[0] in many.scenes]
+    assert len(shown) == MOST_SCENES
+    found = matrix(many, statuses(many))
+    fine, more = map(int, re.findall(r"\d+", found.left_out))
+    assert fine + more + MOST_SCENES == len(many.scenes)
+    by_scene = statuses(core)
+    without = [scene for scene, found in by_scene.items() if all(one.words in ("converges", "declined") for one in found.values())]
+    assert fine == 5 * len(without) > 0
+    assert not {name.rpartition("-")[0] for name in shown} & set(without)
+
+
+def test_cells_have_status_and_leading_error(core, capsys):
+    """The mark is that of the one status; the number is in the results."""
+    lines = {line.split()[0]: line for line in printed(core, capsys)}
+    errors = core.measurements[(core.measurements["dt"] == 1e-3) & (core.measurements["metric"] == "orientation_error")]
+    of = errors[errors["scene"] == "spin-asymmetric"].set_index("engine")["value"]
+    assert lines["spin-asymmetric"].split()[1:] == [
+        *("orientation", "[rad]"),
+        *(part for engine, mark in zip(core.engines, "≠✓✓", strict=True) for part in (mark, f"{of[engine]:.2e}")),
+    ]
+    assert lines["slide-box"].split()[3] == "–"
+
+
+def test_failing_scene_stays_when_others_are_left_out(core, capsys):
+    """Whatever else there is to find; its failures follow with one command."""
+    many = repeated(core, 5)
+    hit = (many.table["scene"] == "spin-principal-3") & (many.table["engine"] == "mujoco") & (many.table["verdict"] == "passed")
+    lines = printed(replace(many, table=many.table.assign(verdict=many.table["verdict"].mask(hit, "failed"))), capsys)
+    [row] = [line for line in lines if line.startswith("spin-principal-3 ")]
+    assert row.split()[5] == "✗"
+    assert [line.split()[1] for line in lines if line.startswith("✗ ") and "failed" not in line] == ["spin-principal-3"]
+    assert sum(line.startswith("Reproduce: dropspin run ") for line in lines) == 1
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 160])
+def test_matrix_of_many_engines_drops_the_errors_before_it_breaks_a_number(core, capsys, width):
+    """Numbers stand for long names."""
+    labels = {"document": "document[rotation=implicit-gyroscopic]", "pybullet": "pybullet[coordinates=multibody]"}
+    renamed = replace(
+        core,
+        engines=tuple(labels.get(engine, engine) for engine in core.engines),
+        table=core.table.assign(engine=core.table["engine"].replace(labels)),
+    )
+    lines = printed(renamed, capsys, width)
+    assert max(map(len, lines)) <= width
+    text = "\n".join(lines)
+    assert ("1 document[rotation=implicit-gyroscopic]" in text) == (width < 160)
+    assert ("Errors are not shown at this width" in " ".join(text.split())) == (width < 80)
+
+
+def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
+    sentences = overview(core).findings
+    of = {engine: [one for one in sentences if re.match(rf"{engine}( \(|:)", one)] for engine in core.engines}
+    assert [len(some) for some in of.values()] == [1, 1, 1]
+    limits = core.table[core.table["kind"] == "asymptotic_error"]
+    worst = limits[(limits["engine"] == "document") & (limits["metric"] == "orientation_error") & (limits["cause"] == "model")]
+    row = worst.loc[worst["value"].abs().idxmax()]
+    assert f"(orientation up to {row['value']:.3g} rad in {row['scene']})" in of["document"][0]
+    mine = limits[limits["engine"] == "mujoco"]
+    remain = mine[(mine["cause"] == "model") & (mine["value"].abs() > 1e-4)]["scene"].nunique()
+    assert f" of {mine['scene'].nunique()} scenes, remain in {remain} (" in of["mujoco"][0]
+    assert of["document"][0].endswith(" ns, the least.")
+    assert all(of[engine][0].endswith(" times that of document.") for engine in ("mujoco", "pybullet"))
+
+
+def test_piped_list_has_one_line_for_each_scene(tmp_path):
+    lines = dropspin("list", cwd=tmp_path).stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["scene", *ds.scene_names()]
+    assert lines[0].split() == ["scene", "truth", "tags", "summary"]
+
+
+def test_narrow_terminal_leaves_out_columns_and_names_them(tmp_path):
+    text = dropspin("list", cwd=tmp_path, **TERMINAL).stdout
+    assert max(map(len, text.splitlines())) <= 80
+    assert "Not shown at this width: tags; shown on a wider terminal or with --json." in text
+    wide = dropspin("list", cwd=tmp_path, FORCE_COLOR="1", NO_COLOR="1", COLUMNS="200").stdout
+    assert "tags" in wide
+    assert "Not shown" not in wide
+
+
+def test_table_keeps_numbers_whole(capsys, monkeypatch):
+    """Columns are left out in the order given until the others fit."""
+    for name, value in TERMINAL.items():
+        monkeypatch.setenv(name, value)
+    row = {
+        "engine": "e" * 38,
+        "error": "3.05e+00",
+        "time": "49.1 ns",
+        "least wanted": "9.87e-05 and more",
+        "less wanted": "1.23e+04 in all",
+    }
+    print_rows([row], json_output=False, left_out_first=["least wanted", "less wanted"])
+    text = capsys.readouterr().out
+    assert {"3.05e+00", "1.23e+04"} <= set(text.split())
+    assert "49.1 ns" in text
+    assert "9.87e-05" not in text
+    assert "Not shown at this width: least wanted; " in text

@@ -64,7 +64,7 @@ class ProcessesHere:
     def __exit__(self, *error: object) -> None:
         pass
 
-    def run_engine(self, entry: EngineEntry, scene: ds.Scenario, dt: float, starts: Sequence[ds.Scenario]) -> EngineRun:
+    def run_engine(self, entry: EngineEntry, scene: ds.Scenario, dt: float, starts: Sequence[ds.Scenario], _: object) -> EngineRun:
         """Run a scene with an engine."""
         return run_engine(entry, scene, dt, starts)
 

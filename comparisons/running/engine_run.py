@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from comparisons.measuring.tolerances import perturbed
 from comparisons.results.ensembles import EnsembleOutcome
 from comparisons.running.ensembles import run_ensemble
 from comparisons.running.inputs import EngineEntry
-from comparisons.running.recording import Breakdown, classify, record, time_steps
+from comparisons.running.progress import OnSimulations
+from comparisons.running.recording import Breakdown, Recording, classify, record, time_steps
 from scenarios import Scenario, Trajectory, truth_for
 
 TIMING_REPEATS = 3
@@ -53,8 +55,22 @@ class EngineRun:
     predicted: dict[str, float] = field(default_factory=dict)
 
 
-def run_engine(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario]) -> EngineRun:
-    """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result."""
+def run_engine(
+    entry: EngineEntry,
+    scene: Scenario,
+    dt: float,
+    starts: Sequence[Scenario],
+    on_simulations: OnSimulations = lambda done, total: None,
+) -> EngineRun:
+    """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result.
+
+    Args:
+        entry: The engine.
+        scene: The scene.
+        dt: Time step [s].
+        starts: The scene from each of its start phases.
+        on_simulations: Called after each simulation.
+    """
     engine, found = entry.engine, EngineRun(entry.label)
     if engine is None:
         found.breakdown = Breakdown("missing", entry.missing)
@@ -65,10 +81,19 @@ def run_engine(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[
             found.breakdown = Breakdown("declined", refusal)
             return found
         found.discretisation, found.order, found.precision = engine.discretisation(scene), engine.order_in(scene), engine.precision
-        own = record(engine, scene, dt)
+        sets = perturbed(scene, starts, engine.precision)
+        total = 1 + (len(starts) if len(starts) > 1 else 0) + sum(map(len, sets)) + TIMING_REPEATS
+        number = count(1)
+
+        def recorded(start: Scenario) -> Recording:
+            recording = record(engine, start, dt)
+            on_simulations(next(number), total)
+            return recording
+
+        own = recorded(scene)
         found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
-        found.phases = [own.motion] if len(starts) == 1 else [record(engine, start, dt).motion for start in starts]
-        found.perturbed = [[record(engine, start, dt).motion for start in moved] for moved in perturbed(scene, starts, engine.precision)]
+        found.phases = [own.motion] if len(starts) == 1 else [recorded(start).motion for start in starts]
+        found.perturbed = [[recorded(start).motion for start in moved] for moved in sets]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt)
         # The predicted error of a bounce is a mean over start phases.
         found.predicted = _predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}

@@ -25,6 +25,7 @@ from pebble import ProcessExpired, ProcessPool
 from comparisons.judging.verdicts import Verdict
 from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
+from comparisons.running.progress import OnSimulations
 from comparisons.running.recording import Breakdown
 from scenarios import Scenario
 
@@ -79,19 +80,47 @@ class EngineProcesses:
         self._resources = resources
         self._pools: dict[str, ProcessPool] = {}
         self._processes: dict[str, ctypes.c_long] = {}
+        self._counts: dict[str, ctypes.Array[ctypes.c_long]] = {}
         self._closed = False
 
-    def run_engine(self, entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario]) -> EngineRun:
-        """Run a scene with an engine in its process; failures are part of the result."""
+    def run_engine(
+        self,
+        entry: EngineEntry,
+        scene: Scenario,
+        dt: float,
+        starts: Sequence[Scenario],
+        on_simulations: OnSimulations = lambda done, total: None,
+    ) -> EngineRun:
+        """Run a scene with an engine in its process; failures are part of the result.
+
+        Args:
+            entry: The engine.
+            scene: The scene.
+            dt: Time step [s].
+            starts: The scene from each of its start phases.
+            on_simulations: Called while the engine works, twice a second.
+        """
         if entry.engine is None:
             return run_engine(entry, scene, dt, starts)
         try:
-            return self.call(entry, run_engine, scene, dt, starts)
+            return self.call(entry, _run_engine, scene, dt, starts, while_waiting=lambda: on_simulations(*self._counts[entry.label]))
         except Failed as failure:
             return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
 
-    def call(self, entry: EngineEntry, work: Callable[[EngineEntry, *Given], Result], *given: *Given) -> Result:
+    def call(
+        self,
+        entry: EngineEntry,
+        work: Callable[[EngineEntry, *Given], Result],
+        *given: *Given,
+        while_waiting: Callable[[], None] = lambda: None,
+    ) -> Result:
         """Call a function in an engine's process; its first argument is the entry.
+
+        Args:
+            entry: The engine.
+            work: The function.
+            given: Its other arguments.
+            while_waiting: Called twice a second until the work is done.
 
         Raises:
             Failed: The call ended the process, ran out of time or memory, or raised.
@@ -102,6 +131,7 @@ class EngineProcesses:
         if entry.label not in self._pools:
             self._pools[entry.label] = self._pool(entry)
         self._processes[entry.label].value = 0
+        self._counts[entry.label][:] = [0, 0]
         task = self._pools[entry.label].schedule(
             _call, args=[work, given, self._resources.processor_time], timeout=WALL_TIME_FACTOR * self._resources.processor_time
         )
@@ -112,6 +142,7 @@ class EngineProcesses:
                 if self._has_exited(entry.label) and not wait([task], timeout=GRACE).done:
                     self.renew(entry)
                     raise Failed("crashed", "its process exited with code 0 before the work was done")
+                while_waiting()
             result: Result = task.result()
         except OutOfTime:
             raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * self._resources.processor_time:g} s of wall time") from None
@@ -147,7 +178,9 @@ class EngineProcesses:
         context = get_context(self._start_method)
         # Without a lock: the parent would wait forever for a process that is killed while it holds one.
         self._processes[entry.label] = process = context.RawValue("l", 0)
-        return ProcessPool(max_workers=1, initializer=_start_process, initargs=[entry, self._resources.memory, process], context=context)
+        self._counts[entry.label] = counts = context.RawArray("l", 2)
+        shared = [entry, self._resources.memory, process, counts]
+        return ProcessPool(max_workers=1, initializer=_start_process, initargs=shared, context=context)
 
     def __enter__(self) -> Self:
         return self
@@ -170,14 +203,26 @@ class EngineProcesses:
 
 _busy: list["ctypes.c_long"] = []
 """The shared number in which this process writes its process id while it works."""
+_counts: list["ctypes.Array[ctypes.c_long]"] = []
+"""The shared numbers of simulations that this process has done and is to do."""
 _entry: list[EngineEntry] = []
 """The engine of this process; empty in the parent."""
 
 
-def _start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long") -> None:
+def _run_engine(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario]) -> EngineRun:
+    """Run a scene with an engine in this process, and share the numbers of simulations with the parent."""
+
+    def on_simulations(done: int, total: int) -> None:
+        _counts[0][:] = [done, total]
+
+    return run_engine(entry, scene, dt, starts, on_simulations)
+
+
+def _start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", counts: "ctypes.Array[ctypes.c_long]") -> None:
     """Start a process: drop its output, leave interrupts to the parent, limit its memory."""
     _entry.append(entry)
     _busy.append(process)
+    _counts.append(counts)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, even if the parent handles its own
     faulthandler.disable()

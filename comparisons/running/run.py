@@ -13,14 +13,12 @@ from comparisons.results.provenance import adapter_code, provenance
 from comparisons.results.results import Results, joined
 from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
+from comparisons.running.progress import OnProgress, Progress
 from comparisons.running.scene_run import run_scene
 from comparisons.running.start_phases import StartPhase
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
 DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
-
-OnProgress = Callable[[str, str, float], None]
-"""Called with scene, engine and time step [s]."""
 
 
 def run(
@@ -28,7 +26,7 @@ def run(
     engines: Engine | str | Iterable[Engine | str],
     dt: float | Iterable[float] = DEFAULT_DTS,
     *,
-    on_progress: OnProgress = lambda scene, engine, dt: None,
+    on_progress: OnProgress = lambda progress: None,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
     keep: Callable[[Results], None] = lambda part: None,
     done: Iterable[Results] = (),
@@ -39,7 +37,8 @@ def run(
         scenes: One scene or several: scenes, catalogue names or paths; their names must differ.
         engines: One engine or several: engines, or names with options. One that is not installed is `missing` in the results.
         dt: One time step or several [s].
-        on_progress: Called after each of the len(scenes) * len(engines) * len(dt) pieces of work.
+        on_progress: Called with scene, engine, time step and the simulations done: before and while an engine works, twice a second, and
+            with `finished` after each of the len(scenes) * len(engines) * len(dt) pieces of work.
         resources: What an engine may use for one of these pieces; each engine runs in a process of its own.
         keep: Called with the results of each scene as soon as it is done.
         done: Results of scenes from an earlier run. Those with the same request, versions and machine are not run again.
@@ -57,7 +56,7 @@ def run(
             if scene.model_dump_json() in earlier:
                 parts.append(replace(earlier[scene.model_dump_json()], scenes={scene.name: scene}))
                 for entry, step in product(entries, dts):
-                    on_progress(scene.name, entry.label, step)
+                    on_progress(Progress(scene.name, entry.label, step, finished=True))
                 continue
             parts.append(run_scene(StartPhase(scene, truth), entries, dts, processes, on_progress, stamp))
             keep(parts[-1])

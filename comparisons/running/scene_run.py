@@ -1,6 +1,6 @@
 """One scene of a run: every engine at every time step, the measurements, their convergence, and the engines' agreement."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
@@ -20,6 +20,7 @@ from comparisons.running.ensembles import judge_differences, judge_means
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
 from comparisons.running.processes import EngineProcesses
+from comparisons.running.progress import OnProgress, Progress, reporter
 from comparisons.running.start_phases import StartPhase
 from comparisons.running.studies import study_engine
 from scenarios import Trajectory
@@ -43,7 +44,7 @@ def run_scene(
     entries: Sequence[EngineEntry],
     dts: Sequence[float],
     processes: EngineProcesses,
-    on_progress: Callable[[str, str, float], None],
+    on_progress: OnProgress,
     stamp: Mapping[str, Any],
 ) -> Results:
     """Run one scene with every engine at every time step.
@@ -53,7 +54,7 @@ def run_scene(
         entries: The engines.
         dts: Time steps [s].
         processes: The engines' processes.
-        on_progress: Called with scene, engine and time step after each engine.
+        on_progress: Called before, while and after each engine works.
         stamp: The run's provenance.
     """
     scene = own.scene
@@ -63,19 +64,21 @@ def run_scene(
         phases, exact = phases_at(own, dt)
         compared: list[tuple[EngineRun, list[Comparison]]] = []
         for entry in entries:
-            engine_run = processes.run_engine(entry, scene, dt, [phase.scene for phase in phases])
+            progress = Progress(scene.name, entry.label, dt)
+            on_progress(progress)
+            engine_run = processes.run_engine(entry, scene, dt, [phase.scene for phase in phases], reporter(progress, on_progress))
             cases = [] if breakdown_of(engine_run) else compare(engine_run.phases, phases, exact)
             found.measured[entry.label] += measure(own, dt, engine_run, phases, exact, cases)
             _collect(found, own, dt, engine_run)
             compared.append((engine_run, cases))
-            on_progress(scene.name, entry.label, dt)
+            on_progress(progress._replace(finished=True))
         for first, second in combinations(compared, 2):
             found.rows += _agreement(own, dt, phases, first, second)
     if is_sufficient(sorted(dts)):
         for entry in entries:
             if entry.label in found.claims:
                 measured = found.measured[entry.label]
-                found.studies[entry.label] = study_engine(own, entry, found.claims[entry.label], measured, processes)
+                found.studies[entry.label] = study_engine(own, entry, found.claims[entry.label], measured, processes, on_progress)
     rows = found.rows + _with_convergence(found, labels)
     provenance = {**stamp, "settings": found.settings}
     return Results(as_table(rows), {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance)

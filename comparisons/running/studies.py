@@ -18,6 +18,7 @@ from comparisons.measuring.metrics import METRICS
 from comparisons.running.inputs import EngineEntry, engine_entry
 from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
 from comparisons.running.processes import EngineProcesses
+from comparisons.running.progress import OnProgress, Progress, reporter
 from comparisons.running.start_phases import StartPhase
 
 FEWEST_STEPS = 8
@@ -27,7 +28,14 @@ Studies = dict[str, ConvergenceStudy]
 """By metric."""
 
 
-def study_engine(own: StartPhase, entry: EngineEntry, claim: Claim, measured: Sequence[Measured], processes: EngineProcesses) -> Studies:
+def study_engine(
+    own: StartPhase,
+    entry: EngineEntry,
+    claim: Claim,
+    measured: Sequence[Measured],
+    processes: EngineProcesses,
+    on_progress: OnProgress = lambda progress: None,
+) -> Studies:
     """The convergence of each metric of one engine; with coarser steps where those asked for leave it open.
 
     Args:
@@ -36,20 +44,21 @@ def study_engine(own: StartPhase, entry: EngineEntry, claim: Claim, measured: Se
         claim: What it states.
         measured: Its metrics at each time step.
         processes: The engines' processes, for further steps.
+        on_progress: Called while an engine works on these.
     """
     series = _series(measured)
     dts = sorted({point.dt for point in chain(*series.values())})
     studies = {name: study_convergence(own.scene, claim, METRICS[name], points) for name, points in series.items()}
     if any(study.is_open for study in studies.values()):
         added = [factor * dts[-1] for factor in ADDED_STEPS]
-        coarser = _series([one for dt in added for one in _measured_at(own, entry, dt, processes)])
+        coarser = _series([one for dt in added for one in _measured_at(own, entry, dt, processes, on_progress)])
         for name, points in coarser.items():
             if name in studies and studies[name].is_open:
                 longer = study_convergence(own.scene, claim, METRICS[name], [*points, *series[name]])
                 if studies[name].cause == "unresolved" or longer.cause == "model":
                     studies[name] = _with_remark(longer, f"with {' and '.join(f'{point.dt:g}' for point in points)} s added")
     if entry.engine is not None and entry.engine.accuracy and any(study.cause in ("model", "unresolved") for study in studies.values()):
-        return _with_accuracy_options(studies, own, claim, entry.engine, dts, processes)
+        return _with_accuracy_options(studies, own, claim, entry.engine, dts, processes, on_progress)
     return studies
 
 
@@ -60,11 +69,17 @@ def _with_remark(study: ConvergenceStudy, remark: str) -> ConvergenceStudy:
 
 
 def _with_accuracy_options(
-    studies: Studies, own: StartPhase, claim: Claim, engine: Engine, dts: Sequence[float], processes: EngineProcesses
+    studies: Studies,
+    own: StartPhase,
+    claim: Claim,
+    engine: Engine,
+    dts: Sequence[float],
+    processes: EngineProcesses,
+    on_progress: OnProgress,
 ) -> Studies:
     """The studies; where the time step alone does not make an error vanish, with the accuracy options refined too."""
     refined = engine.refined(dts)
-    series = _series([one for dt, finer in refined for one in _measured_at(own, engine_entry(finer), dt, processes)])
+    series = _series([one for dt, finer in refined for one in _measured_at(own, engine_entry(finer), dt, processes, on_progress)])
     again = {
         name: study_convergence(own.scene, claim._replace(order=None), METRICS[name], points)
         for name, points in series.items()
@@ -83,12 +98,13 @@ def _short(value: str) -> str:
         return value
 
 
-def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: EngineProcesses) -> list[Measured]:
+def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: EngineProcesses, on_progress: OnProgress) -> list[Measured]:
     """Every metric of one engine at a step that was not asked for; none if it breaks down there."""
     if own.scene.steps(dt) < FEWEST_STEPS:
         return []
     phases, exact = phases_at(own, dt)
-    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases])
+    progress = Progress(own.scene.name, entry.label, dt, added=True)
+    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases], reporter(progress, on_progress))
     return [] if breakdown_of(engine_run) else measure(own, dt, engine_run, phases, exact, compare(engine_run.phases, phases, exact))
 
 

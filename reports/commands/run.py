@@ -14,6 +14,7 @@ from reports.commands.options import as_json, baseline_option, time_limit_option
 if TYPE_CHECKING:
     from comparisons.regressions.checking import Checked
     from comparisons.results.results import Results
+    from comparisons.running.progress import Progress
     from reports.views.check import BaselineFile
     from scenarios import Scenario
 
@@ -117,11 +118,11 @@ def _run(
         with run_folder(output) as folder:
             if not resume:
                 measured.clear()
-            with progress_bar(len(scenes) * len(chosen) * len(steps)) as progress:
+            with progress_bar(len(scenes), len(chosen) * len(steps)) as show_progress:
 
-                def on_progress(scene: str, engine: str, dt: float) -> None:
+                def on_progress(progress: "Progress") -> None:
                     stop_if_interrupted()
-                    progress(scene, engine, dt)
+                    show_progress(progress)
 
                 resources = ResourceLimits(processor_time=time_limit)
                 results = run(

@@ -6,30 +6,38 @@ from contextlib import contextmanager
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 from rich.text import Text
+
+from comparisons.running.progress import OnProgress, Progress
+from reports.views.numbers import in_ms
 
 
 @contextmanager
-def progress_bar(total: int) -> Iterator[Callable[[str, str, float], None]]:
-    """A bar on a terminal, one line for each scene elsewhere."""
-    console = Console(stderr=True)
+def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
+    """A bar of scenes, each with some pieces of work, on a terminal; a line for each scene, with the time elapsed, elsewhere."""
+    console, start = Console(stderr=True), time.monotonic()
     if not console.is_terminal:
         seen: set[str] = set()
 
-        def line(scene: str, engine: str, dt: float) -> None:
-            if scene not in seen:
-                seen.add(scene)
-                click.echo(f"running {scene}", err=True)
+        def line(progress: Progress) -> None:
+            if progress.scene not in seen:
+                seen.add(progress.scene)
+                elapsed = _duration(time.monotonic() - start)
+                click.echo(f"running {progress.scene} (scene {len(seen)} of {scenes}, {elapsed} elapsed)", err=True)
 
         yield line
         return
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("starting", total=total)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn())
+    with Bar(*columns, console=console, transient=True) as bar:
+        task, finished = bar.add_task("starting", total=float(scenes * pieces)), 0
 
-        def advance(scene: str, engine: str, dt: float) -> None:
-            bar.update(task, advance=1, description=f"{scene} {engine} {dt:g} s")
+        def advance(progress: Progress) -> None:
+            nonlocal finished
+            finished += progress.finished
+            share = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
+            bar.update(task, completed=finished + share, description=_described(progress))
 
         yield advance
 
@@ -55,7 +63,7 @@ def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
         yield lambda what, share: None
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda what, share: bar.update(task, completed=share, description=f"{title}: {what}")
 
@@ -102,7 +110,7 @@ def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
             return Text(f"{rate():,.0f}/s")
 
     columns = (TextColumn("jobs"), BarColumn(), MofNCompleteColumn(), Rate(""), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task("jobs", total=total)
 
         def advance(jobs: int) -> None:
@@ -110,6 +118,12 @@ def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
             bar.update(task, completed=done)
 
         yield advance
+
+
+def _described(progress: Progress) -> str:
+    """Scene, engine, time step, and which simulation of how many."""
+    start = f", start {min(progress.done + 1, progress.total)} of {progress.total}" if progress.total and not progress.finished else ""
+    return f"{progress.scene}, {progress.engine}, {in_ms(progress.dt)}{' (added)' if progress.added else ''}{start}"
 
 
 def _duration(seconds: float) -> str:

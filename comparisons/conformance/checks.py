@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import cast
 
 from comparisons.conformance.clock import check_time, check_velocity_lag
+from comparisons.conformance.exceptions import described, whole_traceback
 from comparisons.conformance.isolation import check_files, check_repeats
 from comparisons.conformance.motion import check_motion
 from comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckResult, Declined
@@ -35,6 +36,7 @@ def conform(
     checks: Sequence[str] = (),
     *,
     resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
+    on_result: Callable[[CheckResult], None] = lambda result: None,
 ) -> list[CheckResult]:
     """Check an adapter against the protocol, and its motions against reference motions.
 
@@ -42,6 +44,7 @@ def conform(
         engine: The engine, or its name.
         checks: Names of the checks to run; by default all.
         resources: What each check may use.
+        on_result: Called with the outcome of each check as soon as it is known.
 
     Raises:
         UnknownName: There is no such check.
@@ -59,6 +62,7 @@ def conform(
                 found.append(processes.call(entry, run_check, check))
             except Failed as failure:
                 found.append(CheckResult(check, cast(CheckOutcome, failure.verdict), failure.reason))
+            on_result(found[-1])
     return found
 
 
@@ -68,8 +72,10 @@ def run_check(entry: EngineEntry, check: str) -> CheckResult:
     try:
         return CHECKS[check](entry.engine, check)
     except (CheckFailed, BuildMismatch) as failure:
-        return CheckResult(check, "failed", str(failure))
+        return CheckResult(check, "failed", str(failure), whole_traceback(failure) if failure.__cause__ else "")
     except Declined as declined:
         return CheckResult(check, "declined", str(declined))
     except Diverged as diverged:
         return CheckResult(check, "failed", f"the engine diverged: {diverged}")
+    except Exception as error:  # an adapter is somebody else's code
+        return CheckResult(check, "crashed", described(error, entry.engine), whole_traceback(error))

@@ -94,8 +94,8 @@ def check_velocity_lag(engine: Engine, check: str) -> CheckResult:
         return CheckResult(check, "noted", f"a fall runs ahead by {measured:.3g} steps; known schemes by at most half a step")
     if abs(measured - stated) > LAG_TOLERANCE:
         raise CheckFailed(
-            f"velocity lags position by {measured:.3g} steps, by how far a fall runs ahead of the exact one; velocity_lag is "
-            f"{stated:.3g} steps; set {_suggested_lag(measured)}"
+            f"velocity_lag is {stated:.3g} steps, but velocity lags position by {measured:.3g} steps, by how far a fall runs ahead of the "
+            f"exact one; set {_suggested_lag(measured)}"
         )
     return CheckResult(check, "passed", f"velocity lags position by {stated:.3g} steps")
 

@@ -7,11 +7,12 @@ CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "time
 
 
 class CheckResult(NamedTuple):
-    """The outcome of one check, and a message."""
+    """The outcome of one check, a message, and the traceback of an exception of the adapter if there was one."""
 
     check: str
     outcome: CheckOutcome
     message: str
+    traceback: str = ""
 
 
 class CheckFailed(Exception):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.conformance.exceptions import described
 from comparisons.conformance.explanations import explain_start
 from comparisons.conformance.outcomes import CheckFailed, CheckResult
 from comparisons.conformance.probes import DT, PROBES
@@ -61,12 +62,12 @@ def check_builds(engine: Engine, check: str) -> CheckResult:
         try:
             read_back += _verify_built(engine, scene)
         except (CheckFailed, BuildMismatch) as wrong:
-            raise CheckFailed(f"{scene.name}: {wrong}") from None
+            raise CheckFailed(f"{wrong} (in the scene {scene.name})") from None
         except Diverged:
             raise
         except Exception as error:
             raise CheckFailed(
-                f"{scene.name}: {type(error).__name__}: {error}; decline scenes that the engine cannot run, with a reason"
+                f"{described(error, engine)}, in the scene {scene.name}; decline scenes that the engine cannot run, with a reason"
             ) from error
     if not read_back:
         return CheckResult(check, "passed", "the start equals the scene's; as_built() returns no mass, inertia and gravity to compare")

@@ -1,33 +1,55 @@
 """`dropspin conform`."""
 
+import json
+from typing import TYPE_CHECKING
+
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
 from reports.commands.options import as_json, time_limit_option
 
+if TYPE_CHECKING:
+    from comparisons.conformance.outcomes import CheckResult
+
 
 @click.command("conform")
 @click.argument("engine_name", metavar="ENGINE")
 @click.option("--check", "checks", multiple=True, metavar="CHECK", help="Make this check only, by its name in the table; repeat for more.")
+@click.option("--traceback", is_flag=True, help="Print the whole traceback of each exception of the adapter.")
 @time_limit_option(60.0, "each check may take")
 @as_json
-def conform_command(engine_name: str, checks: tuple[str, ...], time_limit: float, json_output: bool) -> int:
+def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, time_limit: float, json_output: bool) -> int:
     """Check an engine adapter against the protocol and against reference motions.
 
     ENGINE is a name, as in `dropspin list engines`, or your own as my_module:MyEngine.
 
     Exit code: 0 every check passed, 1 a check failed, 2 bad input, 3 the engine crashed, hung or is not installed.
     """
-    from comparisons.conformance.checks import conform
+    from rich.console import Console
+
+    from comparisons.conformance.checks import CHECKS, conform
     from comparisons.engines.registry import engine
     from comparisons.running.processes import ResourceLimits
-    from reports.terminal.progress import status
-    from reports.terminal.rows import print_rows
+    from reports.terminal.rows import print_row, print_sentences
+    from reports.views import conform as view
 
-    chosen = engine(engine_name)
-    with status(f"checking {chosen.label}"):
-        found = conform(chosen, checks, resources=ResourceLimits(processor_time=time_limit))
-    stop_if_interrupted()
-    print_rows([{"check": one.check, "outcome": one.outcome, "message": one.message} for one in found], json_output)
+    chosen, console = engine(engine_name), Console()
+    found: list[CheckResult] = []
+
+    def show(result: "CheckResult") -> None:
+        stop_if_interrupted()
+        if not json_output:
+            print_row([result.check, result.outcome, view.message(result, found)], [max(map(len, CHECKS)), len("timed_out")], console)
+            if traceback and result.traceback:
+                click.echo(result.traceback)
+        found.append(result)
+
+    click.echo(f"checking {chosen.label}", err=True)
+    conform(chosen, checks, resources=ResourceLimits(processor_time=time_limit), on_result=show)
+    if json_output:
+        keys = ("check", "outcome", "message", *(["traceback"] if traceback else []))
+        click.echo(json.dumps([{key: getattr(one, key) for key in keys} for one in found], indent=1, ensure_ascii=False))
+    else:
+        print_sentences(view.sentences(found))
     outcomes = {one.outcome for one in found}
     return 3 if outcomes & {"crashed", "timed_out"} else int("failed" in outcomes)

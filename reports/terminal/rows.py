@@ -64,6 +64,15 @@ def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
     return ["  ".join(cell + " " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)).rstrip() for row in flat]
 
 
+def print_row(cells: Sequence[str], widths: Sequence[int], console: Console) -> None:
+    """Print one row of a table whose other rows are not yet known; the last cell, which has no width, is wrapped on a terminal."""
+    head = "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=False)) + "  "
+    text = " ".join(cells[-1].split())
+    if console.is_terminal:
+        text = _wrapped(text, max(console.width - len(head), NARROWEST)).replace("\n", "\n" + " " * len(head))
+    console.print(Text(head + text), soft_wrap=True)
+
+
 def print_sentence(sentence: str, console: Console, style: str = "") -> None:
     """Print a sentence, with line breaks between words on a terminal and as one line elsewhere."""
     console.print(Text(sentence, style=style), soft_wrap=not console.is_terminal)

@@ -5,7 +5,10 @@ import os
 from pathlib import Path
 
 import pytest
-from support.cli import dropspin, spawn
+from support.cli import TERMINAL, dropspin, spawn
+from support.engines import Exact
+
+from comparisons.conformance.checks import CHECKS, conform
 
 ADAPTER = (Path(__file__).parents[3] / "docs" / "bring-your-engine.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
 
@@ -39,6 +42,77 @@ def test_a_wrong_adapter_gets_exit_code_1_and_a_diagnosis(tmp_path):
     done = dropspin("conform", "my_module:Flyer", cwd=tmp_path)
     assert done.returncode == 1
     assert "angular velocity appears to be in the body frame" in " ".join(done.stdout.split())
+
+
+RAISING = """
+from dropspin import Engine, Simulation
+from support_of_mine import deeper
+
+
+class Mine(Engine):
+    name = "mine"
+
+    def prepare(self, scene, dt):
+        return Moving(scene)
+
+
+class Moving(Simulation):
+    def __init__(self, scene):
+        self.now = scene.initial_state
+
+    def advance(self, steps):
+        self.now[0] += deeper(self.now)  # line 18
+
+    def state(self):
+        return self.now.copy()
+"""
+
+
+@pytest.fixture
+def raising(tmp_path):
+    """The folder of an adapter that raises when it steps, in a function of another file."""
+    (tmp_path / "raising.py").write_text(RAISING)
+    (tmp_path / "support_of_mine.py").write_text("def deeper(state):\n    return state[99]\n")
+    return tmp_path
+
+
+ERROR = "IndexError: index 99 is out of bounds for axis 0 with size 13 (raising.py:18, in advance)"
+
+
+def test_exceptions_have_the_line_of_the_adapter_and_are_printed_once(raising):
+    done = dropspin("conform", "raising:Mine", cwd=raising)
+    assert done.returncode == 3
+    *rows, shared, outcome = done.stdout.splitlines()
+    assert [row[:20].strip() for row in rows] == list(CHECKS)
+    [first] = [row for row in rows if row.endswith(ERROR)]
+    same = [row for row in rows if row.endswith(f"  the same error as in '{first[:20].strip()}'")]
+    assert shared == f"{1 + len(same)} checks have one error: {ERROR}"
+    [built] = [row for row in rows if row.startswith("builds what is meant")]
+    assert f"{ERROR}, in the scene tumbling; decline scenes that the engine cannot run, with a reason" in built
+    assert outcome == f"{2 + len(same)} of {len(rows)} checks fail, with 2 different messages."
+    assert "Traceback" not in done.stdout
+
+
+def test_whole_traceback_of_an_adapter_is_printed_on_request(raising):
+    done = dropspin("conform", "raising:Mine", "--check", "time", "--traceback", cwd=raising)
+    assert 'support_of_mine.py", line 2, in deeper' in done.stdout
+    [row] = json.loads(dropspin("conform", "raising:Mine", "--check", "time", "--traceback", "--json", cwd=raising).stdout)
+    assert row["traceback"].startswith("Traceback (most recent call last):")
+    assert row["message"] == ERROR
+
+
+def test_checks_are_reported_as_they_finish():
+    """Each with its result, in order."""
+    reported = []
+    found = conform(Exact(), ["claims", "time"], on_result=reported.append)
+    assert reported == found
+    assert [one.check for one in found] == ["claims", "time"]
+
+
+def test_rows_fit_a_terminal_of_80_columns(raising):
+    lines = dropspin("conform", "raising:Mine", "--check", "time", cwd=raising, **TERMINAL).stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert ERROR in " ".join(" ".join(lines).split())
 
 
 ENGINE = "from dropspin import Engine\nclass Mine(Engine):"

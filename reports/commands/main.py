@@ -29,6 +29,9 @@ COMMANDS = {
     "tradeoff": "Measure what accuracy costs.",
 }
 """The commands, each in `reports/commands/NAME.py`, and their line in the help."""
+CITATION = """To cite: The dropspin developers, dropspin, version {version};
+for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
+"""What to cite; a test compares it with CITATION.cff."""
 INTERRUPTED = 130  # 128 + SIGINT, as in shells
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor a usage error
 
@@ -98,11 +101,19 @@ def _print_version(ctx: click.Context, parameter: click.Parameter, value: Any) -
     if value:
         from importlib.metadata import version
 
-        click.echo(f"dropspin, version {version('dropspin')}")
+        number = version("dropspin")
+        click.echo(f"dropspin, version {number}\n{CITATION.format(version=number)}")
         ctx.exit()
 
 
 @click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
-@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_print_version, help="Show the version and exit.")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_print_version,
+    help="Show the version and what to cite, and exit.",
+)
 def dropspin() -> None:
     """Run drop and spin scenes with rigid-body engines and compare them with exact solutions."""

@@ -5,9 +5,11 @@ import os
 import signal
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 from support.cli import DROPSPIN, dropspin, spawn
 
 import dropspin as ds
@@ -17,6 +19,7 @@ from reports.commands import main as cli
 from reports.commands.limits import limits_command
 from reports.commands.run import run_command
 
+ROOT = Path(__file__).parents[3]
 HARSH = """
 duration = 0.5
 [body]
@@ -122,6 +125,19 @@ def test_every_command_has_a_help_page(name, tmp_path):
     done = dropspin(name, "--help", cwd=tmp_path)
     assert done.returncode == 0
     assert done.stdout.startswith(f"Usage: dropspin {name} ")
+
+
+def test_version_says_what_to_cite(tmp_path):
+    """In the words of CITATION.cff, which has the version, the license and the name of the package."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= citation.keys()  # which the format requires
+    assert (citation["title"], citation["version"], citation["license"]) == (project["name"], project["version"], project["license"])
+    [note] = citation["references"]
+    lines = dropspin("--version", cwd=tmp_path).stdout
+    for words in (f"{citation['authors'][0]['name']}, dropspin, version {citation['version']}", "Huamin Wang", note["title"]):
+        assert words in lines
+    assert max(map(len, lines.splitlines())) <= 80
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])

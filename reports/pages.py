@@ -24,7 +24,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted")}
+    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted", "quantity")}
     environment.filters |= {"cell": _markdown_cell, "code": _markdown_code}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": numbers.MARKS}
     return environment

@@ -88,7 +88,9 @@ def _is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
 def _status(rows: pd.DataFrame | None) -> Status:
     if rows is None:
         return Status("missing", word("missing"))
-    mentioned = rows[(rows["verdict"] != "known") | (rows["value"].abs() > NEGLIGIBLE)]
+    is_small = (rows["verdict"] == "known") & ~(rows["value"].abs() > NEGLIGIBLE)
+    explains_nothing = (rows["verdict"] == "limited") & (rows["metric"] == "")
+    mentioned = rows[~(is_small | explains_nothing)]
     worst = min(mentioned["verdict"], key=SEVERITY.index)
     of_model = bool((rows.loc[rows["verdict"] == "known", "cause"] == "model").any())
     studied = worst in ("passed", "measured") and bool((rows["kind"] == "asymptotic_error").any())

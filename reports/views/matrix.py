@@ -38,7 +38,7 @@ class Matrix:
 def matrix(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> Matrix:
     """The matrix of a run, of at most `MOST_SCENES` scenes."""
     scenes, left_out = _shown(statuses)
-    leading = {one.scene: one for one in leading_errors(results)}
+    leading = leading_errors(results)
     rows = []
     for scene in scenes:
         one, found = leading.get(scene), statuses[scene]

@@ -95,8 +95,11 @@ class Chart:
 def draw(chart: Chart, axes: "Axes") -> None:
     """Draw a chart with matplotlib."""
     axes.set(xscale="log" if chart.x_log else "linear", yscale="log" if chart.y_log else "linear")
+    labelled: set[str] = set()
     for line in chart.lines:
-        _draw_line(chart, line, axes)
+        # One entry of the legend for all lines of a label; matplotlib leaves out labels that begin with an underscore.
+        _draw_line(chart, line, "_" if line.label in labelled else line.label, axes)
+        labelled.add(line.label)
     if chart.is_flat:
         low, high = axes.get_ylim()
         middle = 0.5 * (low + high)
@@ -125,11 +128,11 @@ def draw(chart: Chart, axes: "Axes") -> None:
     axes.set_ylabel(chart.y_label)
 
 
-def _draw_line(chart: Chart, line: Line, axes: "Axes") -> None:
+def _draw_line(chart: Chart, line: Line, label: str, axes: "Axes") -> None:
     colour = line.colour or ink()
     if line.low is not None and line.high is not None:
-        label = line.label if line.is_fill else None
-        axes.fill_between(line.x, line.low, line.high, color=colour, linewidth=0.0, alpha=0.3 if line.is_fill else 0.15, label=label)
+        alpha, of_band = (0.3, label) if line.is_fill else (0.15, None)
+        axes.fill_between(line.x, line.low, line.high, color=colour, linewidth=0.0, alpha=alpha, label=of_band)
     if line.is_fill:
         return
     y = np.maximum(line.y, ROUNDING) if chart.y_log else line.y
@@ -140,7 +143,7 @@ def _draw_line(chart: Chart, line: Line, axes: "Axes") -> None:
         style["drawstyle"] = "steps-post"
     if chart.rows:
         style["solid_capstyle"] = "butt"
-    axes.plot(line.x, y, label=line.label, **style)
+    axes.plot(line.x, y, label=label, **style)
 
 
 def _in_lines(label: str) -> str:

@@ -149,8 +149,9 @@ def test_bars_change_colour_half_way_between_two_points(study):
 
     axes = plt.figure().gca()
     plots.plot_failure_modes(study, "spin", axes)
-    bars = [(patch.get_y() + 0.5 * patch.get_height(), patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
     plt.close("all")
+    lines = [line for line in axes.get_lines() if line.get_label() != "nominal value"]
+    bars = sorted((float(line.get_ydata()[0]), *map(float, line.get_xdata())) for line in lines)
     expected = [(0, 0.0, 1.5), (0, 1.5, 2.0), (1, 0.0, 0.5), (1, 0.5, 2.0)]
     assert bars == [pytest.approx((row, math.log(10) * left, math.log(10) * right)) for row, left, right in expected]
-    assert axes.get_legend_handles_labels()[1] == ["sound", "diverged", "clamped"]
+    assert axes.get_legend_handles_labels()[1] == ["sound", "clamped", "diverged", "nominal value"]

@@ -71,7 +71,7 @@ def test_every_block_runs_and_draws(drawer, name):
             assert all(np.isfinite(np.asarray(line.get_ydata(), dtype=float)).any() for line in lines), path
             assert all(np.isfinite(patch.get_bbox().extents).all() and patch.get_width() >= 0.0 for patch in axes.patches), path
             assert len(axes.get_legend().get_texts()) >= 3
-            assert axes.name == "3d" or (axes.get_xlabel() and axes.get_ylabel()), path
+            assert not axes.axison or (axes.get_xlabel() and axes.get_ylabel()), path
             found[path.name] = figure
     assert len(found) == PAGES[name]
 

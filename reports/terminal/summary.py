@@ -34,6 +34,8 @@ def print_failures(groups: Sequence[FailureGroup], console: Console | None = Non
             print_sentence(f"✗ {sentence}", out, "red")
         if len(group.sentences) > MOST_SENTENCES:
             print_sentence(f"✗ {group.engine} fails in {len(group.sentences) - MOST_SENTENCES} more scenes.", out, "red")
+        if group.consistent_with:
+            print_sentence(group.consistent_with, out)
         out.print(Text(f"Reproduce: {group.reproduce}"), soft_wrap=True)  # a command is one line
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import FAILURES
+from comparisons.regressions.parameters import WrongParameter, wrong_parameters
 from comparisons.results.results import Results
 from comparisons.running.processes import ResourceLimits
 from reports.views.numbers import bound, formatted, step, subject, word
@@ -57,11 +58,13 @@ class FailureGroup:
     Attributes:
         engine: Label of the engine.
         sentences: For each scene its first failure, and how many other results fail; for a breakdown the scenes that share it.
+        consistent_with: The single wrong parameters that explain all asymptotic errors of these scenes; empty if none does.
         reproduce: The command, or the call, that reproduces them.
     """
 
     engine: str
     sentences: list[str]
+    consistent_with: str
     reproduce: str
 
 
@@ -115,7 +118,16 @@ def _group(results: Results, engine: str, causes: Sequence[Sequence[Failure]], b
     scenes = list(dict.fromkeys(one.scene for some in causes for one in some))
     accepted = any(one.accepted for some in causes for one in some)
     command = _command(results, scenes, engine, results.provenance["asked"]["dts"], baseline if accepted else None)
-    return FailureGroup(engine, [_of_one_cause(some) for some in causes], command)
+    parameters = dict.fromkeys(map(_described, wrong_parameters(results, engine)))
+    consistent_with = f"Consistent with {' or '.join(parameters)}." if parameters else ""
+    return FailureGroup(engine, [_of_one_cause(some) for some in causes], consistent_with, command)
+
+
+def _described(parameter: WrongParameter) -> str:
+    size = f"{100.0 * abs(parameter.share):.2g} %"
+    if not parameter.signed:
+        return f"{parameter.name} wrong by {size}"
+    return f"{parameter.name} {size} too {'high' if parameter.share > 0.0 else 'low'}"
 
 
 def _of_one_cause(some: Sequence[Failure]) -> str:

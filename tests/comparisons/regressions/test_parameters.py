@@ -1,0 +1,37 @@
+"""The single wrong parameter that the asymptotic errors of an engine are consistent with."""
+
+import pytest
+from support import engines as made
+from support.detection_power import FAULTS, faulty_engine
+
+from comparisons.regressions.parameters import wrong_parameters
+from comparisons.running.run import run
+from reports.views.failures import failures, grouped
+
+OF = {fault.title: fault for fault in FAULTS}
+
+
+@pytest.mark.parametrize(
+    ("title", "engine", "scenes", "size", "words"),
+    [
+        ("restitution", "exact", ["drop-ball", "drop-ball-lively"], 0.005, "restitution 0.5 % too high"),
+        ("restitution", "mujoco", ["drop-ball"], -0.003, "restitution 0.3 % too low"),
+        ("linear damping", "exact", ["fall-damped"], -0.01, "linear damping wrong by 1 %"),
+        ("moment of inertia about x", "exact", ["spin-asymmetric"], 0.01, "moment of inertia about x wrong by 1 %"),
+        ("Coulomb coefficient", "exact", ["slide-box"], 0.01, "Coulomb coefficient wrong by 1 % or gravity wrong by 1 %"),
+    ],
+)
+def test_planted_fault_is_among_the_parameters_that_are_named(title, engine, scenes, size, words):
+    """An error that two parameters cause alike names both: sliding depends on their product."""
+    results = run(scenes, faulty_engine(engine, OF[title], size))
+    [group] = grouped(results, failures(results))
+    assert group.consistent_with == f"Consistent with {words}."
+
+
+@pytest.mark.parametrize(
+    "engine",
+    [faulty_engine("exact", OF["gyroscopic term"], 0.01), made.engine_with("turned", made.turned_by(0.1)), made.Exact()],
+    ids=["gyroscopic", "turned", "sound"],
+)
+def test_fault_of_another_kind_is_attributed_to_no_parameter(engine):
+    assert wrong_parameters(run("spin-asymmetric", engine), engine.label) == []

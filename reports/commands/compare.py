@@ -23,14 +23,15 @@ def compare_command(old: str, new: str, summary: str | None, json_output: bool) 
     from comparisons.regressions.comparing import compare
     from comparisons.results.store import load_results
     from reports.markdown import compare_markdown
+    from reports.terminal.rows import print_sentences
     from reports.views import compare as view
 
-    changes = compare(load_results(Path(old), arrays=False), load_results(Path(new), arrays=False))
+    later = load_results(Path(new), arrays=False)
+    changes = compare(load_results(Path(old), arrays=False), later)
     if summary is not None:
         write_text(summary, compare_markdown(changes), append=True)
     if json_output:
         click.echo(json.dumps(view.as_data(changes), indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        for line in [*view.listed(changes), *view.sentences(changes)]:
-            click.echo(line)
+        print_sentences([*view.listed(changes), *view.commands(changes, later), *view.sentences(changes)])
     return int(bool(len(changes.regressions)))

@@ -8,6 +8,8 @@ import pandas as pd
 
 from comparisons.regressions.comparing import Changes
 from comparisons.regressions.speed import SpeedChange
+from comparisons.results.results import Results
+from reports.views.failures import reproduce_scenes
 from reports.views.numbers import formatted, subject
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
@@ -17,7 +19,7 @@ MOST_LINES = 12
 
 
 def listed(changes: Changes) -> list[str]:
-    """The changes: under a heading for each kind, a line for each metric of an engine in a scene."""
+    """The changes: under a heading for each kind, a line for each engine and scene."""
     listed = []
     for title, lines in tables(changes):
         listed.append(title)
@@ -25,6 +27,7 @@ def listed(changes: Changes) -> list[str]:
             f"  {line['scene']} · {line['engine']}: {line['result']} at {line['step']} from {line['before']} to {line['now']}"
             f"{'' if line['ratio'] == '–' else ', ' + line['ratio'] + ' times'}"
             f"{'' if line['tolerances'] == '–' else ', ' + line['tolerances'] + ' times its tolerance away'}"
+            f"{'' if line['others'] == '–' else '; and ' + line['others'] + ' other results'}"
             for line in lines
         ]
     return listed
@@ -37,7 +40,7 @@ def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
         results = changes.of(change)
         if len(results):
             lines = _lines(results)
-            more = f", the first {MOST_LINES} of {len(lines)} kinds" if len(lines) > MOST_LINES else ""
+            more = f", the first {MOST_LINES} of {len(lines)} scenes and engines" if len(lines) > MOST_LINES else ""
             found.append((f"{word}: {_count(len(results))}{more}", lines[:MOST_LINES]))
     return found
 
@@ -60,6 +63,12 @@ def sentences(changes: Changes) -> list[str]:
     return [*found, f"{verdict}."]
 
 
+def commands(changes: Changes, results: Results) -> list[str]:
+    """For each engine with results that are worse, moved or gone, the command that runs the scenes of these again."""
+    by_engine = changes.regressions.groupby("engine", sort=False)["scene"].unique()
+    return [f"Reproduce: {reproduce_scenes(results, list(scenes), str(engine))}" for engine, scenes in by_engine.items()]
+
+
 def as_data(changes: Changes) -> dict[str, Any]:
     """The comparison for JSON; undefined numbers are None."""
     differing = changes.results[changes.results["change"] != "same"]
@@ -76,8 +85,8 @@ def as_data(changes: Changes) -> dict[str, Any]:
 
 
 def _lines(results: pd.DataFrame) -> list[dict[str, str]]:
-    """A line for each metric of an engine in a scene: its largest change."""
-    return [_line(group.iloc[0].to_dict(), len(group)) for _, group in results.groupby(["engine", "scene", "metric", "kind"], sort=False)]
+    """A line for each engine and scene: its largest change, and the number of others, which have one cause as far as can be seen."""
+    return [_line(group.iloc[0].to_dict(), len(group)) for _, group in results.groupby(["engine", "scene"], sort=False)]
 
 
 def _line(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
@@ -87,11 +96,12 @@ def _line(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
         "scene": row["scene"],
         "engine": row["engine"],
         "result": subject(row["metric"], row["kind"]),
-        "step": "→ 0" if "," in row["steps"] else f"{1e3 * float(row['steps']):g} ms" + (f" and {count - 1} more" if count > 1 else ""),
+        "step": "→ 0" if "," in row["steps"] else f"{1e3 * float(row['steps']):g} ms",
         "before": formatted(before),
         "now": formatted(after),
         "ratio": f"{ratio:.3g}" if math.isfinite(ratio) else "–",
         "tolerances": "–" if math.isnan(row["in_tolerances"]) else f"{row['in_tolerances']:.3g}",
+        "others": f"{count - 1:,}" if count > 1 else "–",
     }
 
 

@@ -117,7 +117,7 @@ def grouped(results: Results, found: Sequence[Failure], baseline: str | None = N
 def _group(results: Results, engine: str, causes: Sequence[Sequence[Failure]], baseline: str | None) -> FailureGroup:
     scenes = list(dict.fromkeys(one.scene for some in causes for one in some))
     accepted = any(one.accepted for some in causes for one in some)
-    command = _command(results, scenes, engine, results.provenance["asked"]["dts"], baseline if accepted else None)
+    command = reproduce_scenes(results, scenes, engine, baseline=baseline if accepted else None)
     parameters = dict.fromkeys(map(_described, wrong_parameters(results, engine)))
     consistent_with = f"Consistent with {' or '.join(parameters)}." if parameters else ""
     return FailureGroup(engine, [_of_one_cause(some) for some in causes], consistent_with, command)
@@ -162,20 +162,31 @@ def what_fails(row: Row) -> str:
 
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
     """The command that measures a row again, or the call if its scene or its engine was given as an object."""
-    steps = results.provenance["asked"]["dts"] if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
-    return _command(results, [row["scene"]], row["engine"], steps, baseline if row["kind"] == "baseline" else None)
+    dts = None if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
+    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, baseline if row["kind"] == "baseline" else None)
 
 
-def _command(results: Results, names: Sequence[str], label: str, dts: Sequence[float], baseline: str | None) -> str:
-    """The command that runs some scenes of a run with one of its engines again, or the call if one of them was given as an object."""
-    scenes, steps = [results.scenes[name] for name in names], sorted(dts, reverse=True)
+def reproduce_scenes(
+    results: Results, names: Sequence[str], label: str, dts: Sequence[float] | None = None, baseline: str | None = None
+) -> str:
+    """The command that runs some scenes of a run with one of its engines again, or the call if one of them was given as an object.
+
+    Args:
+        results: The run.
+        names: Names of the scenes.
+        label: Label of the engine.
+        dts: Time steps [s]; None for all of the run.
+        baseline: The baseline file to compare with.
+    """
+    asked = results.provenance["asked"]
+    scenes, steps = [results.scenes[name] for name in names], sorted(asked["dts"] if dts is None else dts, reverse=True)
     engine = results.provenance["names"].get(label)  # my_module:MyEngine has a name of its own in results
     if engine is None or not all(scene.origin for scene in scenes):
         named = [repr(scene.origin) if scene.origin else f"<scene {scene.name!r}>" for scene in scenes]
         named_scenes = named[0] if len(named) == 1 else f"[{', '.join(named)}]"
         named_engine = f"<engine {label!r}>" if engine is None else repr(engine)
         return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]})"
-    options = [*_options(steps, results.provenance["asked"]["time_limit"]), *([] if baseline is None else ["--baseline", baseline])]
+    options = [*_options(steps, asked["time_limit"]), *([] if baseline is None else ["--baseline", baseline])]
     return shlex.join(["dropspin", "run", *(scene.origin for scene in scenes), "-e", engine, *options, "-o", "out/again"])
 
 

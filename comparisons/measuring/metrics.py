@@ -128,6 +128,8 @@ def _moment_in_first_impact(case: Comparison) -> Array:
     turned = np.diff(angular_momentum(case.scene, case.motion[np.array([before, after])]), axis=0)[0]
     pushed = case.motion.velocity[after] - case.motion.velocity[before] - (after - before) * case.dt * case.scene.acceleration
     scale = mass * float(np.linalg.norm(r) * np.linalg.norm(case.motion.velocity[before]))
+    if scale == 0.0:
+        raise Unresolved("the body is at rest before the impact")
     return np.array([turned - np.cross(r, mass * pushed)]) / scale
 
 

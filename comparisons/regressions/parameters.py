@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from comparisons.judging.convergence import JUMPING
 from comparisons.measuring.comparison import Comparison, exactly
-from comparisons.measuring.metric import Metric
 from comparisons.measuring.metrics import METRICS, metrics_for
 from comparisons.measuring.tolerances import negligible
 from comparisons.results.results import Results
@@ -124,15 +123,7 @@ def _sampled(scene: Scenario, dt: float) -> _Sampled | None:
 def _measured(scene: Scenario, motion: Trajectory, exact: Trajectory) -> dict[str, float]:
     truth = truth_for(scene)
     case = Comparison.with_truth(scene, motion, truth, exact)
-    return {metric.name: _value(metric, case) for metric in metrics_for(scene, truth)}
-
-
-def _value(metric: Metric, case: Comparison) -> float:
-    """The value of a metric; NaN where a motion with another parameter has none, such as one that meets no floor when the scene does."""
-    try:
-        return metric.value_or_nan([case])
-    except ZeroDivisionError:
-        return float("nan")
+    return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}
 
 
 def _times(scene: Scenario, dt: float) -> Array:

@@ -29,7 +29,7 @@ COMMANDS = {
     "tradeoff": "Measure what accuracy costs.",
 }
 """The commands, each in `reports/commands/NAME.py`, and their line in the help."""
-CITATION = """To cite: The dropspin developers, dropspin, version {version};
+CITATION = """To cite: The dropspin authors, dropspin, version {version};
 for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
 """What to cite; a test compares it with CITATION.cff."""
 INTERRUPTED = 130  # 128 + SIGINT, as in shells

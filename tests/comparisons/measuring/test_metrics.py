@@ -202,6 +202,15 @@ def test_planted_landing_error_is_measured():
     assert measure(scene, planted)["landing_error"] == pytest.approx(0.01 * spin[after, 2] / 1.01 / spin[before, 2], rel=1e-9)
 
 
+def test_moment_about_the_contact_point_of_a_body_at_rest_is_unresolved():
+    """A ball that is thrown up in its first step: it has no speed to compare with."""
+    scene, motion = exact_motion("drop-ball")
+    thrown = np.where(motion.t[:, None] > 0.0, [0.0, 3.0, 0.0], 0.0) + motion.t[:, None] * scene.acceleration
+    _, at_rest = exact_motion("drop-ball", velocity=thrown)
+    with pytest.raises(Unresolved, match="the body is at rest before the impact"):
+        METRICS["contact_momentum_error"].average([Comparison.with_truth(scene, at_rest, truth_for(scene))])
+
+
 def test_planted_moment_about_the_contact_point_is_measured():
     """An impact that adds ΔL about the contact point measures ΔL over M |r| |v| in every direction."""
     scene, motion = exact_motion("drop-ball")

@@ -54,7 +54,7 @@ def folder(results, tmp_path_factory):
     study.add_heading("A heading")
     study.add_list(["One sentence.", "Another <one>."])
     study.add_table([{"engine": "mujoco", "error": "1e-3"}])
-    study.add_charts("a-picture", [Chart("cost [s]", "error", [Line("mujoco", np.array([1.0, 2.0]), np.array([3.0, 4.0]))])])
+    study.add_charts("a-picture", [Chart("cost [s]", "error", [Line("<img src=x onerror=alert(1)>", np.array([1.0, 2.0]), np.array([3.0, 4.0]))])])
     # Two studies of one scene have pictures of the same name.
     sections = [study, Section("Where engines break", study.parts)]
     made = ds.write_report(results, tmp_path_factory.mktemp("out") / "run", sections).parent
@@ -232,6 +232,15 @@ def test_filters_hide_scenes_and_engines_and_count_the_rest(opened, results):
     assert sections.count() == len(results.scenes)
     assert tab.locator("[data-engine='0']:visible").count() == 0
     assert tab.locator("[data-engine='1']:visible").count() > 0
+
+
+def test_texts_of_a_study_are_texts_and_pages_load_nothing(opened):
+    """A label with markup stays text; the page's policy forbids every source but itself."""
+    tab = opened("report.html").tab
+    assert tab.locator(".chart .legend button", has_text="<img src=x onerror=alert(1)>").count() == 2
+    assert tab.locator("img").count() == 0
+    policy = tab.locator("meta[http-equiv='Content-Security-Policy']").get_attribute("content")
+    assert policy.startswith("default-src 'none'; ")
 
 
 def test_report_without_javascript_shows_all_but_filters_plots_and_replays(opened, results):

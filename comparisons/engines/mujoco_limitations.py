@@ -50,9 +50,13 @@ def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray
     speed = (1.0 + scene.floor.restitution) * float(length(stopped).max(initial=0.0))
     approach = float(-before[:, 8].min())
     changed = (1.0 - IMPEDANCE) / IMPEDANCE * float(inverse_inertias.max(initial=0.0)) * speed / approach
+    sizes = {"restitution_error": changed}
+    g = -float(scene.acceleration[1])
+    if g > 0.0 and scene.starts_above_floor:
+        e, added = scene.floor.restitution, changed * approach
+        sizes["bounce_height_error"] = (2.0 * e * approach * added + added**2) / (2.0 * g * scene.clearance)
     return KnownLimitation(
-        f"several forces share an impulse; MuJoCo's largest impedance, {IMPEDANCE:g}, changes the restitution by up to {changed:.2g}",
-        {"restitution_error": changed},
+        f"several forces share an impulse; MuJoCo's largest impedance, {IMPEDANCE:g}, changes the restitution by up to {changed:.2g}", sizes
     )
 
 

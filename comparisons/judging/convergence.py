@@ -82,9 +82,8 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
     floor = negligible(scene, metric.unit)
     found = error_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, rounded, signed=metric.signed, negligible=floor)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded)
-    if vector is not None and vector.cause == "model" and found.cause in ("discretisation", "unresolved"):
-        # The length is largest at another time than that of the components, so it may be larger than they are.
-        found = replace(vector, upper=max(vector.upper, found.upper), reason=f"{vector.reason}, in a component")
+    if vector is not None:
+        found = _with_components(found, vector, finest=abs(float(errors[np.argmin(dts)])))
     order, limit = _judge_order(claim, metric, found), None
     if order is not None:
         order = replace(order, tolerance=_order_tolerance(found, dts, errors, np.array([point.tolerance for point in series])))
@@ -97,6 +96,18 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
     is_undecided = found.cause == "unresolved" or (found.cause == "discretisation" and vector is not None and vector.cause == "unresolved")
     is_open = is_undecided and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
     return ConvergenceStudy(found.cause, order, limit, is_open)
+
+
+def _with_components(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
+    """The budget of a length, corrected by that of its components; `finest` is the error at the finest step."""
+    if vector.cause == "model" and length.cause in ("discretisation", "unresolved"):
+        # The length is largest at another time than that of the components, so it may be larger than they are.
+        return replace(vector, upper=max(vector.upper, length.upper), reason=f"{vector.reason}, in a component")
+    if length.cause == "model" and length.lower > finest and vector.cause != "model":
+        # A length that passes a minimum and grows at finer steps does so in a component; an irregular one only seems to.
+        reason = "its length seems to grow at finer time steps, but none of its components does"
+        return ErrorBudget("unresolved", reason, length.asymptotic_error, 0.0, length.upper)
+    return length
 
 
 def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:

@@ -54,7 +54,9 @@ def folder(results, tmp_path_factory):
     study.add_heading("A heading")
     study.add_list(["One sentence.", "Another <one>."])
     study.add_table([{"engine": "mujoco", "error": "1e-3"}])
-    study.add_charts("a-picture", [Chart("cost [s]", "error", [Line("<img src=x onerror=alert(1)>", np.array([1.0, 2.0]), np.array([3.0, 4.0]))])])
+    study.add_charts(
+        "a-picture", [Chart("cost [s]", "error", [Line("<img src=x onerror=alert(1)>", np.array([1.0, 2.0]), np.array([3.0, 4.0]))])]
+    )
     # Two studies of one scene have pictures of the same name.
     sections = [study, Section("Where engines break", study.parts)]
     made = ds.write_report(results, tmp_path_factory.mktemp("out") / "run", sections).parent

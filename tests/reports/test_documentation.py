@@ -1,5 +1,6 @@
 """The documentation, followed step by step: its commands are run, their output is compared with the page, and links are checked."""
 
+import json
 import re
 import shlex
 import sys
@@ -81,6 +82,46 @@ def test_calibration_page_shows_the_output_of_its_first_command(tmp_path):
 @pytest.mark.slow
 def test_page_on_choosing_a_step_shows_the_output_of_its_commands(tmp_path):
     assert follow("choose-a-step.md", tmp_path) == [0, 0]
+
+
+FINDING = re.compile(
+    r"^\| .+ \| (?P<order>order of )?`(?P<name>\w+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d[\d.e-]*))?(?: m)? \|"
+    r" `dropspin (?P<command>run .+)` \|$",
+    re.MULTILINE,
+)
+
+
+def findings():
+    """The rows of the page on engines, by command."""
+    by_command = {}
+    for row in FINDING.finditer((ROOT / "docs" / "engines.md").read_text(encoding="utf-8")):
+        by_command.setdefault(row["command"], []).append(row)
+    return by_command
+
+
+def test_every_finding_on_the_page_on_engines_has_a_value_and_a_command():
+    lines = (ROOT / "docs" / "engines.md").read_text(encoding="utf-8").splitlines()
+    rows = [line for line in lines if re.match(r"\| (?!finding)", line)]
+    assert [row[0] for of_command in findings().values() for row in of_command] == sorted(rows, key=rows.index)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", findings())
+def test_commands_of_the_page_on_engines_measure_the_values_printed_there(command, tmp_path):
+    """To the printed digits; at the finest time step, or as dt → 0. A word is a verdict."""
+    results = json.loads(cli.dropspin(*shlex.split(command), "--json", "-o", "out", cwd=tmp_path).stdout)
+    finest = min((one["dt"] for one in results if one["dt"]), default=None)
+    for row in findings()[command]:
+        kinds = {"order"} if row["order"] else {"asymptotic_error"} if row["relation"] == "→" else {"truth", "invariant"}
+        if row["value"] is None:
+            assert {one["verdict"] for one in results} == {row["name"]}
+            continue
+        of_metric = [one for one in results if one["metric"] == row["name"] and one["kind"] in kinds]
+        [measured] = [one["value"] for one in of_metric if one["dt"] in (finest, None)]
+        if row["relation"] == "<":
+            assert abs(measured) < float(row["value"])
+        else:
+            assert float(f"{measured:.1e}") == float(row["value"])
 
 
 def test_python_of_the_readme_and_of_the_replay_page_runs(tmp_path, monkeypatch):

@@ -1,7 +1,9 @@
 # Two commands do everything on a fresh machine: `make report` and `make test`.
-PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
+# Python 3.11 is preferred, because PyBullet has wheels for it alone. `make PYTHON=/path/to/python report` takes another.
+IS_NEW := -c 'import sys; sys.exit(sys.version_info < (3, 11))'
+PYTHON ?= $(shell for python in python3.11 python3; do "$$python" $(IS_NEW) 2> /dev/null && echo "$$python" && break; done)
 
 .PHONY: report test test-browser test-all faults coverage bench examples docs lint clean
 
@@ -44,10 +46,18 @@ clean:
 	rm -rf $(VENV) out
 
 $(VENV)/bin/python:
-	$(PYTHON) -m venv $(VENV)
+	@"$(PYTHON)" $(IS_NEW) 2> /dev/null || \
+	  { echo "error: dropspin needs Python 3.11 or later, found: $$("$(or $(PYTHON),python3)" --version 2>&1); install one," \
+	    "or name one: make PYTHON=/path/to/python" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2> /dev/null || \
+	  { echo "error: $(PYTHON) cannot make environments; install its module venv (Debian, Ubuntu: apt-get install python3-venv)" >&2; exit 1; }
+	"$(PYTHON)" -m venv $(VENV)
 
 $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/python -c 'import pybullet' 2> /dev/null || \
+	  echo "PyBullet is left out, and tests that use it: it has wheels for CPython 3.11 on Linux x86-64 only." \
+	    "To build it: $(BIN)/pip install pybullet"
 	touch $@
 
 # `pip install --group` needs pip 25.1.

@@ -1,7 +1,9 @@
 """Settings and fixtures that all tests share."""
 
+import importlib.util
 import os
 from collections.abc import Callable
+from itertools import compress
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,18 @@ from hypothesis import settings
 # Numerical properties are cheap but not uniform in time; a deadline would test the machine.
 settings.register_profile("default", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
+
+FIXTURES_WITH_PYBULLET = {"core_run", "repository"}
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the modules that use PyBullet where it is not installed; it has wheels for Python 3.11 alone."""
+    if importlib.util.find_spec("pybullet") is None:
+        uses = [
+            FIXTURES_WITH_PYBULLET & {*item.fixturenames} or "pybullet" in item.path.read_text(encoding="utf-8").lower() for item in items
+        ]
+        config.hook.pytest_deselected(items=list(compress(items, uses)))
+        items[:] = [item for item, use in zip(items, uses, strict=True) if not use]
 
 
 @pytest.fixture(scope="session")

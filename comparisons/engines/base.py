@@ -27,7 +27,7 @@ class EngineMissing(DropspinError):
 
 
 class Diverged(Exception):
-    """The engine gave up on a simulation; the text says at which step and why."""
+    """A simulation broke down; the text says at which step and why."""
 
 
 @dataclass(frozen=True)

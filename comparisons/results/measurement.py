@@ -15,14 +15,14 @@ Kind = Literal["", "truth", "invariant", "agreement", "prediction", "ensemble", 
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """A measurement, or what became of an engine where there is none.
+    """A measurement, or the outcome of an engine that has none.
 
     Attributes:
         scene: Name of the scene.
         engine: Label of the engine.
-        dt: Time step [s]; NaN for what several steps give together.
+        dt: Time step [s]; NaN for results of several time steps.
         seed: Number of the start, for sweeps; 0 in a run.
-        metric: Name of the metric; empty where an engine has no motion, or only a remark.
+        metric: Name of the metric; empty in a row about an engine, without a value.
         value: The value, in `unit`.
         unit: SI unit; '1' for a ratio.
         kind: What the value is compared with.

@@ -25,8 +25,8 @@ class Results:
         scenes: The scenes, by name, in the order they were run.
         engines: The engines' labels, in order.
         trajectories: By (scene, engine, dt): the motion from the scene's own start, every step.
-        ensembles: By (scene, engine, dt): what became of each start, where the scene has an ensemble.
-        provenance: What was asked for, versions, machine, settings per engine and scene.
+        ensembles: By (scene, engine, dt): the results of each start, if the scene has an ensemble.
+        provenance: The arguments of the run, versions, machine, settings per engine and scene.
     """
 
     table: pd.DataFrame

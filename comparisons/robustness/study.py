@@ -88,7 +88,7 @@ def find_limits(
     on_progress: Callable[[str, float], None] = lambda what, share: None,
     resources: ResourceLimits = RESOURCES,
 ) -> RobustnessStudy:
-    """Take a scene to its extremes along axes.
+    """Vary one quantity of a scene at a time, up to extreme values, and find the failure modes of engines.
 
     Args:
         scene: A scene, its catalogue name, or the path of its file.

@@ -59,7 +59,7 @@ def simulate(scene: Scenario | str, engine: Engine | str, dt: float, every: int 
 
     Raises:
         DropspinError: The engine is unknown, not installed, or declines the scene, or the time step does not fit it.
-        Diverged: The engine gave up.
+        Diverged: The simulation broke down.
     """
     scene = as_scene(scene)
     chosen = installed_engine(engine)
@@ -87,7 +87,7 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
 
     Raises:
         BuildMismatch: The engine built another scene, or its record is not one.
-        Diverged: The engine gave up.
+        Diverged: The simulation broke down.
     """
     steps = scene.steps(dt)
     with engine.prepare(scene, dt) as simulation:
@@ -113,7 +113,7 @@ def record_batch(engine: Engine, starts: Sequence[Scenario], dt: float) -> list[
 
     Raises:
         BuildMismatch: A motion does not begin at its start, or a record is not one.
-        Diverged: The engine gave up, or a motion is not finite.
+        Diverged: The simulation broke down, or a motion is not finite.
     """
     steps = starts[0].steps(dt)
     times = dt * np.arange(steps + 1, dtype=float)
@@ -158,7 +158,7 @@ def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> tuple[
     """The wall time of native stepping alone [s], and the state it leads to, shape (13,).
 
     Raises:
-        Diverged: The engine gave up.
+        Diverged: The simulation broke down.
     """
     with engine.prepare(scene, dt) as simulation:
         start = time.perf_counter()

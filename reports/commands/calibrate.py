@@ -11,7 +11,7 @@ from reports.commands.options import as_json
 
 @click.command("calibrate")
 @click.option("-e", "--engine", "engine_name", default="mujoco", show_default=True, metavar="ENGINE", help="The engine, with options.")
-@click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Speed after an impact over speed before.")
+@click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Coefficient of restitution.")
 @click.option("--dt", type=float, required=True, metavar="SECONDS", help="The time step.")
 @click.option("--friction", default="none", show_default=True, metavar="F", help="none, infinite or a coefficient.")
 @click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", show_default=True, help="The shape that falls.")
@@ -28,7 +28,7 @@ def calibrate_command(
 ) -> None:
     """Print the settings that give a restitution at a time step, ready to paste, and what was measured with them.
 
-    MuJoCo has two ways: a damper over one step, and with -e mujoco[spring_steps=20] a spring over that many steps.
+    MuJoCo's contact is a damper over one time step or, with -e mujoco[spring_steps=20], a spring over 20.
     """
     from comparisons.calibration import calibrate
     from comparisons.engines.registry import engine

@@ -13,17 +13,23 @@ from hypothesis import settings
 settings.register_profile("default", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
-FIXTURES_WITH_PYBULLET = {"core_run", "repository"}
+WITH_PYBULLET = {"core_run", "repository", "engine_coverage"}
+"""Fixtures, and a module of tests/support, that use PyBullet."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the modules that use PyBullet where it is not installed; it has wheels for Python 3.11 alone."""
+    """Leave out the tests that use PyBullet where it is not installed; it has wheels for Python 3.11 alone."""
     if importlib.util.find_spec("pybullet") is None:
-        uses = [
-            FIXTURES_WITH_PYBULLET & {*item.fixturenames} or "pybullet" in item.path.read_text(encoding="utf-8").lower() for item in items
-        ]
-        config.hook.pytest_deselected(items=list(compress(items, uses)))
-        items[:] = [item for item, use in zip(items, uses, strict=True) if not use]
+        left_out = [uses_pybullet(item) for item in items]
+        config.hook.pytest_deselected(items=list(compress(items, left_out)))
+        items[:] = [item for item, is_left_out in zip(items, left_out, strict=True) if not is_left_out]
+
+
+def uses_pybullet(item: pytest.Item) -> bool:
+    """Whether a test's module names PyBullet, or the test uses one of `WITH_PYBULLET`."""
+    assert isinstance(item, pytest.Function)
+    names = {*item.fixturenames, *item.function.__code__.co_names}
+    return bool(WITH_PYBULLET & names) or "pybullet" in item.path.read_text(encoding="utf-8").lower()
 
 
 @pytest.fixture(scope="session")

@@ -151,6 +151,38 @@ def test_commands_of_the_pages_exist_with_their_options(page):
         command.make_parser(click.Context(command)).parse_args(arguments)
 
 
+def quoted_constants():
+    """By page, phrases with the constants of the code that they quote."""
+    from comparisons.robustness import runner
+    from comparisons.robustness import study as limits
+    from comparisons.running.start_phases import START_PHASES
+    from comparisons.tradeoff import costs, errors, points, study
+
+    ladder = [
+        f"exceeds `--budget` ({errors.BUDGET:g} s)",
+        f"with a floor {errors.MOST_RECORDED:,}",
+        f"above {errors.CONVERGED:g} of its largest",
+    ]
+    cost = [f"the median of {study.ROUNDS} rounds", f"less than a factor of {points.LEVEL:g}", f"in a batch of {costs.BATCH}"]
+    runs = [
+        f"the time step `--dt` ({1e3 * limits.DT:g} ms)",
+        f"`--within` ({limits.WITHIN:g})",
+        f"more than {runner.MOST_ROWS:,} time steps",
+    ]
+    return {
+        "choose-a-step.md": ladder + cost,
+        "limits.md": [*runs, f"at least {runner.FEWEST_STEPS_WITHOUT_GRAVITY:,} time steps"],
+        "figures.md": [f"means over {START_PHASES} starts"],
+        "verdicts.md": [f"run from {START_PHASES} start phases"],
+    }
+
+
+@pytest.mark.parametrize("page", quoted_constants())
+def test_pages_quote_the_constants_of_the_code(page):
+    text = squeezed((ROOT / "docs" / page).read_text(encoding="utf-8"))
+    assert [phrase for phrase in quoted_constants()[page] if phrase not in text] == []
+
+
 def test_reference_documents_every_public_name():
     text = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
     assert sorted(re.findall(r"^\.\. \S+:: dropspin\.(\w+)$", text, re.MULTILINE)) == ds.__all__

@@ -57,7 +57,7 @@ $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@$(BIN)/python -c 'import pybullet' 2> /dev/null || \
 	  echo "PyBullet is left out, and tests that use it: it has wheels for CPython 3.11 on Linux x86-64 only." \
-	    "To build it: $(BIN)/pip install pybullet"
+	    "$(BIN)/pip install pybullet tries to compile it, which takes long."
 	touch $@
 
 # `pip install --group` needs pip 25.1.

@@ -85,7 +85,7 @@ def test_page_on_choosing_a_step_shows_the_output_of_its_commands(tmp_path):
 
 
 FINDING = re.compile(
-    r"^- .+: (?P<order>order of )?`(?P<name>\w+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\n"
+    r"^- .+: (?P<order>order of )?`(?P<name>\w+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
     r"  `dropspin (?P<command>run .+)`$",
     re.MULTILINE,
 )

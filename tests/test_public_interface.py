@@ -1,5 +1,8 @@
 """`import dropspin as ds`: what a notebook calls first, and what wrong arguments end in."""
 
+import inspect
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -117,3 +120,18 @@ def test_a_wrong_argument_ends_in_one_sentence(call, message):
         call()
     assert str(error.value).startswith(message)
     assert "\n" not in str(error.value)
+
+
+def callables():
+    """The public functions and classes, and the public methods of the classes, by name."""
+    found = {name: getattr(ds, name) for name in ds.__all__ if callable(getattr(ds, name))}
+    classes = {name: public for name, public in found.items() if inspect.isclass(public)}
+    methods = ((f"{name}.{part}", getattr(public, part)) for name, public in classes.items() for part in vars(public) if part[0] != "_")
+    without_signature = {name for name, public in classes.items() if issubclass(public, Exception)}
+    return {name: public for name, public in (found | dict(methods)).items() if callable(public) and name not in without_signature}
+
+
+@pytest.mark.parametrize("name", callables())
+def test_signature_shows_no_anonymous_function_and_no_address(name):
+    """As `help` prints it."""
+    assert not re.search("lambda|0x", str(inspect.signature(callables()[name])))

@@ -11,7 +11,7 @@ from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
 from comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
-from comparisons.running.inputs import as_scene, engine_entry, several, verify_time_step
+from comparisons.running.inputs import as_scene, engine_entry, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from scenarios import DropspinError, Scenario
 from scenarios.errors import UnknownName
@@ -85,7 +85,7 @@ def find_limits(
     *,
     dt: float = DT,
     within: float = WITHIN,
-    on_progress: Callable[[str, float], None] = lambda what, share: None,
+    on_progress: Callable[[str, float], None] | None = None,
     resources: ResourceLimits = RESOURCES,
 ) -> RobustnessStudy:
     """Vary one quantity of a scene at a time, up to extreme values, and find the failure modes of engines.
@@ -112,13 +112,13 @@ def find_limits(
     left_out = {one.label: one.missing for one in entries if one.engine is None}
     present = [one for one in entries if one.engine is not None]
     scans, refinements = [], {}
-    nominal = OperatingPoint(scene, dt)
+    nominal, callback = OperatingPoint(scene, dt), on_progress or ignore
     with EngineProcesses(resources) as processes:
         for number, entry in enumerate(present):
             runner, share = Runner(entry, within, processes), number / len(present)
-            known = refinements[entry.label] = refine(runner, nominal, partial(_report, on_progress, f"{entry.label}, dt", share))
+            known = refinements[entry.label] = refine(runner, nominal, partial(_report, callback, f"{entry.label}, dt", share))
             for done, axis in enumerate(chosen):
-                report = partial(_report, on_progress, f"{entry.label}, {axis.name}", share + done / len(chosen) / len(present))
+                report = partial(_report, callback, f"{entry.label}, {axis.name}", share + done / len(chosen) / len(present))
                 scans.append(scan_axis(runner, nominal, axis, on_progress=report, known=known if axis.name == "step" else ()))
     return RobustnessStudy(scene, dt, within, tuple(scans), left_out, refinements)
 

@@ -35,6 +35,10 @@ ONE_OR_SEVERAL = {
 SINGLE: dict[str, Any] = {"scenes": Scenario | str, "engines": Engine | str, "dt": int | float}
 
 
+def ignore(*arguments: object) -> None:
+    """The callback of a caller who gives none."""
+
+
 def several(name: str, given: Any) -> list[Any]:
     """One scene, engine or time step, or several of them, as a list.
 

@@ -11,7 +11,7 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
 from comparisons.results.provenance import adapter_code, provenance
 from comparisons.results.results import Results, joined
-from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, several, verify_time_step
+from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.progress import OnProgress, Progress
 from comparisons.running.scene_run import run_scene
@@ -26,9 +26,9 @@ def run(
     engines: Engine | str | Iterable[Engine | str],
     dt: float | Iterable[float] = DEFAULT_DTS,
     *,
-    on_progress: OnProgress = lambda progress: None,
+    on_progress: OnProgress | None = None,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
-    keep: Callable[[Results], None] = lambda part: None,
+    keep: Callable[[Results], None] | None = None,
     done: Iterable[Results] = (),
 ) -> Results:
     """Run every scene with every engine at every time step, measure, and judge.
@@ -50,15 +50,16 @@ def run(
     entries, dts = prepared.entries, prepared.dts
     stamp = _stamp(prepared, resources)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if _is_the_same(part.provenance, stamp)}
+    report, keep = on_progress or ignore, keep or ignore
     parts = []
     with EngineProcesses(resources) as processes:
         for scene, truth in zip(prepared.scenes, prepared.truths, strict=True):
             if scene.model_dump_json() in earlier:
                 parts.append(replace(earlier[scene.model_dump_json()], scenes={scene.name: scene}))
                 for entry, step in product(entries, dts):
-                    on_progress(Progress(scene.name, entry.label, step, finished=True))
+                    report(Progress(scene.name, entry.label, step, finished=True))
                 continue
-            parts.append(run_scene(StartPhase(scene, truth), entries, dts, processes, on_progress, stamp))
+            parts.append(run_scene(StartPhase(scene, truth), entries, dts, processes, report, stamp))
             keep(parts[-1])
     return joined(parts, stamp)
 

@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
+from comparisons.running.inputs import ignore
 from comparisons.running.processes import ResourceLimits
 from comparisons.sweeps.cluster import connected, run_on_cluster
 from comparisons.sweeps.folder import SweepFolder
@@ -22,7 +23,7 @@ def run_sweep(
     resume: bool = False,
     scheduler: str | None = None,
     resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
-    on_progress: Callable[[int], None] = lambda jobs: None,
+    on_progress: Callable[[int], None] | None = None,
 ) -> None:
     """Run the jobs of a sweep that a folder does not have yet.
 
@@ -49,15 +50,16 @@ def run_sweep(
             raise DropspinError(
                 f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; resume it with --resume, or choose another folder with -o."
             )
-    on_progress(kept)
+    report = on_progress or ignore
+    report(kept)
     parts = work.missing(folder)
     if scheduler is None:
         folder.begin(work.description)
-        run_locally(work, parts, folder, on_progress)
+        run_locally(work, parts, folder, report)
         return
     with connected(scheduler) as client:
         folder.begin(work.description)
-        run_on_cluster(client, work, parts, folder, on_progress)
+        run_on_cluster(client, work, parts, folder, report)
 
 
 def count(where: str) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 
 from comparisons.engines.base import Engine
 from comparisons.measuring.metrics import leading_metric, metrics_for
-from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, several
+from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, ignore, several
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.tradeoff.costs import cost, costs_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps
@@ -55,7 +55,7 @@ def tradeoff(
     metric: str | None = None,
     *,
     budget: float = BUDGET,
-    on_progress: OnProgress = lambda what, share: None,
+    on_progress: OnProgress | None = None,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
 ) -> TradeOff:
     """Measure error and cost of engines over a ladder of time steps.
@@ -84,12 +84,13 @@ def tradeoff(
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
     named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
     entries = {one.label: one for entry in named for one in _with_accuracy_levels(entry)}
+    report = on_progress or ignore
     with EngineProcesses(resources) as processes:
         ladders = []
         for number, entry in enumerate(entries.values(), 1):
             ladders.append(errors_over_steps(entry, scene, [chosen, of_the_motion], budget, processes))
-            on_progress(f"errors of {entry.label}", 0.5 * number / len(entries))
-        points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, processes, on_progress)
+            report(f"errors of {entry.label}", 0.5 * number / len(entries))
+        points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, processes, report)
     measured = {point.engine for point in points}
     ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
     found = TradeOff(scene, chosen, points, tuple(ladders))

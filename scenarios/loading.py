@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from scenarios.errors import SceneError, did_you_mean
@@ -44,8 +45,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         SceneError: The scene is not valid. The text names the file, the key, the value and what is allowed.
     """
     if isinstance(scene, Mapping):
-        name = scene.get("name", "scene")
-        return _validate(str(name), "", {key: value for key, value in scene.items() if key != "name"})
+        return _from_mapping(scene)
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
@@ -57,7 +57,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         str(path).encode()
     except UnicodeEncodeError:
         raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
-    return _validate(path.stem, str(scene), read_toml(path, str(scene)))
+    return from_table(path.stem, str(scene), read_toml(path, str(scene)))
 
 
 def _find(scene: str | Path) -> Path:
@@ -105,7 +105,36 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = MAX_FI
         raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
 
 
-def _validate(name: str, origin: str, content: dict[str, Any]) -> Scenario:
+def _from_mapping(scene: Mapping[str, Any]) -> Scenario:
+    """The scene of a mapping, whose values may be NumPy's."""
+    if "origin" in scene:
+        raise SceneError(f"scene['origin']: got {shown(scene['origin'])}; the key is not allowed.")
+    try:
+        return Scenario.model_validate({"name": "scene", **_without_numpy(scene)})
+    except ValidationError as error:
+        raise SceneError(first_problem(Scenario, error, ALTERNATIVES, "scene")) from None
+
+
+def _without_numpy(value: Any) -> Any:
+    """A value with arrays as lists, and NumPy's scalars as Python's."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _without_numpy(one) for key, one in value.items()}
+    return [_without_numpy(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def from_table(name: str, origin: str, content: dict[str, Any]) -> Scenario:
+    """The scene of a file's content.
+
+    Args:
+        name: The name of the scene.
+        origin: The path of the file as the user gave it; empty if there is none.
+        content: The file's tables.
+
+    Raises:
+        SceneError: The scene is not valid.
+    """
     where = origin or f"scene {name!r}"
     for key in ("name", "origin"):
         if key in content:

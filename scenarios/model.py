@@ -114,8 +114,8 @@ class Scenario(Table):
     file's content, in SI units.
     """
 
-    name: Annotated[str, Field(json_schema_extra={"hidden": True})]
-    origin: Annotated[str, Field(exclude=True, json_schema_extra={"hidden": True})] = ""
+    name: Annotated[str, Field(json_schema_extra={"hidden": "in files"})]
+    origin: Annotated[str, Field(exclude=True, json_schema_extra={"hidden": "always"})] = ""
     summary: str = ""
     source: str = ""
     tags: tuple[str, ...] = ()

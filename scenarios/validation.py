@@ -1,6 +1,7 @@
 """From the tables of a file to pydantic models; an error becomes one line that says where, what was given and what is allowed."""
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -11,6 +12,9 @@ Kind = TypeVar("Kind", bound=BaseModel)
 Problem = Mapping[str, Any]
 Alternatives = Mapping[tuple[str, str], str]
 """Words for the other values that a key takes, by key and pydantic's type of error: pydantic reports each alternative alone."""
+
+NAMED_KEY = re.compile(r"([a-z_.]+): (.*)")
+"""A problem of several tables together: the key that it names, and the text."""
 
 
 def validated(kind: type[Kind], where: str, content: Any) -> Kind:
@@ -30,14 +34,21 @@ def validated(kind: type[Kind], where: str, content: Any) -> Kind:
         raise DropspinError(f"{where}: {first_problem(kind, error)}") from None
 
 
-def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: Alternatives | None = None) -> str:
-    """The first problem of a table as 'key: got value; what is allowed.', and how many other keys have problems."""
+def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: Alternatives | None = None, root: str = "") -> str:
+    """The first problem of a table as 'key: got value; what is allowed.', and how many other keys have problems.
+
+    Args:
+        kind: The model.
+        error: Pydantic's error.
+        alternatives: Words for the other values that keys take.
+        root: For a mapping in Python its name: keys are then given as scene['body']['mass']; by default as body.mass, as in a file.
+    """
     problems = error.errors(include_url=False)
     # A key that takes a word or something else is reported once for each; for a value that is not a word, the word's problem is irrelevant.
     relevant = [problem for problem in problems if problem["type"] != "literal_error" or isinstance(problem["input"], str)]
     others = len({tuple(_located(kind, problem["loc"])[0][:2]) for problem in problems}) - 1
     more = f" (and {others} more {'problem' if others == 1 else 'problems'})" if others else ""
-    return f"{_described(kind, (relevant or problems)[0], alternatives or {})}{more}"
+    return f"{_described(kind, (relevant or problems)[0], alternatives or {}, root)}{more}"
 
 
 def shown(value: Any) -> str:
@@ -46,42 +57,51 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternatives) -> str:
+def _key(path: Sequence[str | int], root: str) -> str:
+    """A key of a file, such as body.mass; with a root that of a mapping, such as scene['body']['mass']."""
+    if root:
+        return root + "".join(f"[{part!r}]" for part in path)
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+
+
+def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternatives, root: str) -> str:
     """One problem as 'key: got value; what is allowed.'."""
     path, table = _located(kind, problem["loc"])
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+    key = _key(path, root)
     prefix = f"{key}: " if key else ""
     given = shown(problem["input"])
     match problem["type"]:
         case "extra_forbidden":
-            allowed = [field.alias or name for name, field in table.model_fields.items() if not _is_hidden(field)]
+            allowed = [field.alias or name for name, field in table.model_fields.items() if not _is_hidden(field, root)]
             return f"{prefix}unknown key. Allowed: {', '.join(allowed)}.{did_you_mean(str(path[-1]), allowed)}"
         case "missing":
             return f"{prefix}missing; it has no default."
         case "union_tag_not_found" | "union_tag_invalid" as fault:
             name, tags = problem["ctx"]["discriminator"].strip("'"), ", ".join(map(repr, _tagged(table, path[-1])))
             found = "missing" if fault == "union_tag_not_found" else f"got {shown(problem['input'][name])}"
-            return f"{prefix.removesuffix(': ')}.{name}: {found}; must be one of {tags}."
+            return f"{_key([*path, name], root)}: {found}; must be one of {tags}."
         case "value_error" if isinstance(problem["input"], dict):  # of a whole table: the text names keys and values
-            return f"{prefix}{problem['ctx']['error']}."
+            named = NAMED_KEY.fullmatch(str(problem["ctx"]["error"])) if not path else None
+            return f"{prefix}{problem['ctx']['error']}." if named is None else f"{_key(named[1].split('.'), root)}: {named[2]}."
         case "value_error":
             return f"{prefix}got {given}; {problem['ctx']['error']}."
         case "too_short" | "too_long" as fault:
             bound, count = problem["ctx"]["min_length" if fault == "too_short" else "max_length"], problem["ctx"]["actual_length"]
             return f"{prefix}got {given}; must have at {'least' if fault == 'too_short' else 'most'} {_items(bound)}, has {count}."
         case "model_type" | "model_attributes_type":
-            return f"{prefix}got {given}; must be a table, such as [{key}] with its keys below."
-    message = problem["msg"].replace("Input should", "must").replace("valid ", "")
-    return f"{prefix}got {given}; {message}{alternatives.get((key, problem['type']), alternatives.get((key, '*'), ''))}."
+            return f"{prefix}got {given}; must be a {'mapping' if root else f'table, such as [{key}] with its keys below'}."
+    dotted, message = _key(path, ""), problem["msg"].replace("Input should", "must").replace("valid ", "").replace("a tuple", "a list")
+    return f"{prefix}got {given}; {message}{alternatives.get((dotted, problem['type']), alternatives.get((dotted, '*'), ''))}."
 
 
 def _items(count: int) -> str:
     return f"{count} item{'' if count == 1 else 's'}"
 
 
-def _is_hidden(field: Any) -> bool:
-    """Whether a field of a model is not a key of its file."""
-    return bool((field.json_schema_extra or {}).get("hidden"))
+def _is_hidden(field: Any, root: str) -> bool:
+    """Whether a field of a model is not a key of its file, or not of its mapping either."""
+    hidden = (field.json_schema_extra or {}).get("hidden")
+    return hidden == "always" or (hidden == "in files" and not root)
 
 
 def _located(kind: type[BaseModel], location: tuple[Any, ...]) -> tuple[list[str | int], type[BaseModel]]:

@@ -9,6 +9,8 @@ import pytest
 
 import dropspin as ds
 
+FALL = {"duration": 0.5, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}, "gravity": {"acceleration": [0.0, -9.8, 0.0]}}
+
 
 @pytest.fixture(scope="module")
 def results():
@@ -20,6 +22,21 @@ def test_run_takes_one_or_several_names_or_objects(results):
     """The rows are the same, but for the time they took."""
     again = ds.run([ds.load("drop-ball")], [ds.engine("mujoco")], dt=[4e-3])
     pd.testing.assert_frame_equal(again.table.drop(columns="time_per_step"), results.table.drop(columns="time_per_step"))
+
+
+def test_a_mapping_and_a_path_are_scenes(tmp_path):
+    """For `run`, `simulate` and `measure`; a file's scene has its name."""
+    ball = FALL | {"start": {"position": np.array([0.0, 1.0, 0.0])}}
+    (tmp_path / "ball.toml").write_text(
+        "duration = 0.5\nbody = {shape = 'sphere', radius = 0.1, mass = 1.0}\nstart = {position = [0, 1, 0]}\n"
+        "gravity = {acceleration = [0, -9.8, 0]}\n"
+    )
+    found = ds.run([ball, tmp_path / "ball.toml"], "mujoco", dt=1e-2).measurements.set_index("scene")
+    assert set(found.index) == {"scene", "ball"}
+    np.testing.assert_array_equal(found.loc["scene", "value"], found.loc["ball", "value"])
+    assert set(ds.run(ball, "mujoco", dt=1e-2).table["scene"]) == {"scene"}
+    errors = ds.measure(ball, ds.simulate(ball, "mujoco", dt=1e-2))
+    assert errors["energy_error"] == found.loc["scene"].set_index("metric").loc["energy_error", "value"]
 
 
 def test_run_measures_every_combination_at_the_default_time_steps():
@@ -99,8 +116,11 @@ def test_repr_of_a_trajectory_is_one_line():
         (lambda: ds.run("mujoco", "drop-ball"), "scene 'mujoco' is an engine; give the scene first and the engine second."),
         (lambda: ds.run("mujoco[integrator=rk4]", "drop-ball"), "scene 'mujoco[integrator=rk4]' is an engine; give the scene first"),
         (lambda: ds.simulate("mujoco", "drop-ball", 1e-2), "scene 'mujoco' is an engine; give the scene first and the engine second."),
-        (lambda: ds.run(3, "mujoco"), "scenes: got 3 (int); give a Scenario, a name such as 'drop-ball', or a list of these."),
-        (lambda: ds.run([3], "mujoco"), "scene: got 3 (int); give a name such as 'drop-ball', a file's path, or a Scenario from load()."),
+        (
+            lambda: ds.run(3, "mujoco"),
+            "scenes: got 3 (int); give a Scenario, a name such as 'drop-ball', a file's path, a mapping, or a list of",
+        ),
+        (lambda: ds.run([3], "mujoco"), "scene: got 3 (int); give a name such as 'drop-ball', a file's path, a mapping, or a Scenario."),
         (lambda: ds.run("drop-ball", None), "engines: got None (NoneType); give an Engine, a name such as 'mujoco', or a list of these."),
         (lambda: ds.run("drop-ball", [3]), "engine: got 3 (int); give a name such as 'mujoco', or an Engine."),
         (lambda: ds.run("drop-ball", "mujocco"), "engine 'mujocco' is unknown. Did you mean 'mujoco'?"),
@@ -108,6 +128,11 @@ def test_repr_of_a_trajectory_is_one_line():
         (lambda: ds.run("drop-ball", "mujoco", dt=["fast"]), "dt: got 'fast' (str); a time step is a number of seconds."),
         (lambda: ds.run("drop-ball", "mujoco", dt=True), "dt: got True (bool); a time step is a number of seconds."),
         (lambda: ds.run("drop-ball", "mujoco", dt=[]), "dt: got none; give at least one."),
+        (lambda: ds.run({"duration": 1.0}, "mujoco"), "scene['body']: missing; it has no default."),
+        (
+            lambda: ds.run([{"name": "a"} | FALL] * 2, "mujoco"),
+            "two scenes have the same name (a, a); rename a file, or give a mapping a 'name'.",
+        ),
         (lambda: ds.run([], "mujoco"), "scenes: got none; give at least one."),
         (lambda: ds.truth_for("drop-ball"), "scene: got 'drop-ball' (str); give a Scenario, as load() returns it."),
         (lambda: ds.measure("drop-ball", 3), "motion: got a int; give a Trajectory, such as simulate() returns."),

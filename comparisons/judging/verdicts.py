@@ -121,17 +121,22 @@ def verify_expectations(scene: Scenario, truth: Truth | None, engines: Iterable[
     """Raise `SceneError` if an expectation would never be judged: no such metric, not for this scene, no such engine."""
     known_engines = {*BUILT_IN, *(label.split("[")[0] for label in engines)}
     for number, expectation in enumerate(scene.expect):
-        where = f"{scene.origin or scene.name}: expect[{number}]"
+        metric_key, engine_key = (_key(scene, number, name) for name in ("metric", "engine"))
         if expectation.metric not in METRICS:
             raise SceneError(
-                f"{where}.metric: got {expectation.metric!r}; no such metric."
+                f"{metric_key}: got {expectation.metric!r}; no such metric."
                 f"{did_you_mean(expectation.metric, METRICS)} Known: {', '.join(METRICS)}."
             )
         metric = METRICS[expectation.metric]
         if not metric.applies(scene, truth):
-            raise SceneError(f"{where}.metric: got {metric.name!r}; it needs {metric.needs}, which this scene does not have.")
+            raise SceneError(f"{metric_key}: got {metric.name!r}; it needs {metric.needs}, which this scene does not have.")
         if expectation.engine is not None:
-            _verify_engine(f"{where}.engine: got {expectation.engine!r}", expectation.engine, known_engines)
+            _verify_engine(f"{engine_key}: got {expectation.engine!r}", expectation.engine, known_engines)
+
+
+def _key(scene: Scenario, number: int, name: str) -> str:
+    """A key of an expectation, in the scene's file or mapping."""
+    return f"{scene.origin}: expect[{number}].{name}" if scene.origin else f"scene['expect'][{number}][{name!r}]"
 
 
 def _verify_engine(where: str, name: str, known: set[str]) -> None:

@@ -11,7 +11,7 @@ from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
 from comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
-from comparisons.running.inputs import as_scene, engine_entry, ignore, several, verify_time_step
+from comparisons.running.inputs import SceneLike, as_scene, engine_entry, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from scenarios import DropspinError, Scenario
 from scenarios.errors import UnknownName
@@ -79,7 +79,7 @@ def _last_in_a_row(points: Sequence[ScanPoint], allowed: Sequence[str]) -> float
 
 
 def find_limits(
-    scene: Scenario | str,
+    scene: SceneLike,
     engines: Engine | str | Iterable[Engine | str] = (),
     axes: Sequence[str] = (),
     *,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from comparisons.engines.registry import engine as engine_named
 from comparisons.engines.registry import engine_names
 from scenarios import DropspinError, Scenario, SceneError, load
 
+SceneLike = Scenario | str | Path | Mapping[str, Any]
+"""A scene, its catalogue name, the path of its file, or a mapping with the same keys as a file."""
 FEWEST_STEPS = 4
 MOST_STEPS = 2_000_000
 """Steps of one run; 32 start phases of that many fit into a machine's memory."""
@@ -26,13 +29,13 @@ class EngineEntry:
 
 
 ONE_OR_SEVERAL = {
-    "scenes": "a Scenario, a name such as 'drop-ball', or a list of these",
+    "scenes": "a Scenario, a name such as 'drop-ball', a file's path, a mapping, or a list of these",
     "engines": "an Engine, a name such as 'mujoco', or a list of these",
     "dt": "a number of seconds, or a list of these",
 }
 
 
-SINGLE: dict[str, Any] = {"scenes": Scenario | str, "engines": Engine | str, "dt": int | float}
+SINGLE: dict[str, Any] = {"scenes": Scenario | str | Path | Mapping, "engines": Engine | str, "dt": int | float}
 
 
 def ignore(*arguments: object) -> None:
@@ -82,20 +85,20 @@ def installed_engine(engine: Engine | str) -> Engine:
     return entry.engine
 
 
-def as_scene(scene: Any) -> Scenario:
-    """A scene, or the scene of a catalogue name or of a file's path.
+def as_scene(scene: SceneLike) -> Scenario:
+    """A scene, or what `load` takes: a catalogue name, a file's path, or a mapping.
 
     Raises:
         DropspinError: It is neither, or there is no such scene.
     """
     if isinstance(scene, Scenario):
         return scene
-    if not isinstance(scene, str):
-        raise DropspinError(f"scene: got {_described(scene)}; give a name such as 'drop-ball', a file's path, or a Scenario from load().")
+    if not isinstance(scene, str | Path | Mapping):
+        raise DropspinError(f"scene: got {_described(scene)}; give a name such as 'drop-ball', a file's path, a mapping, or a Scenario.")
     try:
         return load(scene)
     except SceneError:
-        if scene.partition("[")[0].strip() in engine_names():
+        if isinstance(scene, str) and scene.partition("[")[0].strip() in engine_names():
             raise DropspinError(f"scene {scene!r} is an engine; give the scene first and the engine second.") from None
         raise
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from comparisons.engines.base import Diverged, Engine, KnownLimitation
 from comparisons.judging.verdicts import Verdict
-from comparisons.running.inputs import as_scene, installed_engine, verify_time_step
+from comparisons.running.inputs import SceneLike, as_scene, installed_engine, verify_time_step
 from comparisons.running.verification import BATCH_ULPS, verified_limitations, verified_record, verify_build, verify_start
 from scenarios import DropspinError, Scenario, Trajectory
 
@@ -45,7 +45,7 @@ class Recording:
     seconds: float = float("nan")
 
 
-def simulate(scene: Scenario | str, engine: Engine | str, dt: float, every: int = 1) -> Trajectory:
+def simulate(scene: SceneLike, engine: Engine | str, dt: float, every: int = 1) -> Trajectory:
     """Simulate one scene with one engine.
 
     Args:

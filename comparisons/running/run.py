@@ -11,7 +11,7 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
 from comparisons.results.provenance import adapter_code, provenance
 from comparisons.results.results import Results, joined
-from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, ignore, several, verify_time_step
+from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, engine_entry, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.progress import OnProgress, Progress
 from comparisons.running.scene_run import run_scene
@@ -22,7 +22,7 @@ DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
 
 
 def run(
-    scenes: Scenario | str | Iterable[Scenario | str],
+    scenes: SceneLike | Iterable[SceneLike],
     engines: Engine | str | Iterable[Engine | str],
     dt: float | Iterable[float] = DEFAULT_DTS,
     *,
@@ -76,7 +76,7 @@ class PreparedRun(NamedTuple):
 
 
 def prepare_run(
-    scenes: Scenario | str | Iterable[Scenario | str], engines: Engine | str | Iterable[Engine | str], dt: float | Iterable[float]
+    scenes: SceneLike | Iterable[SceneLike], engines: Engine | str | Iterable[Engine | str], dt: float | Iterable[float]
 ) -> PreparedRun:
     """Check a request of a run, and find its engines and exact solutions.
 
@@ -100,7 +100,7 @@ def prepare_run(
 def _verify_request(scenes: Sequence[Scenario], truths: Sequence[Truth | None], dts: Sequence[float], labels: Sequence[str]) -> None:
     names = [scene.name for scene in scenes]
     if len(set(names)) < len(names):
-        raise DropspinError(f"two scenes have the same name ({', '.join(names)}); a scene's name is its file's name, rename one.")
+        raise DropspinError(f"two scenes have the same name ({', '.join(names)}); rename a file, or give a mapping a 'name'.")
     for scene, truth in zip(scenes, truths, strict=True):
         verify_expectations(scene, truth, labels)
         for dt in dts:
@@ -129,7 +129,7 @@ def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
     return asked and all(earlier[what] == stamp[what] for what in ("versions", "python", "cpu", "code", "adapters"))
 
 
-def measure(scene: Scenario | str, motion: Trajectory) -> dict[str, float]:
+def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:
     """Every metric that the scene has, of one motion; NaN where the time step is too coarse for it."""
     scene = as_scene(scene)
     if not isinstance(motion, Trajectory):

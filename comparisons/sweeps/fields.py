@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Any
 
-from scenarios import DropspinError, Scenario, load
+from scenarios import DropspinError, Scenario
 from scenarios.errors import did_you_mean
-from scenarios.loading import FEATURES
+from scenarios.loading import FEATURES, from_table
 
 TABLES = ("body", *(name for name in FEATURES if name != "expect"))
 Path = tuple[str | int, ...]
@@ -55,7 +55,7 @@ def with_fields(scene: Scenario, values: Iterable[tuple[str, Any]]) -> Scenario:
     content = content_of(scene)
     for name, value in values:
         set_field(content, path_of(name), value)
-    return load({"name": scene.name, **content})
+    return from_table(scene.name, "", content)
 
 
 def set_field(content: dict[str, Any], path: Path, value: Any) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from comparisons.engines.base import Engine
 from comparisons.measuring.metrics import leading_metric, metrics_for
-from comparisons.running.inputs import EngineEntry, as_scene, engine_entry, ignore, several
+from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, engine_entry, ignore, several
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.tradeoff.costs import cost, costs_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps
@@ -50,7 +50,7 @@ OnProgress = Callable[[str, float], None]
 
 
 def tradeoff(
-    scene: Scenario | str,
+    scene: SceneLike,
     engines: Engine | str | Iterable[Engine | str] = (),
     metric: str | None = None,
     *,

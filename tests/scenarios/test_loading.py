@@ -103,6 +103,42 @@ def test_mapping_may_have_a_name():
     assert load(BALL).name == "scene"
 
 
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"body": BALL["body"] | {"mass": -1}}, "scene['body']['mass']: got -1; must be greater than 0."),
+        (
+            {"floor": {"restitution": 0.5, "friction": "none"}},
+            "scene['start']['position']: got [0.0, 0.0, 0.0]; there the body is 0.1 m below the floor; raise it.",
+        ),
+        ({"gravity": {"acceleration": -9.8}}, "scene['gravity']['acceleration']: got -9.8; must be a list."),
+        ({"body": {"shape": "ball"}}, "scene['body']['shape']: got 'ball'; must be one of 'sphere', 'box', 'vertices'."),
+        (
+            {"floor": {"restitution": 0.5, "friction": "sticky"}},
+            "scene['floor']['friction']: got 'sticky'; must be 'none' or 'infinite', or a",
+        ),
+        ({"floor": 0.5}, "scene['floor']: got 0.5; must be a mapping."),
+        ({"expect": [{"metric": "energy_error", "below": 1.0}]}, "scene['expect'][0]['reason']: missing; it has no default."),
+        ({"flor": {}}, "scene['flor']: unknown key. Allowed: name, summary,"),
+        ({"name": 3}, "scene['name']: got 3; must be a string."),
+        ({"origin": "there"}, "scene['origin']: got 'there'; the key is not allowed."),
+    ],
+)
+def test_wrong_mapping_is_rejected_with_its_key(changed, message):
+    """As Python writes it, in one line."""
+    with pytest.raises(SceneError) as caught:
+        load(BALL | changed)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+def test_mapping_may_have_arrays():
+    """Arrays for lists, and NumPy's numbers for numbers."""
+    position = np.array([0, 1, 0])
+    scene = load(BALL | {"duration": np.int64(1), "start": {"position": position, "velocity": (np.float32(0.5), 0, 0)}})
+    assert scene == load(BALL | {"start": {"position": [0.0, 1.0, 0.0], "velocity": [0.5, 0.0, 0.0]}})
+
+
 def test_bare_name_is_the_catalogue_s_although_a_file_exists(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("drop-ball.toml").write_text('duration = 9.0\n[body]\nshape = "sphere"\nradius = 1.0\nmass = 1.0\n')

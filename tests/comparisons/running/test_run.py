@@ -205,7 +205,7 @@ def test_request_is_checked_before_anything_runs():
     typo = ds.load(
         BALL.model_dump(exclude_none=True, exclude={"expect"}) | {"expect": [{"metric": "energy_eror", "below": 1, "reason": "typo"}]}
     )
-    with pytest.raises(SceneError, match=r"expect\[0\]\.metric: got 'energy_eror'.*Did you mean 'energy_error'"):
+    with pytest.raises(SceneError, match=r"^scene\['expect'\]\[0\]\['metric'\]: got 'energy_eror'.*Did you mean 'energy_error'"):
         ds.run([typo], ["document"])
 
 

@@ -1,5 +1,6 @@
 """Trajectories: the states of a body over time."""
 
+import html
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
@@ -12,6 +13,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+
+
+def _shown(values: Array) -> str:
+    return ", ".join(f"{value:.3g}" for value in values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +64,17 @@ class Trajectory:
     def __repr__(self) -> str:
         if len(self) == 0:
             return "<Trajectory: no states>"
-        return f"<Trajectory: {len(self)} states from t = {self.t[0]:g} s to {self.t[-1]:g} s>"
+        return f"<Trajectory: {len(self)} states from t = {self.t[0]:.3g} s to {self.t[-1]:.3g} s>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the first and the last state."""
+        named = {"position": "m", "orientation": "x, y, z, w", "velocity": "m/s", "angular_velocity": "rad/s"}
+        header = "".join(f"<th>{name.replace('_', ' ')} [{unit}]</th>" for name, unit in named.items())
+        ends = [
+            f"<tr><th>t = {end.t[0]:.3g} s</th>" + "".join(f"<td>{_shown(getattr(end, name)[0])}</td>" for name in named) + "</tr>"
+            for end in ([self[:1], self[-1:]] if len(self) else [])
+        ]
+        return f"<p>{html.escape(repr(self)[1:-1])}</p><table><tr><th></th>{header}</tr>{''.join(ends)}</table>"
 
     def __len__(self) -> int:
         return len(self.t)

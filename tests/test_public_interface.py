@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -31,7 +32,7 @@ def test_a_mapping_and_a_path_are_scenes(tmp_path):
         "duration = 0.5\nbody = {shape = 'sphere', radius = 0.1, mass = 1.0}\nstart = {position = [0, 1, 0]}\n"
         "gravity = {acceleration = [0, -9.8, 0]}\n"
     )
-    found = ds.run([ball, tmp_path / "ball.toml"], "mujoco", dt=1e-2).measurements.set_index("scene")
+    found = ds.run([ball, tmp_path / "ball.toml"], "mujoco", dt=1e-2).table.set_index("scene")
     assert set(found.index) == {"scene", "ball"}
     np.testing.assert_array_equal(found.loc["scene", "value"], found.loc["ball", "value"])
     assert set(ds.run(ball, "mujoco", dt=1e-2).table["scene"]) == {"scene"}
@@ -54,9 +55,41 @@ def test_the_table_has_a_row_for_each_measurement(results):
     assert set(results.table["dt"]) == {4e-3}
 
 
-def test_repr_of_results_counts_the_verdicts(results):
-    verdicts = ", ".join(f"{count} {verdict}" for verdict, count in results.table["verdict"].value_counts().items())
-    assert repr(results) == f"<Results: scenes drop-ball; engines mujoco; {len(results.table)} measurements: {verdicts}>"
+def test_repr_of_results_has_scenes_engines_steps_and_checks(results):
+    passed = (results.table["verdict"] == "passed").sum()
+    assert repr(results) == f"<Results: drop-ball with mujoco at dt = 4 ms: {passed} checks passed, 0 failed>"
+
+
+def table_of(html):
+    """The table in a text that is well-formed as XML, its first column as index."""
+    header, *rows = ([cell.text for cell in row] for row in ElementTree.fromstring(f"<div>{html}</div>").iter("tr"))
+    return pd.DataFrame([row[1:] for row in rows], index=[row[0] for row in rows], columns=header[1:])
+
+
+def test_notebook_shows_status_and_leading_error_of_each_engine():
+    """Scenes by engines; also of a scene without an exact solution, an engine that declines it, and names with markup."""
+    named = ds.load(FALL | {"name": "<b>fall</b>"})
+    unsolved = ds.load("drop-box-corner")
+    sideways = unsolved.starting_at(unsolved.initial_state + np.eye(13)[7])
+    sideways = sideways.model_copy(update={"floor": unsolved.floor.model_copy(update={"friction": 0.3}), "expect": ()})
+    found = ds.run([named, sideways, ds.load("spin-principal")], ["document", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
+    shown = table_of(found._repr_html_())
+    assert list(shown.columns) == ["leading error", "document", "mujoco"]
+    assert list(shown["leading error"]) == ["position error", "–", "orientation error"]
+    for scene, unit in (("<b>fall</b>", "m"), ("spin-principal", "rad")):
+        for engine in found.engines:
+            status, error, shown_unit = re.fullmatch(r"(.+), (\S+) (\w+)", shown.loc[scene, engine]).groups()
+            metric = f"{shown.loc[scene, 'leading error'].replace(' ', '_')}"
+            rows = found.table[(found.table["scene"] == scene) & (found.table["engine"] == engine) & (found.table["metric"] == metric)]
+            [value] = rows.loc[rows["dt"] == 2e-3, "value"]
+            assert float(error) == pytest.approx(abs(value), rel=0.05)
+            assert (status, shown_unit) == ("converges", unit)
+    assert shown.loc["drop-box-corner", "document"] == "declined"
+    assert shown.loc["drop-box-corner", "mujoco"] == "outside the documented range"
+    assert "<b>" not in found._repr_html_()
+    assert found.leading_errors("drop-box-corner").empty
+    with pytest.raises(ds.UnknownName, match=r"'spin-principle' is unknown\. Did you mean 'spin-principal'"):
+        found.leading_errors("spin-principle")
 
 
 def test_summary_has_a_line_for_each_engine():
@@ -102,6 +135,33 @@ def test_repr_of_a_trajectory_is_one_line():
     motion = ds.truth_for(ds.load("spin-principal"))(np.linspace(0.0, 0.5, 6))
     assert repr(motion) == "<Trajectory: 6 states from t = 0 s to 0.5 s>"
     assert repr(motion[:0]) == "<Trajectory: no states>"
+
+
+def test_notebook_shows_the_ends_of_a_trajectory():
+    motion = ds.truth_for(ds.load("fall-spin"))(np.linspace(0.0, 0.5, 6))
+    shown = table_of(motion._repr_html_())
+    assert list(shown.index) == ["t = 0 s", "t = 0.5 s"]
+    for place, row in zip((0, -1), shown.index, strict=True):
+        for column, values in (("position [m]", motion.position), ("angular velocity [rad/s]", motion.angular_velocity)):
+            np.testing.assert_allclose([float(part) for part in shown.loc[row, column].split(",")], values[place], rtol=5e-3)
+    assert "no states" in motion[:0]._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("errors", "start"),
+    [
+        ([0.025, 0.015, 0.01, 0.0075], "Model error: the asymptotic error is 0.005 (95 % interval 0.00"),
+        ([0.008, 0.004, 0.002, 0.001], "Discretisation error: the asymptotic error is "),
+        ([0.008, np.nan, np.nan, 0.001], "Unresolved error: only 2 of 4 time steps are usable; extrapolation needs three that span a"),
+        ([0.0, 0.0, 0.0, 0.0], "Rounding error: the asymptotic error is 0 (95 % interval 0 to 0)."),
+    ],
+)
+def test_repr_of_an_error_budget_is_a_sentence(errors, start):
+    """The cause, the asymptotic error with its interval, and the order if there is one."""
+    found = ds.error_budget([8e-3, 4e-3, 2e-3, 1e-3], errors)
+    assert repr(found).startswith(start)
+    assert repr(found).endswith(".")
+    assert (f", the order {found.order:.2f} (" in repr(found)) == np.isfinite(found.order) == (found.cause in ("model", "discretisation"))
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,8 @@ An error that vanishes as dt → 0 is a discretisation error; one that does not 
 The interval excludes 0 under a model error, contains 0 otherwise, and reaches under a discretisation error no farther than said.
 """
 
+from __future__ import annotations  # help() then shows ArrayLike, not all that it stands for
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -74,6 +76,16 @@ class ErrorBudget:
     order_upper: float = math.nan
     dts: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        cause = f"{self.cause.capitalize()} error: "
+        if math.isnan(self.asymptotic_error):
+            return f"{cause}{self.reason}."
+        why = f"{self.reason}; " if self.cause == "unresolved" else ""
+        value = f"the asymptotic error is {self.asymptotic_error:.3g} (95 % interval {self.lower:.3g} to {self.upper:.3g})"
+        has_no_order = math.isnan(self.order)
+        order = "" if has_no_order else f", the order {self.order:.2f} ({self.order_lower:.2f} to {self.order_upper:.2f})"
+        return f"{cause}{why}{value}{order}."
+
 
 def is_sufficient(dts: Sequence[float]) -> bool:
     """Whether time steps are enough for extrapolation: three that span a factor of four."""
@@ -95,13 +107,16 @@ def error_budget(
 
     Args:
         dts: Time steps [s], shape (n,), in any order. The five finest that are usable count.
-        errors: The error at each, with its sign if it has one; NaN where the step was too coarse to resolve it.
+        errors: The error at each, shape (n,), in any unit, with its sign if it has one; NaN where the step was too coarse to resolve it.
         claimed_order: The order that the method is known to have; None or inf if it has none.
-        resolution: Standard deviation of the sampling noise of each error, or one for all.
-        rounding: The largest error that rounding alone may cause, at each step or for all.
+        resolution: Standard deviation of the sampling noise of each error, shape (n,), or one for all; in the unit of the errors.
+        rounding: The largest error that rounding alone may cause, at each step, shape (n,), or for all; in the unit of the errors.
         signed: Whether the error can be negative; one that cannot is taken for the norm of one that can.
-        negligible: An asymptotic error up to this size is no model error.
+        negligible: An asymptotic error up to this size is no model error; in the unit of the errors.
         judged_together: How many errors are judged together, each with this fraction of the risks of one (C. E. Bonferroni, 1936).
+
+    Returns:
+        The cause, the asymptotic error and the order, each with its 95 % interval.
 
     Raises:
         DropspinError: The time steps or the errors are not what is described above.

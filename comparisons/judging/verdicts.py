@@ -16,6 +16,25 @@ from scenarios.model import Expectation
 
 Verdict = Literal["passed", "failed", "known", "measured", "limited", "diverged", "crashed", "timed_out", "declined", "missing", "no_truth"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+WORDS = {"known": "known fault", "timed_out": "timed out", "no_truth": "no exact solution"}
+"""Verdicts in words, where these are not the verdict itself."""
+MARKS = {
+    "passed": "✓",
+    "failed": "✗",
+    "known": "≠",
+    "measured": "·",
+    "limited": "!",
+    "diverged": "∞",
+    "crashed": "✗",
+    "timed_out": "⏱",
+    "declined": "–",
+    "missing": "?",
+    "no_truth": "·",
+}
+"""Verdicts as one character."""
+SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "known", "limited", "no_truth", "passed", "measured")
+"""Worst first: the verdict that represents a scene and an engine."""
+assert set(SEVERITY) == set(VERDICTS)
 FAILURES = frozenset({"failed"})
 BREAKDOWNS = frozenset({"diverged", "crashed", "timed_out"})
 HOLDS_AGAIN = "the known fault does not show; its expectation can be removed"

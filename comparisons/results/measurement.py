@@ -83,3 +83,8 @@ COLUMNS = {field.name: _DTYPES.get(field.type, "str") for field in fields(Measur
 def as_table(measurements: Sequence[Measurement]) -> pd.DataFrame:
     """Measurements as a table, one row each, with the columns and types of `COLUMNS`."""
     return pd.DataFrame([vars(one) for one in measurements], columns=list(COLUMNS)).astype(COLUMNS)
+
+
+def empty_table() -> pd.DataFrame:
+    """A table without rows."""
+    return as_table([])

@@ -1,19 +1,43 @@
 """A run: its table, its trajectories and its provenance."""
 
+import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES
+from comparisons.judging.convergence import JUMPING
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, SEVERITY, WORDS
+from comparisons.measuring.metrics import leading_metric
 from comparisons.results.ensembles import EnsembleOutcome
+from comparisons.results.measurement import empty_table
 from comparisons.results.provenance import digest
-from scenarios import Scenario, Trajectory
+from scenarios import Scenario, Trajectory, UnknownName, truth_for
 
 TrajectoryKey = tuple[str, str, float]
 NEGLIGIBLE = 1e-4
 """Errors below this (relative to the scene's scale, in m or in rad) are not mentioned in summaries and reports."""
+
+STATUS_WORDS = {**WORDS, "limited": "outside the documented range"}
+UNDECIDED = "partly undecided"
+"""The status of an engine that passes in a scene, but of which the time steps leave errors undecided."""
+MOST_NAMES = 4
+"""Scenes or engines that a title names; of more it has the number."""
+MOST_ROWS = 60
+"""Scenes that a notebook shows; of more it shows the first and the last."""
+
+
+class Status(NamedTuple):
+    """What became of an engine in a scene: its worst verdict, and the status in words."""
+
+    verdict: str
+    words: str
+
+    @property
+    def mark(self) -> str:
+        """The status as one character."""
+        return "~" if self.words == UNDECIDED else MARKS[self.verdict]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,12 +45,15 @@ class Results:
     """A run.
 
     Attributes:
-        table: One row per measurement, with the columns of `Measurement`; dt and time_per_step in s.
+        table: One row per measurement, with the columns of `Measurement`; dt and time_per_step in s. A row without a metric says what
+            became of an engine that has no motion, or has a remark.
         scenes: The scenes, by name, in the order they were run.
         engines: The engines' labels, in order.
         trajectories: By (scene, engine, dt): the motion from the scene's own start, every step.
         ensembles: By (scene, engine, dt): the results of each start, if the scene has an ensemble.
         provenance: The arguments of the run, versions, machine, settings per engine and scene.
+        predictions: The errors that theory predicts for an engine's method, with the same columns; few scenes and methods have any.
+        agreements: The differences between each two engines, with the same columns; `truth` has the label of the other engine.
     """
 
     table: pd.DataFrame
@@ -35,11 +62,62 @@ class Results:
     trajectories: Mapping[TrajectoryKey, Trajectory]
     ensembles: Mapping[TrajectoryKey, EnsembleOutcome] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    predictions: pd.DataFrame = field(default_factory=empty_table)
+    agreements: pd.DataFrame = field(default_factory=empty_table)
 
     def __repr__(self) -> str:
-        counts = self.table["verdict"].value_counts()
-        verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-        return f"<Results: scenes {', '.join(self.scenes)}; engines {', '.join(self.engines)}; {len(self.table)} measurements: {verdicts}>"
+        return f"<Results: {self._title}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the status of each engine in each scene, and its leading error."""
+        statuses, rows = self.statuses(), []
+        for scene in self.scenes:
+            errors = self.leading_errors(scene)
+            first = errors.iloc[0] if len(errors) else None
+            unit = "" if first is None or first["unit"] == "1" else f" {first['unit']}"
+            sizes = {engine: f", {size:.2g}{unit}" for engine, size in errors["value"].abs().items()}
+            cells = {engine: f"{statuses[scene][engine].words}{sizes.get(engine, '')}" for engine in self.engines}
+            rows.append({"leading error": "–" if first is None else first["metric"].replace("_", " ")} | cells)
+        table = pd.DataFrame(rows, index=list(self.scenes))
+        return f"<p>{html.escape(self._title)}</p>{table.to_html(max_rows=MOST_ROWS)}"
+
+    @property
+    def _title(self) -> str:
+        """Scenes, engines, time steps and verdicts in a line."""
+        scenes, engines = (
+            ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} {kind}"
+            for names, kind in ((self.scenes, "scenes"), (self.engines, "engines"))
+        )
+        steps = ", ".join(f"{1e3 * dt:.3g}" for dt in sorted(self.table["dt"].dropna().unique(), reverse=True))
+        return f"{scenes} with {engines} at dt = {steps} ms: {_counted(self.table['verdict'])}"
+
+    def statuses(self) -> dict[str, dict[str, Status]]:
+        """The status of each engine in each scene.
+
+        Returns:
+            By scene and engine: the worst verdict, and the status in words, such as `converges`.
+        """
+        by_pair = {(str(scene), str(engine)): rows for (scene, engine), rows in self.table.groupby(["scene", "engine"])}
+        return {scene: {engine: _status(by_pair.get((scene, engine))) for engine in self.engines} for scene in self.scenes}
+
+    def leading_errors(self, scene: str) -> pd.DataFrame:
+        """The rows of a scene's leading metric, such as the bounce height, at the finest time step.
+
+        Args:
+            scene: Name of the scene.
+
+        Returns:
+            The columns of `table`, with the engine as index; empty if the scene has no exact solution or no engine has a motion.
+
+        Raises:
+            UnknownName: The run has no such scene.
+        """
+        if scene not in self.scenes:
+            raise UnknownName("scene", scene, self.scenes)
+        metric = "" if truth_for(self.scenes[scene]) is None else leading_metric(self.scenes[scene])
+        found = self.measurements
+        mine = found[(found["scene"] == scene) & (found["metric"] == metric) & found["value"].notna()]
+        return mine[mine["dt"] == mine["dt"].min()].set_index("engine")
 
     def summary(self) -> str:
         """A line for each engine: how many checks passed and failed, how many runs broke down, and the scenes with model errors."""
@@ -47,13 +125,7 @@ class Results:
 
     def _summary_of(self, engine: str) -> str:
         verdicts = self.table.loc[self.table["engine"] == engine, "verdict"]
-        passed, failed = int((verdicts == "passed").sum()), int(verdicts.isin(FAILURES).sum())
-        parts = [f"{passed} checks passed, {failed} failed"]
-        parts += [
-            f"{count} {verdict}"
-            for verdict in ("known", "diverged", "crashed", "timed_out", "declined")
-            if (count := int((verdicts == verdict).sum()))
-        ]
+        parts = [_counted(verdicts)]
         errors = self.asymptotic_errors("model")
         scenes = errors.loc[(errors["engine"] == engine) & (errors["value"].abs() > NEGLIGIBLE), "scene"].unique()
         if len(scenes):
@@ -66,7 +138,11 @@ class Results:
         return self.table[self.table["kind"].isin(["truth", "invariant"])]
 
     def asymptotic_errors(self, *causes: str) -> pd.DataFrame:
-        """The rows of asymptotic errors with these causes, such as `model` or `setting`."""
+        """The rows of asymptotic errors with some causes.
+
+        Args:
+            causes: Such as `model` or `setting`.
+        """
         return self.table[(self.table["kind"] == "asymptotic_error") & self.table["cause"].isin(causes)]
 
     @property
@@ -80,6 +156,35 @@ class Results:
         return 3 if self.breakdowns.any() else int(self.table["verdict"].isin(FAILURES).any())
 
 
+def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
+    """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated."""
+    reach = rows[["lower", "upper"]].abs().max(axis=1)
+    return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > NEGLIGIBLE)
+
+
+def _status(rows: pd.DataFrame | None) -> Status:
+    if rows is None:
+        return Status("missing", "missing")
+    is_small = (rows["verdict"] == "known") & ~(rows["value"].abs() > NEGLIGIBLE)
+    explains_nothing = (rows["verdict"] == "limited") & (rows["metric"] == "")
+    mentioned = rows[~(is_small | explains_nothing)]
+    worst = min(mentioned["verdict"], key=SEVERITY.index)
+    of_model = bool((rows.loc[rows["verdict"] == "known", "cause"] == "model").any())
+    studied = worst in ("passed", "measured") and bool((rows["kind"] == "asymptotic_error").any())
+    converges = UNDECIDED if (is_undecided(rows) & ~rows["metric"].isin(JUMPING)).any() else "converges"
+    words = "known model error" if of_model and worst == "known" else converges if studied else STATUS_WORDS.get(worst, worst)
+    return Status(worst, words)
+
+
+def _counted(verdicts: "pd.Series[str]") -> str:
+    """How many checks passed and failed, and how many other verdicts that matter there are."""
+    counts = verdicts.value_counts()
+    others = [
+        f"{counts[one]} {one.replace('_', ' ')}" for one in ("known", "diverged", "crashed", "timed_out", "declined") if one in counts
+    ]
+    return "; ".join([f"{counts.get('passed', 0)} checks passed, {sum(counts.get(one, 0) for one in FAILURES)} failed", *others])
+
+
 def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
     """The runs of several scenes as one run, in order; their settings are collected in the provenance."""
     settings: dict[str, dict[str, Any]] = {}
@@ -87,11 +192,16 @@ def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
         for engine, stamped in part.provenance["settings"].items():
             settings.setdefault(engine, {}).update(stamped)
     digests = {engine: digest(stamped) for engine, stamped in settings.items()}
+    table, predictions, agreements = (
+        pd.concat([getattr(part, name) for part in parts], ignore_index=True) for name in ("table", "predictions", "agreements")
+    )
     return Results(
-        pd.concat([part.table for part in parts], ignore_index=True),
+        table,
         dict(item for part in parts for item in part.scenes.items()),
         parts[0].engines,
         dict(item for part in parts for item in part.trajectories.items()),
         dict(item for part in parts for item in part.ensembles.items()),
         {**provenance, "settings": settings, "settings_digests": digests},
+        predictions,
+        agreements,
     )

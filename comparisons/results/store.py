@@ -56,15 +56,19 @@ def save(results: Results, folder: Path) -> None:
         "ensembles": ensembles,
     }
     (folder / "run.json").write_text(json.dumps(content, indent=1, default=str), encoding="utf-8")
-    results.table.to_parquet(folder / "results.parquet", index=False)
+    rows = pd.concat([results.table, results.predictions, results.agreements])
+    rows.to_parquet(folder / "results.parquet", index=False)
 
 
 def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
     """Load a run from its folder.
 
     Args:
-        folder: The folder that `dropspin run -o` wrote.
-        arrays: Whether to load trajectories and ensembles too; the table alone loads much faster.
+        folder: The folder that `dropspin run -o` or `write_report` wrote.
+        arrays: Whether to load trajectories and ensembles too; the tables alone load much faster.
+
+    Returns:
+        The run, equal to the one that was written.
 
     Raises:
         DropspinError: The folder holds no run, or one of another format.
@@ -80,11 +84,11 @@ def _loaded(folder: Path, arrays: bool) -> Results:
     content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DropspinError(f"{folder}: has a format of {_writer(content)}, which this version cannot read; run it again.")
-    table = pd.read_parquet(folder / "results.parquet")[list(COLUMNS)].astype(COLUMNS)
+    rows = pd.read_parquet(folder / "results.parquet")[list(COLUMNS)].astype(COLUMNS)
     lacking = PROVENANCE_KEYS - content["provenance"].keys() | ASKED_KEYS - content["provenance"]["asked"].keys()
     if lacking:
         raise ValueError(f"its provenance lacks {', '.join(sorted(lacking))}")
-    if not set(table["scene"]) <= content["scenes"].keys():
+    if not set(rows["scene"]) <= content["scenes"].keys():
         raise ValueError("its table has scenes that run.json does not have")
     files = {kind: content[kind] if arrays else {} for kind in ("trajectories", "ensembles")}
     trajectories = {
@@ -96,7 +100,9 @@ def _loaded(folder: Path, arrays: bool) -> Results:
         name: load({"name": name, **scene}).model_copy(update={"origin": content["origins"][name]})
         for name, scene in content["scenes"].items()
     }
-    return Results(table, scenes, tuple(content["engines"]), trajectories, ensembles, content["provenance"])
+    is_prediction, is_agreement = (rows["kind"] == kind for kind in ("prediction", "agreement"))
+    table, *others = (rows[kept].reset_index(drop=True) for kept in (~(is_prediction | is_agreement), is_prediction, is_agreement))
+    return Results(table, scenes, tuple(content["engines"]), trajectories, ensembles, content["provenance"], *others)
 
 
 def _writer(content: Any) -> str:

@@ -32,7 +32,9 @@ class _Collected:
 
     measured: dict[str, list[Measured]]
     studies: dict[str, dict[str, ConvergenceStudy]] = field(default_factory=dict)
-    rows: list[Measurement] = field(default_factory=list)
+    means: list[Measurement] = field(default_factory=list)
+    predictions: list[Measurement] = field(default_factory=list)
+    agreements: list[Measurement] = field(default_factory=list)
     claims: dict[str, Claim] = field(default_factory=dict)
     trajectories: dict[TrajectoryKey, Trajectory] = field(default_factory=dict)
     ensembles: dict[TrajectoryKey, EnsembleOutcome] = field(default_factory=dict)
@@ -73,15 +75,15 @@ def run_scene(
             compared.append((engine_run, cases))
             on_progress(progress._replace(finished=True))
         for first, second in combinations(compared, 2):
-            found.rows += _agreement(own, dt, phases, first, second)
+            found.agreements += _agreement(own, dt, phases, first, second)
     if is_sufficient(sorted(dts)):
         for entry in entries:
             if entry.label in found.claims:
                 measured = found.measured[entry.label]
                 found.studies[entry.label] = study_engine(own, entry, found.claims[entry.label], measured, processes, on_progress)
-    rows = found.rows + _with_convergence(found, labels)
+    table, predictions, agreements = map(as_table, (found.means + _with_convergence(found, labels), found.predictions, found.agreements))
     provenance = {**stamp, "settings": found.settings}
-    return Results(as_table(rows), {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance)
+    return Results(table, {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance, predictions, agreements)
 
 
 def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRun) -> None:
@@ -90,7 +92,7 @@ def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRu
     case = Case(scene.name, label, dt, scene.steps(dt))
     truth = own.truth.name if own.truth else ""
     for name, value in engine_run.predicted.items():
-        found.rows.append(case.measurement("prediction", name, METRICS[name].unit, Judgement(value, "measured"), truth))
+        found.predictions.append(case.measurement("prediction", name, METRICS[name].unit, Judgement(value, "measured"), truth))
     if engine_run.motion is not None:
         found.trajectories[scene.name, label, dt] = engine_run.motion
         found.settings.setdefault(label, {})[f"{scene.name} dt={dt:g}"] = engine_run.settings
@@ -99,7 +101,7 @@ def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRu
     if engine_run.outcome is not None:
         found.ensembles[scene.name, label, dt] = engine_run.outcome
         for name, judgement in judge_means(scene, dt, engine_run.outcome):
-            found.rows.append(case.measurement("ensemble", name, ENSEMBLE_METRICS[name].unit, judgement))
+            found.means.append(case.measurement("ensemble", name, ENSEMBLE_METRICS[name].unit, judgement))
 
 
 def _agreement(

@@ -62,7 +62,7 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
 def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:
     scene = results.scenes[name]
     truth = truth_for(scene)
-    frame = results.table[results.table["scene"] == name]
+    frame, agreements = (rows[rows["scene"] == name] for rows in (results.table, results.agreements))
     dts = sorted(frame["dt"].dropna().unique(), reverse=True)
     own = results.measurements[results.measurements["scene"] == name]
     studies = frame[frame["kind"].isin(STUDIES)]
@@ -85,8 +85,8 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
         "rows": _all_results(results, name, pd.concat([own, studies])),
         "replay": None if motions is None else as_data(motions),
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
-        "agreement": _agreement(frame, min(dts)),
-        "ensemble": _ensemble(frame, min(dts)),
+        "agreement": _agreement(agreements, min(dts)),
+        "ensemble": _ensemble(pd.concat([frame, agreements]), min(dts)),
         "wobbles": wobbles_freely(scene),
         "charts": {kind: [chart_data(chart) for chart in charts.get(kind, ())] for kind in CHARTS},
     }
@@ -119,8 +119,8 @@ def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[
     return {"scene": scene_name, "rows": found, "texts": list(texts)}
 
 
-def _agreement(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
-    pairs = frame[(frame["kind"] == "agreement") & (frame["dt"] == dt) & ~frame["metric"].isin(list(ENSEMBLE_METRICS))]
+def _agreement(agreements: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
+    pairs = agreements[(agreements["dt"] == dt) & ~agreements["metric"].isin(list(ENSEMBLE_METRICS))]
     return [_row(row) for row in pairs.itertuples()]
 
 

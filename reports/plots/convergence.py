@@ -29,7 +29,7 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
         scene_name: One of its scenes.
         metric: One of its metrics.
     """
-    frame = results.table[(results.table["scene"] == scene_name) & (results.table["metric"] == metric)]
+    frame, predictions = (rows[(rows["scene"] == scene_name) & (rows["metric"] == metric)] for rows in (results.table, results.predictions))
     values = frame[frame["kind"].isin(["truth", "invariant"])]
     lines, largest = [], 0.0
     for engine, (colour, marker) in engine_styles(results.engines).items():
@@ -38,7 +38,7 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
         dts, errors = rows["dt"].to_numpy(), rows["value"].to_numpy()
         largest = max(largest, np.abs(errors).max(initial=0.0))
         lines.append(Line(engine, dts, np.abs(errors), colour, marker=marker))
-        predicted = mine[(mine["kind"] == "prediction") & (mine["value"] != 0.0)]
+        predicted = predictions[(predictions["engine"] == engine) & (predictions["value"] != 0.0)]
         if len(predicted):
             lines.append(Line("predicted", predicted["dt"].to_numpy(), predicted["value"].abs().to_numpy(), width=0.0, marker="x"))
         order, asymptotic = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))

@@ -21,7 +21,12 @@ STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diver
 
 
 def print_table(results: Results, console: Console | None = None) -> None:
-    """Print a run at its finest time step: every metric of every engine, and the spread between independent engines; then the summary."""
+    """Print a run at its finest time step: every metric of every engine, and the spread between independent engines; then the summary.
+
+    Args:
+        results: The run.
+        console: Rich's console to print to; None: the standard output.
+    """
     out = console or Console()
     at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
     for name, scene in results.scenes.items():
@@ -39,7 +44,8 @@ def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     frame = results.table[results.table["scene"] == name]
     finest = frame[frame["dt"] == frame["dt"].min()]
     own = finest[finest["kind"].isin(["truth", "invariant"])]
-    pairs = finest[(finest["kind"] == "agreement") & ~finest["reason"].str.startswith(NO_EVIDENCE)]
+    agreements = results.agreements[(results.agreements["scene"] == name) & (results.agreements["dt"] == frame["dt"].min())]
+    pairs = agreements[~agreements["reason"].str.startswith(NO_EVIDENCE)]
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
     for engine in engines:

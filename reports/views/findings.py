@@ -2,28 +2,21 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
 from comparisons.engines.base import calibrated_label
-from comparisons.judging.convergence import JUMPING, STUDIES
+from comparisons.judging.convergence import STUDIES
 from comparisons.judging.error_budget import is_sufficient
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, VERDICTS
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN
 from comparisons.measuring.tolerances import negligible
-from comparisons.results.results import NEGLIGIBLE, Results
+from comparisons.results.results import NEGLIGIBLE, Results, is_undecided
 from reports.views.leading_errors import step_costs
-from reports.views.numbers import MARKS, duration, quantity, size, word
+from reports.views.numbers import duration, quantity, size
 
-STATUS_WORDS = {"limited": "outside the documented range"}
-UNDECIDED = "partly undecided"
-"""The status of an engine that passes in a scene, but of which the time steps leave errors undecided."""
 ENGINE_NAMES = {"document": "document (Wang's method)"}
 """Engines whose label does not say what they are."""
-
-SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "known", "limited", "no_truth", "passed", "measured")
-"""Worst first: the verdict that represents a scene and an engine."""
-assert set(SEVERITY) == set(VERDICTS)
 
 
 @dataclass(frozen=True)
@@ -58,45 +51,6 @@ def counts(results: Results) -> Counts:
     of_studies = (passed | failed) & results.table["kind"].isin(STUDIES)
     broken = verdicts.isin(BREAKDOWNS)
     return Counts(*(int(rows.sum()) for rows in (passed, failed, known, fixed, limited, of_studies, broken)))
-
-
-class Status(NamedTuple):
-    """What became of an engine in a scene: its worst verdict, and the status in words."""
-
-    verdict: str
-    words: str
-
-    @property
-    def mark(self) -> str:
-        """The status as one character."""
-        return "~" if self.words == UNDECIDED else MARKS[self.verdict]
-
-
-def statuses(results: Results) -> dict[str, dict[str, Status]]:
-    """The status of each engine in each scene."""
-    own = results.table[results.table["kind"] != "agreement"]
-    by_pair = {(str(scene), str(engine)): rows for (scene, engine), rows in own.groupby(["scene", "engine"])}
-    return {scene: {engine: _status(by_pair.get((scene, engine))) for engine in results.engines} for scene in results.scenes}
-
-
-def _is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
-    """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated."""
-    reach = rows[["lower", "upper"]].abs().max(axis=1)
-    return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > NEGLIGIBLE)
-
-
-def _status(rows: pd.DataFrame | None) -> Status:
-    if rows is None:
-        return Status("missing", word("missing"))
-    is_small = (rows["verdict"] == "known") & ~(rows["value"].abs() > NEGLIGIBLE)
-    explains_nothing = (rows["verdict"] == "limited") & (rows["metric"] == "")
-    mentioned = rows[~(is_small | explains_nothing)]
-    worst = min(mentioned["verdict"], key=SEVERITY.index)
-    of_model = bool((rows.loc[rows["verdict"] == "known", "cause"] == "model").any())
-    studied = worst in ("passed", "measured") and bool((rows["kind"] == "asymptotic_error").any())
-    converges = UNDECIDED if (_is_undecided(rows) & ~rows["metric"].isin(JUMPING)).any() else "converges"
-    words = "known model error" if of_model and worst == "known" else converges if studied else STATUS_WORDS.get(worst, word(worst))
-    return Status(worst, words)
 
 
 def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
@@ -224,7 +178,7 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
             continue
         remain = {scene for cause in ("model", "setting") for scene in lasting[cause][engine]}
         errors = results.table[(results.table["kind"] == "asymptotic_error") & (results.table["engine"] == engine)]
-        opened = errors[_is_undecided(errors) & ~errors["scene"].isin(remain)]
+        opened = errors[is_undecided(errors) & ~errors["scene"].isin(remain)]
         opened_errors = opened[~opened["metric"].isin(JUMPING)]
         parts = [
             _convergence(results, engine, errors, remain, opened_errors["scene"].nunique()),

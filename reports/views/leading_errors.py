@@ -3,10 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from comparisons.measuring.metrics import METRICS, leading_metric
+from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.tolerances import scale
 from comparisons.results.results import Results
-from scenarios import truth_for
 
 
 @dataclass(frozen=True)
@@ -36,15 +35,10 @@ def leading_errors(results: Results) -> dict[str, Leading]:
     """The leading error of each scene with an exact solution, by scene."""
     found = {}
     for name, scene in results.scenes.items():
-        if truth_for(scene) is None:
+        finest = results.leading_errors(name)
+        if finest.empty:
             continue
-        metric = leading_metric(scene)
-        frame = results.measurements
-        mine = frame[(frame["scene"] == name) & (frame["metric"] == metric) & frame["value"].notna()]
-        if mine.empty:
-            continue
-        dt = float(mine["dt"].min())
-        finest = mine[mine["dt"] == dt].set_index("engine")
+        metric, dt = str(finest["metric"].iloc[0]), float(finest["dt"].iloc[0])
         values = finest["value"].abs()
         sizes = {engine: float(values.get(engine, math.nan)) for engine in results.engines}
         rounded = set(finest.index[finest["cause"] == "rounding"])

@@ -4,9 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES
-from comparisons.results.results import Results
-from reports.views.findings import SEVERITY, UNDECIDED, Status
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
+from comparisons.results.results import UNDECIDED, Results, Status
 from reports.views.leading_errors import leading_errors
 from reports.views.numbers import formatted, in_ms, quantity, unit
 

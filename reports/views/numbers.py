@@ -3,20 +3,8 @@
 import math
 from functools import cache
 
-MARKS = {
-    "passed": "✓",
-    "failed": "✗",
-    "known": "≠",
-    "measured": "·",
-    "limited": "!",
-    "diverged": "∞",
-    "crashed": "✗",
-    "timed_out": "⏱",
-    "declined": "–",
-    "missing": "?",
-    "no_truth": "·",
-}
-WORDS = {"known": "known fault", "timed_out": "timed out", "no_truth": "no exact solution"}
+from comparisons.judging.verdicts import MARKS as MARKS
+from comparisons.judging.verdicts import WORDS
 
 
 def formatted(value: float) -> str:

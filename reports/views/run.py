@@ -3,17 +3,15 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from comparisons.results.results import Results
+from comparisons.results.results import Results, Status
 from reports.views.failures import Failure, failures, reproduce_drawn
 from reports.views.findings import (
     Counts,
     ProfileComparison,
-    Status,
     asymptotic_errors,
     counts,
     finding_sentences,
     profile_comparisons,
-    statuses,
     verdict_sentence,
 )
 
@@ -44,4 +42,4 @@ def overview(results: Results) -> Overview:
     tally, profiles = counts(results), profile_comparisons(results)
     findings = finding_sentences(results, {cause: asymptotic_errors(results, cause) for cause in ("model", "setting")}, profiles)
     findings = [*findings, *reproduce_drawn(results)]
-    return Overview(verdict_sentence(results, tally), findings, tally, statuses(results), profiles, failures(results))
+    return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results))

@@ -44,16 +44,17 @@ def _shared_runs(core_results, monkeypatch):
 
 def part(results, scene, engines, dts):
     """The results of a run with one scene, some engines and some time steps of another run."""
-    table = results.table
-    at_these = table["dt"].isin(dts) | (table["dt"].isna() & (len(dts) == len(ds.DEFAULT_DTS)))
+    tables = {}
+    for name in ("table", "predictions", "agreements"):
+        rows = getattr(results, name)
+        at_these = rows["dt"].isin(dts) | (rows["dt"].isna() & (len(dts) == len(ds.DEFAULT_DTS)))
+        tables[name] = rows[(rows["scene"] == scene) & rows["engine"].isin(engines) & at_these]
     kept = [
         {key: value for key, value in of_each.items() if key[0] == scene and key[1] in engines and key[2] in dts}
         for of_each in (results.trajectories, results.ensembles)
     ]
-    table = table[(table["scene"] == scene) & table["engine"].isin(engines) & at_these]
-    return replace(
-        results, table=table, scenes={scene: results.scenes[scene]}, engines=tuple(engines), trajectories=kept[0], ensembles=kept[1]
-    )
+    chosen = {scene: results.scenes[scene]}
+    return replace(results, **tables, scenes=chosen, engines=tuple(engines), trajectories=kept[0], ensembles=kept[1])
 
 
 @pytest.mark.usefixtures("_shared_runs")

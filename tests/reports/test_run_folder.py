@@ -143,9 +143,12 @@ def test_failures_come_before_the_comparison():
 
 
 def test_a_loaded_run_equals_the_one_that_was_saved(results, folder):
-    """Table, trajectories, scenes: equal to the bit."""
+    """Tables, trajectories, scenes: equal to the bit."""
     again = load_results(folder)
-    pd.testing.assert_frame_equal(again.table, results.table)
+    assert len(results.predictions)
+    assert len(results.agreements)
+    for name in ("table", "predictions", "agreements"):
+        pd.testing.assert_frame_equal(getattr(again, name), getattr(results, name))
     assert set(again.trajectories) == set(results.trajectories)
     for key, motion in results.trajectories.items():
         np.testing.assert_array_equal(again.trajectories[key].states, motion.states)
@@ -355,7 +358,7 @@ def test_many_engines_split_the_table_and_cut_no_number(capsys):
     multibody = "pybullet[coordinates=multibody"
     every = ["pybullet", f"{multibody}]", f"{multibody},velocity_clamp=kept]", "mujoco", "mujoco[integrator=implicit]"]
     found = run("spin-principal", every, 1e-2)
-    spread = found.table[(found.table["kind"] == "agreement") & (found.table["metric"] == "energy_error")]["value"].abs().max()
+    spread = found.agreements.loc[found.agreements["metric"] == "energy_error", "value"].abs().max()
     for engines in (found.engines, found.engines[:3], found.engines[1:2]):
         for width in (60, 80, 90, 200):
             print_table(replace(found, engines=engines), Console(width=width, force_terminal=True, color_system=None))

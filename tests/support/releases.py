@@ -104,6 +104,9 @@ class OneBadStart(Candidate):
 RELEASES = [Candidate, TooLively, WithoutGyroscopicTerm, Euler, OnAnotherMachine, Broken]
 
 
+TABLES = ("table", "predictions", "agreements")
+
+
 def longer(scene):
     """Another scene of the same name."""
     return scene.model_copy(update={"duration": 1.1 * scene.duration})
@@ -112,11 +115,9 @@ def longer(scene):
 def part(results, *scenes, engines=None, dt=None):
     """Some scenes and engines of a run, as if only these had been asked for; all scenes, engines and time steps by default."""
     names, labels = list(scenes) or list(results.scenes), tuple(engines or results.engines)
-    rows = results.table["scene"].isin(names) & results.table["engine"].isin(labels)
     stamp = dict(results.provenance)
     stamp["asked"] = stamp["asked"] | {"scenes": names, "engines": list(labels)}
     if dt is not None:
-        rows &= results.table["dt"] == dt
         stamp["asked"]["dts"] = [dt]
     stamp["settings"] = {
         label: {case: settings for case, settings in stamped.items() if case.split(" dt=")[0] in names}
@@ -126,7 +127,12 @@ def part(results, *scenes, engines=None, dt=None):
     for table in ("names", "adapters"):
         stamp[table] = {label: content for label, content in stamp[table].items() if label in labels}
     chosen = {name: results.scenes[name] for name in names}
-    return replace(results, table=results.table[rows].reset_index(drop=True), scenes=chosen, engines=labels, provenance=stamp)
+    tables = {}
+    for table in TABLES:
+        rows = getattr(results, table)
+        kept = rows["scene"].isin(names) & rows["engine"].isin(labels) & ((dt is None) | (rows["dt"] == dt))
+        tables[table] = rows[kept].reset_index(drop=True)
+    return replace(results, **tables, scenes=chosen, engines=labels, provenance=stamp)
 
 
 def relabelled(results, old, new):
@@ -136,7 +142,8 @@ def relabelled(results, old, new):
     for table in ("names", "adapters", "settings"):
         stamp[table] = {new if label == old else label: content for label, content in stamp[table].items()}
     engines = tuple(new if label == old else label for label in results.engines)
-    return replace(results, table=results.table.assign(engine=results.table["engine"].replace(old, new)), engines=engines, provenance=stamp)
+    tables = {table: getattr(results, table).replace({"engine": {old: new}}) for table in TABLES}
+    return replace(results, **tables, engines=engines, provenance=stamp)
 
 
 def released(results, version):

@@ -82,7 +82,7 @@ def test_run_and_its_folder_keep_the_ensemble(tmp_path):
     assert list(rows["metric"]) == 2 * list(ENSEMBLE_METRICS)
     assert (rows["cause"] == "chaotic").all()
     assert ((rows["lower"] <= rows["value"]) & (rows["value"] <= rows["upper"])).all()
-    pairs = found.table[(found.table["kind"] == "agreement") & found.table["metric"].isin(list(ENSEMBLE_METRICS))]
+    pairs = found.agreements[found.agreements["metric"].isin(list(ENSEMBLE_METRICS))]
     assert len(pairs) == len(ENSEMBLE_METRICS)
     save(found, tmp_path)
     again = load_results(tmp_path)
@@ -113,10 +113,11 @@ def test_member_that_is_not_finite_costs_the_engines_row():
 def test_ensemble_without_contact_has_no_rebound():
     """No start reaches the floor in time, and no difference is significant."""
     short = FEW.model_copy(update={"duration": 0.2})
-    found = ds.run(short, ["document", "pybullet"], [4e-3]).table
-    rebounds = found[(found["metric"] == "rebound_height")]
-    assert (rebounds["value"] == 0.0).all()
-    assert not rebounds["reason"].str.contains("is significant").any()
+    found = ds.run(short, ["document", "pybullet"], [4e-3])
+    means, differences = (rows[rows["metric"] == "rebound_height"] for rows in (found.table, found.agreements))
+    assert list(means["value"]) == [0.0, 0.0]
+    assert list(differences["value"]) == [0.0]
+    assert differences["reason"].str.contains("is not significant").all()
 
 
 def test_members_must_start_where_they_were_placed():

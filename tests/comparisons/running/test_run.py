@@ -59,7 +59,13 @@ def failures_of(results):
 def test_table_has_the_documented_columns_and_unique_keys(core):
     """Every measurement has its steps, its time per step and its time step."""
     assert list(core.table.columns) == list(COLUMNS)
-    assert not core.table.duplicated(["scene", "engine", "dt", "seed", "metric", "kind", "truth"]).any()
+    assert not core.table.duplicated(["scene", "engine", "dt", "metric", "kind", "reason"]).any()
+    assert not core.table[core.table["metric"] != ""].duplicated(["scene", "engine", "dt", "metric", "kind"]).any()
+    for others, kind in ((core.predictions, "prediction"), (core.agreements, "agreement")):
+        assert list(others.columns) == list(COLUMNS)
+        assert set(others["kind"]) == {kind}
+        assert not others.duplicated(["scene", "engine", "dt", "metric", "truth"]).any()
+    assert not core.table["kind"].isin(["prediction", "agreement"]).any()
     assert (core.measurements["steps"] > 0).all()
     assert (core.measurements["time_per_step"] > 0).all()
     assert core.measurements["dt"].notna().all()
@@ -128,7 +134,7 @@ def test_run_and_simulate_give_the_same_trajectory(core):
 
 def test_each_pair_of_engines_is_compared_once(core):
     """By energy, apex and angular momentum; MuJoCo and PyBullet bounce alike."""
-    pairs = core.table[core.table["kind"] == "agreement"]
+    pairs = core.agreements
     assert set(zip(pairs["engine"], pairs["truth"], strict=True)) == {
         ("document", "mujoco"), ("document", "pybullet"), ("mujoco", "pybullet"),
     }  # fmt: skip
@@ -154,10 +160,9 @@ def test_scene_without_truth_is_measured_by_invariants():
     scene = scene.model_copy(update={"floor": scene.floor.model_copy(update={"friction": 0.3})})
     scene = scene.starting_at(scene.initial_state + np.eye(13)[7])  # sideways
     found = ds.run([scene.model_copy(update={"expect": ()})], ["document[law=coulomb]", "pybullet"], [2e-3])
-    own = found.table[found.table["kind"] != "agreement"]
+    own, pairs = found.table, found.agreements
     assert set(own["verdict"]) == {"measured", "no_truth"}
     assert set(own[own["verdict"] == "measured"]["metric"]) == {"energy_drift", "energy_gain", "penetration"}
-    pairs = found.table[found.table["kind"] == "agreement"]
     assert set(pairs["metric"]) == {"energy_error"}
     assert (pairs["value"].abs() < 1e-12).all()  # up to the first contact both fall freely
 
@@ -237,7 +242,7 @@ def test_unsolved_contacts_are_reported():
 def test_agreement_of_one_discretisation_is_no_evidence(scene, first, second, same):
     """Pairs that solve the same difference equations are marked; they agree far better than either does with the exact solution."""
     found = ds.run(scene, [first, second], 8e-3)
-    pairs = found.table[found.table["kind"] == "agreement"]
+    pairs = found.agreements
     assert pairs["reason"].str.startswith("no evidence: both are").all() == same
     if same:
         difference = pairs[pairs["metric"] == "energy_error"]["value"].abs().max()

@@ -86,9 +86,12 @@ def calibrate(
         engine: The engine or its name; its options choose among its contact models.
         restitution: From 0 to 1.
         dt: Time step [s].
-        friction: 'none', 'infinite' or a coefficient.
-        shape: The body that falls flat onto a floor.
-        resources: What the measurement may use.
+        friction: `none`, `infinite` or a Coulomb coefficient.
+        shape: The body that falls flat onto a floor: `ball` or `box`.
+        resources: The processor time [s] and memory [bytes] that the measurement may use.
+
+    Returns:
+        The settings, the reason for each, programs to paste, and what was measured with them.
 
     Raises:
         DropspinError: The engine has no such settings, or broke down with them.

@@ -6,6 +6,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
+from comparisons.judging.verdicts import MARKS
 from reports.views import numbers
 
 
@@ -26,7 +27,7 @@ def _environment() -> Environment:
     )
     environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted", "quantity")}
     environment.filters |= {"cell": _markdown_cell, "code": _markdown_code}
-    environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": numbers.MARKS}
+    environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": MARKS}
     return environment
 
 

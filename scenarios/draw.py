@@ -57,6 +57,9 @@ def draw(count: int, seed: int) -> list[Scenario]:
         count: How many, from 1 to 1000.
         seed: From 0 to 2⁶⁴ - 1; the same seed draws the same scenes with the same versions of dropspin and NumPy.
 
+    Returns:
+        The scenes, numbered from 1.
+
     Raises:
         DropspinError: Count or seed are out of range.
     """

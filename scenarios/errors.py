@@ -18,7 +18,13 @@ class SceneError(DropspinError):
 
 
 class UnknownName(DropspinError):
-    """A name that is not in its list."""
+    """A name that is not in its list.
+
+    Args:
+        what: What the name is of, such as `engine`.
+        given: The name.
+        known: All names; the nearest is suggested.
+    """
 
     def __init__(self, what: str, given: str, known: Iterable[str]) -> None:
         known = sorted(known)

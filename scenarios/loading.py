@@ -34,15 +34,26 @@ ALTERNATIVES: Alternatives = {
 
 
 def names() -> list[str]:
-    """The names of the catalogue's scenes, sorted."""
+    """The names of the catalogue's scenes.
+
+    Returns:
+        Sorted, each of which `load` takes.
+    """
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
 
 def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
-    """Load a scene by its catalogue name or the name of a drawn scene, from the path of a TOML file, or from a mapping with the same keys.
+    """Load a scene.
+
+    Args:
+        scene: Its catalogue name or the name of a drawn scene, the path of a TOML file, or a mapping with the same keys. A mapping may
+            have arrays for lists, and a `name`, which is `scene` by default.
+
+    Returns:
+        The scene; all values are in SI units.
 
     Raises:
-        SceneError: The scene is not valid. The text names the file, the key, the value and what is allowed.
+        SceneError: The scene is not valid. The text says which file or mapping, the key, the value and what is allowed.
     """
     if isinstance(scene, Mapping):
         return _from_mapping(scene)

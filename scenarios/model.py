@@ -108,10 +108,22 @@ class Expectation(Table):
 
 
 class Scenario(Table):
-    """One scene.
+    """One scene, in SI units, y up.
 
-    `name` is the file's name without its ending. `origin` is the argument that loaded it, empty for a mapping. All other fields are the
-    file's content, in SI units.
+    Attributes:
+        name: The name of its file without the ending, or that of its mapping.
+        origin: The argument that loaded it; empty for a mapping.
+        summary: What it is, in a line.
+        source: Where it comes from.
+        tags: Words to find it by.
+        duration: [s].
+        body: Shape (`sphere`, `box` or `vertices`), size [m], mass [kg] and inertia [kg m²].
+        start: Position [m], orientation, velocity [m/s] and angular velocity [rad/s] at t = 0, in the world frame.
+        gravity: Its acceleration [m/s²], or None.
+        floor: Restitution, friction and rest speed [m/s] of the plane y = 0, or None.
+        damping: Rates of decay [1/s], or None.
+        ensemble: The spread of random starts, or None.
+        expect: Bounds on metrics, each with a reason.
     """
 
     name: Annotated[str, Field(json_schema_extra={"hidden": "in files"})]

@@ -43,8 +43,11 @@ def conform(
     Args:
         engine: The engine, or its name.
         checks: Names of the checks to run; by default all.
-        resources: What each check may use.
+        resources: The processor time [s] and memory [bytes] that each check may use.
         on_result: Called with the outcome of each check as soon as it is known.
+
+    Returns:
+        The outcome of each check, in order; an engine that crashes or hangs fails the check alone.
 
     Raises:
         UnknownName: There is no such check.

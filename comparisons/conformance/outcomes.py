@@ -7,7 +7,14 @@ CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "time
 
 
 class CheckResult(NamedTuple):
-    """The outcome of one check, a message, and the traceback of an exception of the adapter if there was one."""
+    """The outcome of one check.
+
+    Attributes:
+        check: Name of the check.
+        outcome: `passed`, `failed`, `noted` for a peculiarity of the engine, `declined`, `crashed` or `timed_out`.
+        message: What was found, in words.
+        traceback: Of an exception of the adapter, if there was one.
+    """
 
     check: str
     outcome: CheckOutcome

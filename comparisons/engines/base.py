@@ -125,7 +125,13 @@ class BatchSimulation:
 
 
 class NumericOption(NamedTuple):
-    """The default and the range of a numeric option."""
+    """The default and the range of a numeric option.
+
+    Attributes:
+        default: Its value where it is not given.
+        least: The least value allowed.
+        most: The largest value allowed.
+    """
 
     default: float
     least: float

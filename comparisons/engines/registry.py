@@ -40,12 +40,22 @@ BUILT_IN = {
 
 
 def engine_names() -> list[str]:
-    """All engine names, installed or not: the built-in ones, then those that other packages register."""
+    """All engine names, installed or not.
+
+    Returns:
+        The built-in ones, then those that other packages register.
+    """
     return [*BUILT_IN, *sorted(_entry_points())]
 
 
 def engine(name: str) -> Engine:
     """The engine of a name with options, such as `mujoco[integrator=rk4]`, or of a class, such as `my_module:MyEngine`.
+
+    Args:
+        name: The name; `dropspin list engines` lists the engines and their options.
+
+    Returns:
+        The engine, with its options.
 
     Raises:
         UnknownName: There is no such engine, option or value.

@@ -105,6 +105,12 @@ class Baseline:
 def load_baseline(path: str | Path) -> Baseline:
     """Read a baseline.
 
+    Args:
+        path: The file that `dropspin accept` or `write_baseline` wrote.
+
+    Returns:
+        The accepted results, each with its tolerance, and when and why it was accepted.
+
     Raises:
         DropspinError: It is not a baseline; the text says where, what was given, what is allowed.
     """
@@ -166,12 +172,13 @@ def accept(
     Args:
         results: The run.
         earlier: The baseline before; `Baseline()` if there is none.
-        reason: Why these results are accepted.
+        reason: Why these results are accepted, in words; it is stored with them.
         date: Date of the acceptance.
         known_failures: Whether to accept failing checks as known failures.
 
     Returns:
-        The new baseline, and its difference from the earlier one, as `values.changes` gives it.
+        The new baseline, and a table of what differs from the earlier one: a row for each result, with `value` and `before` in `unit`, and
+        the `change`: new, worse, moved, better, same or gone.
     """
     mine = comparable_results(results)
     mine["known_failure"] = (mine["verdict"] == "failed") & known_failures
@@ -198,6 +205,10 @@ def accept(
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:
     """Write a baseline, whole or not at all.
+
+    Args:
+        baseline: The baseline, from `accept`.
+        path: The file; its folder is created if it does not exist.
 
     Raises:
         DropspinError: The file cannot be written.

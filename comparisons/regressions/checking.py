@@ -48,6 +48,14 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     A result that is worse than accepted by more than its tolerance, or gone, fails. One that is better passes. A check of the run that
     fails and was accepted as a known failure is `known` as long as its result is not worse.
 
+    Args:
+        results: The run.
+        baseline: The accepted results, from `load_baseline`; None: the expectations of the scenes alone.
+
+    Returns:
+        `results`, the run with a row of kind `baseline` for each accepted result, so that its `exit_code()` is that of the check;
+        `changes`, its results compared with the accepted ones; and `not_run`, the accepted results that the run does not cover.
+
     Raises:
         NothingAccepted: No accepted result is covered by the run, so that the check would be empty. If engines broke down, that is
             reported instead.

@@ -47,6 +47,14 @@ def compare(old: Results, new: Results) -> Changes:
 
     Results of scenes, engines and time steps that were asked for in one of the runs only are left out: they are neither new nor gone.
 
+    Args:
+        old: The earlier run.
+        new: The later run.
+
+    Returns:
+        The changes: `results`, a table with `value` and `before` in `unit`, and the `change` (same, better, worse, moved, new or gone);
+        `attributions`, by engine what its changes are attributed to; and `speed`, how the time per step changed.
+
     Raises:
         DropspinError: They have none in common.
     """

@@ -52,7 +52,11 @@ def history(runs: Mapping[str, Results]) -> History:
     """Follow results over runs.
 
     Args:
-        runs: By name; they are sorted by the time they were started.
+        runs: Two runs or more, by name; they are sorted by the time they were started.
+
+    Returns:
+        `names` of the runs in order; `stamps`, their times, commits and versions; `results`, the values of all runs; and `moves`, the runs
+        in which results moved, and what that is attributed to.
 
     Raises:
         DropspinError: There are fewer than two.

@@ -48,7 +48,7 @@ class RobustnessStudy:
     Attributes:
         scene: The scene.
         dt: The time step where it is not varied [s].
-        within: The largest error that counts as accurate.
+        within: The largest error that counts as accurate: a ratio, or an angle in radians.
         scans: Each engine along each axis.
         left_out: Engines that do not run the scene, and why.
         refinements: Of each other engine, the nominal time step, and the smaller ones tried where it is not sound there.
@@ -91,13 +91,16 @@ def find_limits(
     """Vary one quantity of a scene at a time, up to extreme values, and find the failure modes of engines.
 
     Args:
-        scene: A scene, its catalogue name, or the path of its file.
-        engines: Engines or names with options; by default the methods that differ on such a scene.
-        axes: Names of axes; by default all that the scene has, see `AXES`.
+        scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.
+        engines: One engine or several: engines, or names with options; by default the methods that differ on such a scene.
+        axes: Names of axes, such as `step`, `spin` or `mass`; by default all that the scene has.
         dt: Time step where it is not varied [s].
         within: The largest error that counts as accurate: a ratio, or an angle in radians.
-        on_progress: Called with what is done, and the share of all of it.
-        resources: What an engine may use for one point.
+        on_progress: Called with what is done in words, and the share of all of it, from 0 to 1.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one point.
+
+    Returns:
+        Of each engine along each axis, where it is accurate, where it is stable, and how it fails.
 
     Raises:
         DropspinError: There is no such engine or axis, or the scene does not have the axis.

@@ -49,13 +49,13 @@ def simulate(scene: SceneLike, engine: Engine | str, dt: float, every: int = 1) 
     """Simulate one scene with one engine.
 
     Args:
-        scene: A scene, its catalogue name, or the path of its file.
+        scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.
         engine: An engine, or its name with options, such as `mujoco[integrator=rk4]`.
         dt: Time step [s].
         every: Steps between two rows.
 
     Returns:
-        The motion; its first row is the start.
+        The motion, one row for each `every` steps; the first is the start.
 
     Raises:
         DropspinError: The engine is unknown, not installed, or declines the scene, or the time step does not fit it.

@@ -34,14 +34,19 @@ def run(
     """Run every scene with every engine at every time step, measure, and judge.
 
     Args:
-        scenes: One scene or several: scenes, catalogue names or paths; their names must differ.
+        scenes: One scene or several, with different names: each a scene, a catalogue name, the path of a file, or a mapping with the same
+            keys.
         engines: One engine or several: engines, or names with options. One that is not installed is `missing` in the results.
-        dt: One time step or several [s].
+        dt: One time step or several [s]; three or more that span a factor of four give orders and asymptotic errors.
         on_progress: Called with scene, engine, time step and the simulations done: before and while an engine works, twice a second, and
             with `finished` after each of the len(scenes) * len(engines) * len(dt) pieces of work.
-        resources: What an engine may use for one of these pieces; each engine runs in a process of its own.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one of these pieces; each engine runs in a process
+            of its own.
         keep: Called with the results of each scene as soon as it is done.
         done: Results of scenes from an earlier run. Those with the same request, versions and machine are not run again.
+
+    Returns:
+        The measurements with their verdicts, predictions, agreements of engines, and the motions.
 
     Raises:
         DropspinError: The request cannot be run: an unknown engine, an impossible time step, equal names.
@@ -130,7 +135,18 @@ def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
 
 
 def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:
-    """Every metric that the scene has, of one motion; NaN where the time step is too coarse for it."""
+    """Every metric that a scene has, of one motion.
+
+    Args:
+        scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.
+        motion: The motion, from the scene's start, at equal time steps.
+
+    Returns:
+        By name, in the unit that `METRICS` has for it; NaN where the time step is too coarse.
+
+    Raises:
+        DropspinError: There is no such scene, or the motion is not a `Trajectory`.
+    """
     scene = as_scene(scene)
     if not isinstance(motion, Trajectory):
         raise DropspinError(f"motion: got a {type(motion).__name__}; give a Trajectory, such as simulate() returns.")

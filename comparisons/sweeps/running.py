@@ -32,7 +32,7 @@ def run_sweep(
         where: The folder, or a URL that fsspec supports.
         resume: Whether the folder may hold parts of the same sweep, which are kept.
         scheduler: The address of a Dask scheduler; None: run on this machine.
-        resources: What an engine may use for one job.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one job.
         on_progress: Called with the number of jobs completed since the last call, first with those that the folder has; may raise to
             stop the sweep.
 
@@ -70,6 +70,12 @@ def count(where: str) -> int:
 def read_sweep(where: str) -> pd.DataFrame:
     """The table of a sweep, in the order of its jobs; of an unfinished sweep, the jobs that have been run.
 
+    Args:
+        where: The folder, or a URL that fsspec supports.
+
+    Returns:
+        One row a job.
+
     Raises:
         DropspinError: The folder does not hold a sweep.
     """
@@ -78,6 +84,13 @@ def read_sweep(where: str) -> pd.DataFrame:
 
 def read_sweep_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
     """The table of a sweep part by part, for tables that are larger than memory.
+
+    Args:
+        where: The folder, or a URL that fsspec supports.
+        columns: Names of the columns to read; None: all.
+
+    Returns:
+        An iterator over the parts, in the order of the jobs, each a PyArrow table.
 
     Raises:
         DropspinError: The folder does not hold a sweep.

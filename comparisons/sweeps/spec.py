@@ -84,6 +84,9 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
     Args:
         spec: The path of a TOML file, or a mapping with the same keys. Paths of scenes are relative to the file.
 
+    Returns:
+        The sweep, for `run_sweep`; its `size` is the number of jobs.
+
     Raises:
         DropspinError: The spec is not valid, or a scene, engine, field or value in it is not. The text says which.
     """

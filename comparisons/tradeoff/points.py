@@ -104,6 +104,9 @@ class TradeOff:
     def recommendation(self, within: float) -> Recommendation | None:
         """The cheapest point within a tolerance; None if no point is.
 
+        Args:
+            within: The tolerance, in the metric's unit.
+
         Of each engine, the coarsest time step counts that is within the tolerance together with all finer ones: at a coarser one the error
         may be small by chance, where it crosses 0.
         """

@@ -61,12 +61,15 @@ def tradeoff(
     """Measure error and cost of engines over a ladder of time steps.
 
     Args:
-        scene: A scene with an exact solution, its catalogue name, or the path of its file.
-        engines: Engines, or names with options; by default the methods that differ on such a scene.
+        scene: A scene with an exact solution, its catalogue name, the path of its file, or a mapping with the same keys.
+        engines: One engine or several: engines, or names with options; by default the methods that differ on such a scene.
         metric: The metric of the error; by default the scene's leading metric.
         budget: Processor time for the errors of each engine, at all time steps together [s]; where it is spent, its ladder of steps ends.
-        on_progress: Called with what is done, and the share of the whole study.
-        resources: What each run may use.
+        on_progress: Called with what is done in words, and the share of the whole study, from 0 to 1.
+        resources: The processor time [s] and memory [bytes] that each piece of work may use.
+
+    Returns:
+        The error of each engine at each time step and its cost, in seconds per simulated second, with the Pareto front.
 
     Raises:
         DropspinError: The scene has no exact solution, or not this metric; the budget is not above 0; or no engine runs the scene.

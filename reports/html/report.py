@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 
 from comparisons.judging.convergence import STUDIES
+from comparisons.judging.verdicts import MARKS
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.provenance import first_settings
@@ -113,7 +114,7 @@ def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[
     for row in rows.assign(place=rows["metric"].map(metrics)).sort_values(["place", "engine", "dt"]).to_dict("records"):
         name = numbers.subject(row["metric"], row["kind"]) + numbers.unit(row["unit"])
         values = [row["engine"], numbers.in_ms(row["dt"]), numbers.formatted(row["value"]), numbers.bound(row["lower"], row["upper"])]
-        judged = [f"{numbers.MARKS[row['verdict']]} {numbers.word(row['verdict'])}", row["cause"], row["reason"]]
+        judged = [f"{MARKS[row['verdict']]} {numbers.word(row['verdict'])}", row["cause"], row["reason"]]
         listed = (texts.setdefault(text, len(texts)) for text in [name, *values, *judged])
         found.append([engines[row["engine"]], int(row["verdict"] == "failed"), *listed])
     return {"scene": scene_name, "rows": found, "texts": list(texts)}

@@ -9,11 +9,12 @@ from rich.table import Table
 from rich.text import Text
 
 from comparisons.judging.agreement import NO_EVIDENCE
+from comparisons.judging.verdicts import MARKS
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.results import Results
 from reports.terminal.summary import print_summary
 from reports.views.findings import orders
-from reports.views.numbers import MARKS, formatted, trend, word
+from reports.views.numbers import formatted, trend, word
 
 NUMBER_WIDTH = 9  # of -1.23e-04; a narrow terminal folds names and splits the table, but never cuts a number
 NAME_WIDTH, GAP = 20, 3

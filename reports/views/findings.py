@@ -7,13 +7,13 @@ from typing import Any
 import pandas as pd
 
 from comparisons.engines.base import calibrated_label
-from comparisons.judging.convergence import STUDIES
+from comparisons.judging.convergence import JUMPING, STUDIES
 from comparisons.judging.error_budget import is_sufficient
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN
 from comparisons.measuring.tolerances import negligible
 from comparisons.results.results import NEGLIGIBLE, Results, is_undecided
 from reports.views.leading_errors import step_costs
-from reports.views.numbers import duration, quantity, size
+from reports.views.numbers import duration, quantity, size, word
 
 ENGINE_NAMES = {"document": "document (Wang's method)"}
 """Engines whose label does not say what they are."""

@@ -3,7 +3,6 @@
 import math
 from functools import cache
 
-from comparisons.judging.verdicts import MARKS as MARKS
 from comparisons.judging.verdicts import WORDS
 
 

@@ -1,5 +1,6 @@
 """`import dropspin as ds`: what a notebook calls first, and what wrong arguments end in."""
 
+import dataclasses
 import inspect
 import re
 from xml.etree import ElementTree
@@ -214,6 +215,25 @@ def callables():
     methods = ((f"{name}.{part}", getattr(public, part)) for name, public in classes.items() for part in vars(public) if part[0] != "_")
     without_signature = {name for name, public in classes.items() if issubclass(public, Exception)}
     return {name: public for name, public in (found | dict(methods)).items() if callable(public) and name not in without_signature}
+
+
+@pytest.mark.parametrize("name", callables())
+def test_docstring_describes_every_argument_and_what_is_returned(name):
+    """Of a function its arguments and what it returns; of a dataclass its fields; a method has a text."""
+    public = callables()[name]
+    text = inspect.getdoc(public)
+    assert text
+    described = set(re.findall(r"^ +(\w+): ", text, re.MULTILINE))
+    if dataclasses.is_dataclass(public):
+        assert {field.name for field in dataclasses.fields(public)} <= described
+    elif hasattr(public, "_fields"):
+        assert set(public._fields) <= described
+    elif hasattr(public, "model_fields"):
+        assert set(public.model_fields) == described
+    elif not inspect.isclass(public) and "." not in name:
+        signature = inspect.signature(public)
+        assert set(signature.parameters) <= described
+        assert ("Returns:" in text) == (signature.return_annotation is not None)
 
 
 @pytest.mark.parametrize("name", callables())

@@ -142,7 +142,6 @@ FEWEST_VALUES = 3
 """Values of an option that sets the accuracy: extrapolation needs as many."""
 PROFILES = ("calibrated", "default")
 """Settings that reproduce the scene as closely as the engine can; and the engine's defaults, with only the obvious settings made."""
-
 LATE_IMPACTS = "impacts detected late"
 SEMI_IMPLICIT_EULER = "semi-implicit Euler"
 EXPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term explicit"

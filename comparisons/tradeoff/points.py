@@ -122,7 +122,11 @@ class TradeOff:
         return Recommendation(within, best, others[0], ratio, level)
 
     def best_in_batch(self, within: float) -> CostPoint | None:
-        """The point with the least cost per world within a tolerance; None if no engine that can step batches reaches it."""
+        """The point with the least cost per world within a tolerance; None if no engine that can step batches reaches it.
+
+        Args:
+            within: The tolerance, in the metric's unit.
+        """
         batched = [point for point in self._coarsest(within) if np.isfinite(point.cost_per_world)]
         return min(batched, key=lambda point: point.cost_per_world, default=None)
 

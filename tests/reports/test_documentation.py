@@ -134,6 +134,13 @@ def test_python_of_the_readme_and_of_the_replay_page_runs(tmp_path, monkeypatch)
     assert (tmp_path / "corner.gif").exists()
 
 
+def test_python_of_the_reference_prints_what_the_page_shows(capsys):
+    text = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    [(block, printed)] = re.findall(r"^```python\n(.*?)^```\n\nIt prints:\n\n```text\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    exec(compile(block, "python.md", "exec"), {})
+    assert capsys.readouterr().out == printed
+
+
 def test_scene_of_the_readme_is_valid():
     [scene] = re.findall(r"^```toml\n(.*?)^```$", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     assert ds.load(tomllib.loads(scene) | {"name": "mine"}).expect[0].metric == "bounce_height_error"

@@ -30,7 +30,7 @@ def error_over_cost(found: "TradeOff", batch: bool = False) -> Chart:
     def line(label: str, points: "list[CostPoint]", colour: str = "", marker: str = "", width: float = 1.0) -> Line:
         return Line(label, np.array([cost(one) for one in points]), np.array([one.error for one in points]), colour, width, marker=marker)
 
-    lines = [line("Pareto front", list(found.batch_pareto_front if batch else found.pareto_front), width=5.0)]
+    lines = [line("Pareto front", list(found.batch_pareto_front if batch else found.pareto_front), "#B0B0B0", width=5.0)]
     for engine, (colour, marker) in engine_styles(list(dict.fromkeys(point.engine for point in found.points))).items():
         lines.append(line(engine, [one for one in found.points if one.engine == engine and isfinite(cost(one))], colour, marker))
     per_world = f", per world (batch of {BATCH})" if batch else ""

@@ -1,20 +1,22 @@
 """The findings of a run, counted and in words; terminal, HTML and Markdown share them."""
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-import pandas as pd
 
 from comparisons.engines.base import calibrated_label
 from comparisons.judging.convergence import JUMPING, STUDIES
 from comparisons.judging.error_budget import is_sufficient
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN
 from comparisons.measuring.tolerances import negligible
-from comparisons.results.results import NEGLIGIBLE, Results, is_undecided
+from comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided
 from reports.views.leading_errors import step_costs
 from reports.views.numbers import duration, quantity, size, word
 
+CONVERGING = frozenset({"passed", "measured", "no_truth"})
+"""Verdicts of a scene without a finding."""
+MOST_NAMED = 3
 ENGINE_NAMES = {"document": "document (Wang's method)"}
 """Engines whose label does not say what they are."""
 
@@ -161,8 +163,8 @@ def _known(tally: Counts) -> str:
 def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
     """One sentence for each engine, and one for all errors that the time steps leave undecided.
 
-    An engine's sentence has the number of scenes in which its errors vanish as dt → 0, the largest error that does not, known faults at
-    these time steps, breakdowns, and the cost of a step. That of a missing engine says why it is missing.
+    An engine's sentence has the number of scenes in which it converges, what it does in the others with its largest error, breakdowns,
+    and the cost of a step. That of a missing engine says why it is missing.
 
     Args:
         results: The run.
@@ -170,7 +172,7 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
         profiles: Engines with default settings compared with the calibrated ones.
     """
     missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine").set_index("engine")["reason"]
-    costs = step_costs(results)
+    costs, statuses = step_costs(results), results.statuses()
     sentences, undecided = [], []
     for engine in results.engines:
         if engine in missing:
@@ -179,48 +181,52 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
         remain = {scene for cause in ("model", "setting") for scene in lasting[cause][engine]}
         errors = results.table[(results.table["kind"] == "asymptotic_error") & (results.table["engine"] == engine)]
         opened = errors[is_undecided(errors) & ~errors["scene"].isin(remain)]
-        opened_errors = opened[~opened["metric"].isin(JUMPING)]
         parts = [
-            _convergence(results, engine, errors, remain, opened_errors["scene"].nunique()),
-            *_known_faults(results, engine, remain),
+            _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
             *_breakdowns(results, engine),
             *(profile.clause for profile in profiles if profile.engine == engine),
             *_cost(results, engine, costs),
         ]
         sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
         if len(opened):
-            undecided.append(f"{engine} in {_scenes(opened['scene'].nunique())} ({', '.join(map(quantity, opened['metric'].unique()))})")
-    return [*sentences, *([f"Undecided at these time steps: {', '.join(undecided)}."] if undecided else [])]
+            undecided.append(
+                f"{engine} in {_named(list(opened['scene'].unique()))} ({', '.join(map(quantity, opened['metric'].unique()))})"
+            )
+    return [*sentences, *([f"Undecided at these time steps: {'; '.join(undecided)}."] if undecided else [])]
 
 
-def _convergence(results: Results, engine: str, errors: pd.DataFrame, remain: Collection[str], opened: int) -> str:
-    """In how many scenes the errors of an engine vanish as dt → 0, and the largest error that does not, relative to its scale."""
-    total = errors["scene"].nunique()
-    if not total:
+def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
+    """In how many scenes an engine converges, and what it does in the others, with its largest error relative to its scale."""
+    mine = results.table[results.table["engine"] == engine]
+    studied = list(mine.loc[mine["kind"] == "asymptotic_error", "scene"].unique())
+    if not studied:
         frame = results.measurements
         measured = _scenes(frame.loc[frame["engine"] == engine, "scene"].nunique())
         enough = is_sufficient(results.provenance["asked"]["dts"])
         return f"{measured} measured, no asymptotic errors" + ("" if enough else "; they take three time steps that span a factor of four")
-    vanish = total - len(remain) - opened
-    words = f"errors above {NEGLIGIBLE:g} vanish as dt → 0 in {'all ' if vanish == total > 1 else ''}"
-    words += _scenes(total) if vanish == total else f"{vanish} of {total} scenes"
-    if not remain:
-        return words
-    stay = errors[errors["cause"].isin(["model", "setting"]) & ~errors["metric"].isin(JUMPING)]
-    scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(stay["scene"], stay["unit"], strict=True)]
-    largest = (stay["value"].abs() / scales).sort_values(ascending=False).index[:1]
-    named = [
-        f" ({quantity(row['metric'])} up to {size(row['value'], row['unit'])} in {row['scene']})"
-        for row in stay.loc[largest].to_dict("records")
+    wrong = [scene for scene in studied if scene in remain or statuses[scene].verdict not in CONVERGING]
+    kinds = Counter("setting error" if statuses[scene].verdict in CONVERGING else statuses[scene].words for scene in wrong)
+    kinds[UNDECIDED] = sum(statuses[scene].words == UNDECIDED for scene in studied if scene not in wrong)
+    counted = [f"{kind} in {count}" for kind, count in kinds.items() if count]
+    converges = "; ".join([f"converges in {len(studied) - kinds.total()} of {_scenes(len(studied))}", *filter(None, [", ".join(counted)])])
+    if not wrong:
+        return converges
+    shown = mine[
+        mine["scene"].isin(wrong) & (mine["verdict"].isin(["known", "limited", *FAILURES]) | mine["cause"].isin(["model", "setting"]))
     ]
-    return f"{words}, remain in {len(remain)}{''.join(named)}"
+    shown = shown[(shown["metric"] != "") & (shown["kind"] != "order") & ~shown["metric"].isin(JUMPING) & shown["value"].notna()]
+    scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(shown["scene"], shown["unit"], strict=True)]
+    largest = (shown["value"].abs() / scales).sort_values(ascending=False, kind="stable").index[:1]
+    worst = [
+        f"largest error: {size(row['value'], row['unit'])} of {quantity(row['metric'])} in {row['scene']}"
+        for row in shown.loc[largest].to_dict("records")
+    ]
+    return f"{converges}{''.join(f' ({one})' for one in worst)}"
 
 
-def _known_faults(results: Results, engine: str, remain: Collection[str]) -> list[str]:
-    """The scenes in which results of an engine show an expected fault, though its errors vanish, negligible ones left out."""
-    known = (results.table["verdict"] == "known") & (results.table["value"].abs() > NEGLIGIBLE) & (results.table["engine"] == engine)
-    scenes = [scene for scene in results.table.loc[known, "scene"].unique() if scene not in remain]
-    return [f"known {'fault' if len(scenes) == 1 else 'faults'} in {', '.join(scenes)}"] if scenes else []
+def _named(scenes: Collection[str]) -> str:
+    """The names of a few scenes, or the number of many."""
+    return ", ".join(scenes) if len(scenes) <= MOST_NAMED else _scenes(len(scenes))
 
 
 def _breakdowns(results: Results, engine: str) -> list[str]:

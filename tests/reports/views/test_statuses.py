@@ -39,7 +39,8 @@ def test_known_faults_are_counted_apart_and_in_the_headline(core):
     assert summary.counts.known == len(known) > 100
     assert summary.counts.passed == (core.table["verdict"] == "passed").sum()
     assert f"{len(known)} results show known faults" in summary.verdict
-    [sentence] = [one for one in summary.findings if "spin-principal-500" in one]
-    assert sentence.startswith("document (Wang's method): ")
-    assert "; known faults in drop-ball-dull, spin-principal-500; " in sentence
+    [sentence] = [one for one in summary.findings if one.startswith("document (Wang's method): ")]
+    faults = sum(by_engine["document"].words == "known fault" for by_engine in summary.statuses.values())
+    assert faults > 0
+    assert f"known fault in {faults}" in sentence
     assert junit_xml(core).decode().count("known fault: ") == len(known)

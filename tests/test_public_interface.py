@@ -86,7 +86,7 @@ def test_notebook_shows_status_and_leading_error_of_each_engine():
             assert float(error) == pytest.approx(abs(value), rel=0.05)
             assert (status, shown_unit) == ("converges", unit)
     assert shown.loc["drop-box-corner", "document"] == "declined"
-    assert shown.loc["drop-box-corner", "mujoco"] == "outside the documented range"
+    assert shown.loc["drop-box-corner", "mujoco"] == "no exact solution"
     assert "<b>" not in found._repr_html_()
     assert found.leading_errors("drop-box-corner").empty
     with pytest.raises(ds.UnknownName, match=r"'spin-principle' is unknown\. Did you mean 'spin-principal'"):

@@ -36,7 +36,7 @@ def conform(
     checks: Sequence[str] = (),
     *,
     resources: ResourceLimits = ResourceLimits(processor_time=60.0),  # noqa: B008 - it is immutable
-    on_result: Callable[[CheckResult], None] = lambda result: None,
+    on_result: Callable[[CheckResult], None] | None = None,
 ) -> list[CheckResult]:
     """Check an adapter against the protocol, and its motions against reference motions.
 
@@ -65,7 +65,8 @@ def conform(
                 found.append(processes.call(entry, run_check, check))
             except Failed as failure:
                 found.append(CheckResult(check, cast(CheckOutcome, failure.verdict), failure.reason))
-            on_result(found[-1])
+            if on_result is not None:
+                on_result(found[-1])
     return found
 
 

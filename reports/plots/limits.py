@@ -46,7 +46,7 @@ def failure_modes(found: RobustnessStudy, axis_name: str) -> Chart:
     values = [point.value for scan in scans for point in scan.points]
     return Chart(
         axis.label,
-        "",
+        "engine",
         [*sorted(bars, key=lambda bar: order.index(bar.label)), nominal],
         ticks=_ticks(axis, values),
         x_range=(axis.coordinate(min(values)), axis.coordinate(max(values))) if max(values) > min(values) else None,

@@ -16,7 +16,7 @@ from reports.views.numbers import duration, quantity, size, word
 
 CONVERGING = frozenset({"passed", "measured", "no_truth"})
 """Verdicts of a scene without a finding."""
-MOST_NAMED = 3
+MOST_NAMED = 2
 ENGINE_NAMES = {"document": "document (Wang's method)"}
 """Engines whose label does not say what they are."""
 
@@ -218,7 +218,7 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(shown["scene"], shown["unit"], strict=True)]
     largest = (shown["value"].abs() / scales).sort_values(ascending=False, kind="stable").index[:1]
     worst = [
-        f"largest error: {size(row['value'], row['unit'])} of {quantity(row['metric'])} in {row['scene']}"
+        f"largest: {quantity(row['metric'])} {size(row['value'], row['unit'])}, {row['scene']}"
         for row in shown.loc[largest].to_dict("records")
     ]
     return f"{converges}{''.join(f' ({one})' for one in worst)}"
@@ -242,9 +242,9 @@ def _cost(results: Results, engine: str, costs: Mapping[str, float]) -> list[str
         return []
     fastest = min(timed, key=timed.__getitem__)
     if engine != fastest:
-        return [f"a step takes {float(f'{timed[engine]:.2g}'):g} times that of {fastest}"]
+        return [f"steps take {float(f'{timed[engine]:.2g}'):g} times as long"]
     seconds = results.table.loc[results.table["engine"] == engine, "time_per_step"].median()
-    return [f"a step takes {duration(float(seconds))}{', the least' if len(timed) > 1 else ''}"]
+    return [f"steps take {duration(float(seconds))}{', the least' if len(timed) > 1 else ''}"]
 
 
 def _scenes(count: int) -> str:

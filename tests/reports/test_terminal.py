@@ -10,7 +10,6 @@ from support.cli import TERMINAL, dropspin
 import dropspin as ds
 from reports.terminal.rows import print_rows
 from reports.terminal.summary import print_summary
-from reports.views.findings import statuses
 from reports.views.matrix import MOST_SCENES, matrix
 from reports.views.run import overview
 
@@ -52,10 +51,10 @@ def test_summary_of_many_scenes_shows_those_with_findings_and_counts_the_others(
     assert len(lines) <= 45
     shown = [line.split()[0] for line in lines if line.split()[0] in many.scenes]
     assert len(shown) == MOST_SCENES
-    found = matrix(many, statuses(many))
+    found = matrix(many, many.statuses())
     fine, more = map(int, re.findall(r"\d+", found.left_out))
     assert fine + more + MOST_SCENES == len(many.scenes)
-    by_scene = statuses(core)
+    by_scene = core.statuses()
     without = [scene for scene, found in by_scene.items() if all(one.words in ("converges", "declined") for one in found.values())]
     assert fine == 5 * len(without) > 0
     assert not {name.rpartition("-")[0] for name in shown} & set(without)
@@ -104,15 +103,17 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     sentences = overview(core).findings
     of = {engine: [one for one in sentences if re.match(rf"{engine}( \(|:)", one)] for engine in core.engines}
     assert [len(some) for some in of.values()] == [1, 1, 1]
-    limits = core.table[core.table["kind"] == "asymptotic_error"]
-    worst = limits[(limits["engine"] == "document") & (limits["metric"] == "orientation_error") & (limits["cause"] == "model")]
-    row = worst.loc[worst["value"].abs().idxmax()]
-    assert f"(orientation up to {row['value']:.3g} rad in {row['scene']})" in of["document"][0]
-    mine = limits[limits["engine"] == "mujoco"]
-    remain = mine[(mine["cause"] == "model") & (mine["value"].abs() > 1e-4)]["scene"].nunique()
-    assert f" of {mine['scene'].nunique()} scenes, remain in {remain} (" in of["mujoco"][0]
+    known = core.table[(core.table["verdict"] == "known") & (core.table["unit"] == "rad")]
+    row = known.loc[known["value"].abs().idxmax()]
+    assert f"(largest: {row['metric'].split('_')[0]} {row['value']:.3g} rad, {row['scene']})" in of["document"][0]
+    for engine in core.engines:
+        words = [by_engine[engine].words for by_engine in core.statuses().values()]
+        studied = len(words) - words.count("declined")
+        assert f"converges in {words.count('converges')} of {studied} scenes" in of[engine][0]
+        for status in set(words) - {"converges", "declined"}:
+            assert f"{status} in {words.count(status)}" in of[engine][0]
     assert of["document"][0].endswith(" ns, the least.")
-    assert all(of[engine][0].endswith(" times that of document.") for engine in ("mujoco", "pybullet"))
+    assert all(of[engine][0].endswith(" times as long.") for engine in ("mujoco", "pybullet"))
 
 
 def test_piped_list_has_one_line_for_each_scene(tmp_path):

@@ -82,7 +82,7 @@ def test_invalid_ensembles_are_rejected():
     """A scene without an ensemble, an angle beyond half a turn, a negative width."""
     with pytest.raises(ValueError, match="no \\[ensemble\\]"):
         members(load("drop-ball"))
-    with pytest.raises(SceneError, match=r"ensemble.turn: got 4.0; must be less than or equal to 3.14"):
+    with pytest.raises(SceneError, match=r"\['ensemble'\]\['turn'\]: got 4.0; must be less than or equal to 3.14"):
         scene_with(turn=4.0)
-    with pytest.raises(SceneError, match=r"ensemble.velocity\[1\]: got -1.0"):
+    with pytest.raises(SceneError, match=r"\['ensemble'\]\['velocity'\]\[1\]: got -1.0"):
         scene_with(velocity=[0.0, -1.0, 0.0])

@@ -16,6 +16,9 @@ class MyEngine(Engine):
 
     name = "my-engine"
 
+    def declines(self, scene):
+        return engine("pybullet").declines(scene)
+
     def prepare(self, scene, dt):
         release = os.environ.get("RELEASE", "good")
         if release == "crashing" and scene.floor is not None:

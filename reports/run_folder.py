@@ -68,7 +68,7 @@ def _write_plots(results: Results, folder: Path, kinds: Collection[str]) -> None
 
 @contextmanager
 def run_folder(folder: str | Path) -> Iterator[Path]:
-    """An empty folder beside the one asked for, which it replaces when the block succeeds; else it is removed.
+    """An empty temporary folder beside the requested one. If the block succeeds, it replaces the requested folder; else it is deleted.
 
     Raises:
         DropspinError: On entering, if the folder holds something else or cannot be written.

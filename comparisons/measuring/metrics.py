@@ -65,7 +65,7 @@ def energy_error(case: Comparison) -> Array:
 
 @_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True)
 def energy_error_raw(case: Comparison) -> Array:
-    """As energy_error, without synchronisation: velocities of some engines lag positions by half a step."""
+    """Like energy_error, but velocity and position are not synchronised: velocities of some engines lag positions by half a step."""
     return _extremes_of_each_flight(errors.energy_error(case, synchronised=False), case)
 
 
@@ -179,7 +179,7 @@ def landing_error(case: Comparison) -> float:
 
 @_metric("1/s", "truth", "an exact solution that bounces or rocks more than once", requirements.repeats_impacts)
 def desync_rate(case: Comparison) -> float:
-    """1 over the time at which the height is wrong by half the height of a flight (desynchronised); 0 if that never happens."""
+    """1 over the first time at which the error of height reaches half the height of a flight (desynchronised); 0 if it never does."""
     return 1.0 / case.desynchronised_from
 
 

@@ -305,7 +305,7 @@
         const at = one === line ? i : one.x.findIndex((v) => Math.abs(v - x) <= 1e-9 * Math.abs(x));
         return at < 0 || !Number.isFinite(one.y[at]) || (one !== line && one.dashes === "dashed" && one.colour) ? [] : [made("div", one === line ? { class: "chosen" } : {}, `${one.label}: ${text(one, at)}`)];
       });
-      this.tip.replaceChildren(made("div", { class: "quiet" }, `${this.raw.xLabel.replace(/ \[.*/, "")} ${place}`), ...rows);
+      this.tip.replaceChildren(made("div", { class: "quiet" }, `${(this.raw.xLabel ?? "").replace(/ \[.*/, "")} ${place}`), ...rows);
       const right = this.toX(x) > this.frame.width / 2;
       this.tip.style.left = right ? "" : `${this.toX(x) + 12}px`;
       this.tip.style.right = right ? `${this.frame.width - this.toX(x) + 12}px` : "";
@@ -327,7 +327,7 @@
       const { x0, x1, y0, y1, left, wide, tall } = this.frame;
       const xAt = (px) => x0 + (px - left) / wide * (x1 - x0), yAt = (py) => y1 - (py - TOP) / tall * (y1 - y0);
       if (Math.hypot(a[0] - b[0], a[1] - b[1]) < SHORTEST_DRAG) {
-        if (this.raw.xLabel.startsWith("time [")) this.section.dispatchEvent(new CustomEvent("dropspin:seek", { detail: xAt(b[0]) }));
+        if (this.raw.xLabel?.startsWith("time [")) this.section.dispatchEvent(new CustomEvent("dropspin:seek", { detail: xAt(b[0]) }));
         return;
       }
       const range = (u, v, most) => (Math.abs(u - v) < most ? null : [Math.min(u, v), Math.max(u, v)]);
@@ -343,7 +343,7 @@
     // Mark a time of the replay.
     seek(time) {
       this.time = time;
-      if (!this.cursor || !this.raw.xLabel.startsWith("time [")) return;
+      if (!this.cursor || !this.raw.xLabel?.startsWith("time [")) return;
       const x = this.toX(time), { left, wide } = this.frame;
       this.cursor.setAttribute("x1", x);
       this.cursor.setAttribute("x2", x);

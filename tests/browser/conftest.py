@@ -22,7 +22,8 @@ class Page:
 
     def __init__(self, browser, file, **settings):
         self.messages, self.requests = [], []
-        self.tab = browser.new_page(**settings)
+        # Waiting for a condition evaluates text, which the policy of the pages forbids.
+        self.tab = browser.new_page(**{"bypass_csp": True} | settings)
         self.tab.on("console", lambda message: self.messages.append(message.text))
         self.tab.on("pageerror", lambda error: self.messages.append(str(error)))
         self.tab.on("request", lambda request: self.requests.append(request.url))

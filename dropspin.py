@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from comparisons.engines.base import BatchSimulation as BatchSimulation
     from comparisons.engines.base import Diverged as Diverged
     from comparisons.engines.base import Engine as Engine
+    from comparisons.engines.base import EngineBroken as EngineBroken
     from comparisons.engines.base import EngineMissing as EngineMissing
     from comparisons.engines.base import KnownLimitation as KnownLimitation
     from comparisons.engines.base import NumericOption as NumericOption
@@ -79,6 +80,7 @@ _HOMES = {
         "BatchSimulation",
         "Diverged",
         "Engine",
+        "EngineBroken",
         "EngineMissing",
         "KnownLimitation",
         "NumericOption",
@@ -139,13 +141,13 @@ def __dir__() -> list[str]:
 def main() -> None:
     """Run the command line.
 
-    Installed packages come before the working directory and PYTHONPATH, so that a user's folders named `scenarios`, `reports` or
-    `comparisons` do not hide dropspin's own.
+    Neither the working directory nor a user's folder on PYTHONPATH hides dropspin's modules or installed packages: the first is not on
+    Python's path, except in the processes of engines of one's own, and the others come last.
     """
-    home = os.path.dirname(os.path.abspath(__file__))
-    named = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    last = [place for place in dict.fromkeys(map(os.path.abspath, [*named, os.getcwd()])) if place != home]
-    sys.path[:] = [place for place in sys.path if os.path.abspath(place) not in last] + last
+    home, here = os.path.dirname(os.path.abspath(__file__)), os.getcwd()
+    named = [os.path.abspath(place) for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
+    own = [place for place in sys.path if os.path.abspath(place) not in {*named, here} - {home}]
+    sys.path[:] = own + [place for place in dict.fromkeys(named) if place not in {home, here}]
     from reports.commands.main import main as command_line
 
     command_line()

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine
-from comparisons.running.inputs import EngineEntry, installed_engine, verify_time_step
+from comparisons.running.entries import present_entry
+from comparisons.running.inputs import EngineEntry, verify_time_step
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.start_phases import START_PHASES
+from comparisons.running.verification import verified_refusal, verified_settings
 from scenarios import DropspinError, Scenario, load
 
 Array = NDArray[np.float64]
@@ -96,21 +98,16 @@ def calibrate(
     Raises:
         DropspinError: The engine has no such settings, or broke down with them.
     """
-    engine = installed_engine(engine)
-    scene = drop(restitution, friction, shape)
+    entry, scene = present_entry(engine), drop(restitution, friction, shape)
     verify_time_step(scene, dt)
-    refusal = engine.declines(scene)
-    if refusal is not None:
-        raise DropspinError(f"{engine.label} cannot be calibrated: {refusal}.")
-    programs = engine.programs(scene, dt)
-    if not programs:
-        raise DropspinError(f"{engine.label} has no settings to calibrate; use mujoco or pybullet.")
     with EngineProcesses(resources) as processes:
         try:
-            settings, measured = processes.call(EngineEntry(engine.label, engine), _measured, scene, dt, programs["python"])
+            found = processes.call(entry, _calibrated, scene, dt)
         except Failed as failure:
-            raise DropspinError(f"{engine.label} broke down with these settings: {failure.reason}.") from None
-    return Calibration(engine.label, settings, engine.reasons, programs, measured)
+            raise DropspinError(f"{entry.label} broke down with these settings: {failure.reason}.") from None
+    if isinstance(found, str):
+        raise DropspinError(f"{entry.label} {found}.")
+    return found
 
 
 def drop(restitution: float, friction: str | float = "none", shape: Shape = "ball") -> Scenario:
@@ -127,14 +124,21 @@ def drop(restitution: float, friction: str | float = "none", shape: Shape = "bal
     )
 
 
-def _measured(entry: EngineEntry, scene: Scenario, dt: float, program: str) -> tuple[dict[str, Any], tuple[Measured, ...]]:
-    """In the engine's process: its settings, and the measurements of a program."""
-    assert entry.engine is not None
-    with entry.engine.prepare(scene, dt) as simulation:
-        settings = dict(simulation.settings)
+def _calibrated(entry: EngineEntry, scene: Scenario, dt: float) -> Calibration | str:
+    """In the engine's process: its settings with the programs, and the measurements of these; or why there are none."""
+    engine = entry.adapter
+    refusal = verified_refusal(engine.declines(scene))
+    if refusal is not None:
+        return f"cannot be calibrated: {refusal}"
+    programs = engine.programs(scene, dt)
+    if not programs:
+        return "has no settings to calibrate; use mujoco or pybullet"
+    with engine.prepare(scene, dt) as simulation:
+        settings = verified_settings(simulation.settings)
     names: dict[str, Any] = {"__name__": "pasted"}
-    exec(compile(program, "pasted", "exec"), names)
-    return settings, tuple(measurements(cast(Motion, names["motion"]), dt))
+    exec(compile(programs["python"], "pasted", "exec"), names)
+    measured = tuple(measurements(cast(Motion, names["motion"]), dt))
+    return Calibration(entry.label, settings, engine.reasons, programs, measured)
 
 
 def measurements(motion: Motion, dt: float) -> list[Measured]:

@@ -10,8 +10,9 @@ from comparisons.conformance.motion import check_motion
 from comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckResult, Declined
 from comparisons.conformance.probes import PROBES
 from comparisons.conformance.protocol import check_builds, check_claims, check_record, check_refusals, check_settings, check_states
-from comparisons.engines.base import Diverged, Engine, EngineMissing
-from comparisons.running.inputs import EngineEntry, engine_entry
+from comparisons.engines.base import Diverged, Engine
+from comparisons.running.entries import present_entry
+from comparisons.running.inputs import EngineEntry
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.verification import BuildMismatch
 from scenarios.errors import UnknownName
@@ -52,12 +53,11 @@ def conform(
     Raises:
         UnknownName: There is no such check.
         EngineMissing: The engine is not installed.
+        EngineBroken: It cannot be imported or constructed.
     """
     for unknown in set(checks) - CHECKS.keys():
         raise UnknownName("check", unknown, CHECKS)
-    entry = engine_entry(engine)
-    if entry.engine is None:
-        raise EngineMissing(entry.missing)
+    entry = present_entry(engine)
     found = []
     with EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
@@ -72,9 +72,8 @@ def conform(
 
 def run_check(entry: EngineEntry, check: str) -> CheckResult:
     """Run one check in this process."""
-    assert entry.engine is not None
     try:
-        return CHECKS[check](entry.engine, check)
+        return CHECKS[check](entry.adapter, check)
     except (CheckFailed, BuildMismatch) as failure:
         return CheckResult(check, "failed", str(failure), whole_traceback(failure) if failure.__cause__ else "")
     except Declined as declined:
@@ -82,4 +81,4 @@ def run_check(entry: EngineEntry, check: str) -> CheckResult:
     except Diverged as diverged:
         return CheckResult(check, "failed", f"the engine diverged: {diverged}")
     except Exception as error:  # an adapter is somebody else's code
-        return CheckResult(check, "crashed", described(error, entry.engine), whole_traceback(error))
+        return CheckResult(check, "crashed", described(error, entry.adapter), whole_traceback(error))

@@ -4,6 +4,7 @@ import os
 import sys
 import traceback
 
+from comparisons.engines import exceptions
 from comparisons.engines.base import Engine
 
 
@@ -12,7 +13,7 @@ def described(error: Exception, engine: Engine) -> str:
     file = getattr(sys.modules.get(type(engine).__module__), "__file__", None)
     own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     where = f" ({os.path.relpath(own[-1].filename)}:{own[-1].lineno}, in {own[-1].name})" if own else ""
-    return f"{type(error).__name__}: {error}{where}"
+    return exceptions.described(error) + where
 
 
 def whole_traceback(error: Exception) -> str:

@@ -26,6 +26,10 @@ class EngineMissing(DropspinError):
     """An engine whose package is not installed; the text says how to get it."""
 
 
+class EngineBroken(DropspinError):
+    """An engine that is there and cannot be imported or constructed; the text says why, and the cure where one is known."""
+
+
 class Diverged(Exception):
     """A simulation broke down; the text says at which step and why."""
 

@@ -2,13 +2,15 @@
 
 import re
 import sys
+from collections.abc import Mapping
 from contextlib import redirect_stdout
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import NamedTuple, cast
 
-from comparisons.engines.base import Engine, EngineMissing
+from comparisons.engines.base import Engine, EngineBroken, EngineMissing
+from comparisons.engines.exceptions import described
 from scenarios.errors import DropspinError, UnknownName
 
 
@@ -38,6 +40,15 @@ BUILT_IN = {
     "drake": _Home("comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
 }
 
+CURES = {
+    r"libGL\.so|libEGL\.so|libOSMesa": "install the system's OpenGL libraries (Debian, Ubuntu: apt-get install libgl1 libegl1)",
+    r"libstdc\+\+.*GLIBCXX|GLIBC_\d": "its wheel needs a newer system; install a release that was built for this one",
+    r"compiled using NumPy 1|numpy\.core\.multiarray|numpy\.dtype size changed": "install a release for this NumPy, or an older NumPy",
+    r"wrong ELF class|invalid ELF header|incompatible architecture": "its wheel is for another processor; install it again with pip",
+    r"partially initialized|cannot import name|No module named": "it is incomplete, or a file of the same name hides it; install it again",
+}
+"""By what the import of a package says: what to do."""
+
 
 def engine_names() -> list[str]:
     """All engine names, installed or not.
@@ -60,21 +71,37 @@ def engine(name: str) -> Engine:
     Raises:
         UnknownName: There is no such engine, option or value.
         EngineMissing: A package it needs is not installed; the text says how to get it.
-        DropspinError: It is not an engine, or cannot be imported or created.
+        EngineBroken: It cannot be imported or constructed.
+        DropspinError: It is not an engine.
     """
+    base, options = parsed(name)
+    return constructed(base, options)
+
+
+def parsed(name: str) -> tuple[str, dict[str, str]]:
+    """The name of an engine without its options, and the options."""
     if not isinstance(name, str):
         raise DropspinError(f"engine: got {name!r} ({type(name).__name__}); give a name such as 'mujoco'.")
     match = re.fullmatch(r"\s*([\w.:-]+)\s*(?:\[(.*)\])?\s*", name)
     if match is None:
         raise DropspinError(f"engine {name!r}: write a name, or a name with options, such as mujoco[integrator=rk4].")
-    base, listed = match.group(1), match.group(2) or ""
+    return match.group(1), _options(name, match.group(2) or "")
+
+
+def constructed(base: str, options: Mapping[str, str]) -> Engine:
+    """The engine of a name without options, with options; errors are those of `engine`."""
     adapter = _adapter(base)
     try:
-        return adapter(_options(name, listed))
+        return adapter(options)
     except DropspinError:
         raise
     except (Exception, SystemExit) as error:
-        raise DropspinError(f"engine {base!r}: it could not be created ({type(error).__name__}: {error}).") from error
+        raise EngineBroken(f"{base} cannot be constructed: {described(error)}.") from error
+
+
+def is_foreign(base: str) -> bool:
+    """Whether the code of an engine is not dropspin's: a class, or an engine of another package."""
+    return ":" in base or base in _entry_points()
 
 
 def _adapter(base: str) -> type[Engine]:
@@ -84,7 +111,12 @@ def _adapter(base: str) -> type[Engine]:
         # Checked before the import of the adapter, which imports its engine.
         if home.package and find_spec(home.package) is None:
             raise EngineMissing(f"{base} is not installed: {home.how_to_install}.")
-        adapter: type[Engine] = getattr(import_module(home.module), home.adapter)
+        try:
+            adapter: type[Engine] = getattr(import_module(home.module), home.adapter)
+        except (Exception, SystemExit) as error:
+            text = described(error)
+            cure = next((f"; {cure}" for pattern, cure in CURES.items() if re.search(pattern, text)), "")
+            raise EngineBroken(f"{base} is installed, but {home.package} cannot be imported: {text}{cure}.") from error
         return adapter
     if ":" in base:
         module, _, attribute = base.partition(":")
@@ -112,7 +144,7 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
             raise DropspinError(f"engine {name!r}: no module {module_name!r} here or on Python's path.") from None
         raise EngineMissing(f"{name} needs the module {error.name}, which is not installed.") from None
     except (Exception, SystemExit) as error:
-        raise DropspinError(f"engine {name!r}: {module_name} cannot be imported ({type(error).__name__}: {error}).") from error
+        raise EngineBroken(f"{name} cannot be used: its module {module_name} cannot be imported: {described(error)}.") from error
     found: object = module
     for part in attribute.split("."):
         if not hasattr(found, part):
@@ -122,7 +154,7 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
         raise DropspinError(f"engine {name!r}: {attribute} is not an engine; an engine is a class that inherits from dropspin.Engine.")
     adapter = cast(type[Engine], found)
     given = getattr(adapter, "name", "")
-    if not re.fullmatch(r"[A-Za-z][\w-]*", given):
+    if not isinstance(given, str) or not re.fullmatch(r"[A-Za-z][\w-]*", given, re.ASCII):
         raise DropspinError(
             f"engine {name!r}: {attribute}.name is {given!r}; give it a name for results, of letters, digits, - and _, such as 'my-engine'."
         )

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from comparisons.engines.base import EngineMissing, KnownLimitation
+from comparisons.engines.base import EngineBroken, EngineMissing, KnownLimitation
 from comparisons.engines.registry import BUILT_IN, engine
 from comparisons.measuring.metric import Metric
 from comparisons.measuring.metrics import METRICS
@@ -14,7 +14,9 @@ from scenarios import DropspinError, Scenario, SceneError, Truth
 from scenarios.errors import did_you_mean
 from scenarios.model import Expectation
 
-Verdict = Literal["passed", "failed", "known", "measured", "limited", "diverged", "crashed", "timed_out", "declined", "missing", "no_truth"]
+Verdict = Literal[
+    "passed", "failed", "known", "measured", "limited", "diverged", "crashed", "timed_out", "declined", "missing", "broken", "no_truth"
+]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 WORDS = {"known": "known fault", "timed_out": "timed out", "no_truth": "no exact solution"}
 """Verdicts in words, where these are not the verdict itself."""
@@ -29,14 +31,28 @@ MARKS = {
     "timed_out": "⏱",
     "declined": "–",
     "missing": "?",
+    "broken": "✗",
     "no_truth": "·",
 }
 """Verdicts as one character."""
-SEVERITY = ("crashed", "timed_out", "diverged", "failed", "missing", "declined", "known", "limited", "no_truth", "passed", "measured")
+SEVERITY = (
+    "broken",
+    "crashed",
+    "timed_out",
+    "diverged",
+    "failed",
+    "missing",
+    "declined",
+    "known",
+    "limited",
+    "no_truth",
+    "passed",
+    "measured",
+)
 """Worst first: the verdict that represents a scene and an engine."""
 assert set(SEVERITY) == set(VERDICTS)
 FAILURES = frozenset({"failed"})
-BREAKDOWNS = frozenset({"diverged", "crashed", "timed_out"})
+BREAKDOWNS = frozenset({"broken", "diverged", "crashed", "timed_out"})
 HOLDS_AGAIN = "the known fault does not show; its expectation can be removed"
 """How the reason begins of a check that passes although a known fault is expected."""
 Cause = str
@@ -166,7 +182,7 @@ def _verify_engine(where: str, name: str, known: set[str]) -> None:
         return
     try:
         canonical = engine(name).label
-    except EngineMissing:
+    except (EngineBroken, EngineMissing):
         return  # its options cannot be checked here
     except DropspinError as error:
         raise SceneError(f"{where}; {error}") from None

@@ -1,7 +1,6 @@
 """Provenance of results: versions, machine, commit, time."""
 
 import hashlib
-import inspect
 import json
 import os
 import platform
@@ -86,14 +85,6 @@ def code(*places: Path) -> str:
     for file in files:
         found.update(file.read_bytes())
     return found.hexdigest()[:12]
-
-
-def adapter_code(engine: object) -> str | None:
-    """The hash of the file that defines an engine's adapter; None for one that is not in a file."""
-    try:
-        return code(Path(inspect.getfile(type(engine))))
-    except (OSError, TypeError):
-        return None
 
 
 def digest(settings: Mapping[str, Any]) -> str:

@@ -172,12 +172,11 @@ def _without_value(mode: FailureMode, reason: str) -> Diagnosis:
 
 def _record(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend: bool) -> list[Recording] | Diagnosis:
     """In the engine's process: its recordings of scenes, or why there are none."""
-    assert entry.engine is not None
     found = []
     for scene in scenes:
         steps = scene.steps(dt)
         extra = max(0, FEWEST_STEPS_WITHOUT_GRAVITY - steps) if extend and scene.gravity is None else 0
-        recording = try_record(entry.engine, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra)
+        recording = try_record(entry.adapter, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra)
         if isinstance(recording, Breakdown):
             if recording.verdict == "diverged":
                 return Diagnosis("diverged", "gave up", math.inf, recording.reason)

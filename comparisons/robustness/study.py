@@ -11,7 +11,8 @@ from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
 from comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
-from comparisons.running.inputs import SceneLike, as_scene, engine_entry, ignore, several, verify_time_step
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from scenarios import DropspinError, Scenario
 from scenarios.errors import UnknownName
@@ -112,7 +113,7 @@ def find_limits(
     chosen = _axes(scene, tuple(dict.fromkeys(axes)))
     named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
     entries = list({one.label: one for one in named}.values())
-    left_out = {one.label: one.missing for one in entries if one.engine is None}
+    left_out = {one.label: one.reason for one in entries if one.engine is None}
     present = [one for one in entries if one.engine is not None]
     scans, refinements = [], {}
     nominal, callback = OperatingPoint(scene, dt), on_progress or ignore

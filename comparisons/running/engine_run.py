@@ -15,6 +15,7 @@ from comparisons.running.ensembles import run_ensemble
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.progress import OnSimulations
 from comparisons.running.recording import Breakdown, Recording, classify, record, time_steps
+from comparisons.running.verification import verified_claims, verified_predictions, verified_refusal
 from scenarios import Scenario, Trajectory, truth_for
 
 TIMING_REPEATS = 3
@@ -72,16 +73,17 @@ def run_engine(
         on_simulations: Called after each simulation.
     """
     engine, found = entry.engine, EngineRun(entry.label)
-    if engine is None:
-        found.breakdown = Breakdown("missing", entry.missing)
+    if entry.absence:
+        found.breakdown = Breakdown(entry.absence, entry.reason)
         return found
+    assert engine is not None
     try:
-        refusal = engine.declines(scene)
+        refusal = verified_refusal(engine.declines(scene))
         if refusal is not None:
             found.breakdown = Breakdown("declined", refusal)
             return found
-        found.discretisation, found.order, found.precision = engine.discretisation(scene), engine.order_in(scene), engine.precision
-        sets = perturbed(scene, starts, engine.precision)
+        found.discretisation, found.order, found.precision = verified_claims(engine, scene)
+        sets = perturbed(scene, starts, found.precision)
         total = 1 + (len(starts) if len(starts) > 1 else 0) + sum(map(len, sets)) + TIMING_REPEATS
         number = count(1)
 
@@ -107,5 +109,6 @@ def run_engine(
 def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:
     """The errors that the engine's scheme must have, by metric."""
     truth = truth_for(scene)
-    found = {metric.name: engine.predicted_error(scene, truth, metric.name, dt) for metric in metrics_for(scene, truth)}
-    return {name: value for name, value in found.items() if value is not None}
+    return verified_predictions(
+        {metric.name: engine.predicted_error(scene, truth, metric.name, dt) for metric in metrics_for(scene, truth)}
+    )

@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from comparisons.engines.base import Engine, EngineMissing
-from comparisons.engines.registry import engine as engine_named
+from comparisons.engines.base import Engine
 from comparisons.engines.registry import engine_names
 from scenarios import DropspinError, Scenario, SceneError, load
 
@@ -21,11 +20,25 @@ MOST_STEPS = 2_000_000
 
 @dataclass(frozen=True)
 class EngineEntry:
-    """An engine that takes part in a run; `missing` says why one that was asked for cannot."""
+    """An engine that takes part in a run.
+
+    Attributes:
+        label: Its label; of one that cannot take part, what it was asked for by.
+        engine: The engine, or its stand-in outside its process; None for one that cannot take part.
+        absence: Why it cannot take part: it is not installed, or broken.
+        reason: The same in a sentence.
+    """
 
     label: str
     engine: Engine | None
-    missing: str = ""
+    absence: Literal["", "missing", "broken"] = ""
+    reason: str = ""
+
+    @property
+    def adapter(self) -> Engine:
+        """The engine of an entry that can take part."""
+        assert self.engine is not None
+        return self.engine
 
 
 ONE_OR_SEVERAL = {
@@ -55,36 +68,6 @@ def several(name: str, given: Any) -> list[Any]:
     return list(given)
 
 
-def engine_entry(engine: Engine | str) -> EngineEntry:
-    """An engine by its name, or an engine object, as an entry of a run.
-
-    Raises:
-        DropspinError: There is no engine of that name, or it is neither an engine nor a name.
-    """
-    if isinstance(engine, Engine):
-        return EngineEntry(engine.label, engine)
-    if not isinstance(engine, str):
-        raise DropspinError(f"engine: got {_described(engine)}; give a name such as 'mujoco', or an Engine.")
-    try:
-        created = engine_named(engine)
-    except EngineMissing as error:
-        return EngineEntry(engine.strip(), None, str(error))
-    return EngineEntry(created.label, created)
-
-
-def installed_engine(engine: Engine | str) -> Engine:
-    """An engine by its name, or an engine object.
-
-    Raises:
-        EngineMissing: A package that it needs is not installed.
-        DropspinError: There is no engine of that name, or it is neither an engine nor a name.
-    """
-    entry = engine_entry(engine)
-    if entry.engine is None:
-        raise EngineMissing(entry.missing)
-    return entry.engine
-
-
 def as_scene(scene: SceneLike) -> Scenario:
     """A scene, or what `load` takes: a catalogue name, a file's path, or a mapping.
 
@@ -94,7 +77,9 @@ def as_scene(scene: SceneLike) -> Scenario:
     if isinstance(scene, Scenario):
         return scene
     if not isinstance(scene, str | Path | Mapping):
-        raise DropspinError(f"scene: got {_described(scene)}; give a name such as 'drop-ball', a file's path, a mapping, or a Scenario.")
+        raise DropspinError(
+            f"scene: got {described_value(scene)}; give a name such as 'drop-ball', a file's path, a mapping, or a Scenario."
+        )
     try:
         return load(scene)
     except SceneError:
@@ -106,7 +91,7 @@ def as_scene(scene: SceneLike) -> Scenario:
 def verify_time_step(scene: Scenario, dt: float) -> None:
     """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s]."""
     if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):
-        raise DropspinError(f"dt: got {_described(dt)}; a time step is a number of seconds.")
+        raise DropspinError(f"dt: got {described_value(dt)}; a time step is a number of seconds.")
     if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 <= MOST_STEPS):
         raise DropspinError(
             f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be "
@@ -114,7 +99,7 @@ def verify_time_step(scene: Scenario, dt: float) -> None:
         )
 
 
-def _described(value: object) -> str:
+def described_value(value: object) -> str:
     """A value of a wrong type for a message: its type, and the value if it is short."""
     text = repr(value)
     return f"{text} ({type(value).__name__})" if len(text) <= 40 else f"a {type(value).__name__}"

@@ -1,8 +1,10 @@
 """A process for each engine, so that a crash, a hang or a leak costs the engine's own row and nothing else.
 
+An engine of one's own is imported and constructed in its process, with the working directory on Python's path, and nowhere else.
 A segmentation fault ends the engine's process, not the run; an endless loop ends at a limit of processor time, which other load on the
 machine does not use up; a leak ends at a limit of memory; output of an engine is dropped. A process that ended is replaced for the next
-piece of work. One engine runs at a time, so that timings are not disturbed.
+piece of work; each leads a process group, with which the engine's own children end. One engine runs at a time, so that timings are not
+disturbed.
 """
 
 import ctypes
@@ -14,7 +16,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as OutOfTime
 from concurrent.futures import wait
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from types import TracebackType
@@ -22,6 +24,11 @@ from typing import Any, Self, TypeVar, TypeVarTuple
 
 from pebble import ProcessExpired, ProcessPool
 
+from comparisons.engines.adapter_code import adapter_code
+from comparisons.engines.base import EngineBroken
+from comparisons.engines.exceptions import described
+from comparisons.engines.registry import constructed
+from comparisons.engines.stand_in import StandIn
 from comparisons.judging.verdicts import Verdict
 from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
@@ -34,6 +41,10 @@ Result = TypeVar("Result")
 
 PROCESSES = Path("/proc")
 POLL, GRACE = 0.5, 2.0  # s, between checks of a process, and for the pool to report its end
+PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096  # bytes
+GIB = 2**30  # bytes
+NEAR_LIMIT = 0.5
+"""Share of the memory limit above which a crash mentions it."""
 WALL_TIME_FACTOR = 10.0
 """Wall time allowed over processor time allowed: an engine that sleeps forever uses no processor time."""
 
@@ -100,7 +111,7 @@ class EngineProcesses:
             starts: The scene from each of its start phases.
             on_simulations: Called while the engine works, twice a second.
         """
-        if entry.engine is None:
+        if entry.absence:
             return run_engine(entry, scene, dt, starts)
         try:
             return self.call(entry, _run_engine, scene, dt, starts, while_waiting=lambda: on_simulations(*self._counts[entry.label]))
@@ -135,6 +146,7 @@ class EngineProcesses:
         task = self._pools[entry.label].schedule(
             _call, args=[work, given, self._resources.processor_time], timeout=WALL_TIME_FACTOR * self._resources.processor_time
         )
+        largest = 0
         try:
             while not wait([task], timeout=POLL).done:
                 if self._closed:
@@ -142,13 +154,36 @@ class EngineProcesses:
                 if self._has_exited(entry.label) and not wait([task], timeout=GRACE).done:
                     self.renew(entry)
                     raise Failed("crashed", "its process exited with code 0 before the work was done")
+                largest = max(largest, self._memory(entry.label))
                 while_waiting()
             result: Result = task.result()
         except OutOfTime:
+            self._end_group(entry.label)
             raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * self._resources.processor_time:g} s of wall time") from None
         except ProcessExpired as end:
-            raise Failed(*self._verdict(end.exitcode)) from None
+            self._end_group(entry.label)
+            verdict, reason = self._verdict(end.exitcode)
+            if largest > NEAR_LIMIT * self._resources.memory:
+                reason += f"; it used {largest / GIB:.1f} GiB of memory, and its limit is {self._resources.memory / GIB:g} GiB"
+            raise Failed(verdict, reason) from None
+        except (Failed, Closed):
+            raise
+        except Exception as error:  # what the adapter returns cannot be sent to this process
+            raise Failed("crashed", f"its result cannot be returned: {described(error)}") from None
         return result
+
+    def _memory(self, label: str) -> int:
+        """The memory that an engine's process has reserved [bytes]; 0 where the system does not say."""
+        try:
+            return int((PROCESSES / str(self._processes[label].value) / "statm").read_text().split()[0]) * PAGE
+        except OSError:
+            return 0
+
+    def _end_group(self, label: str) -> None:
+        """End the processes that an engine started and left."""
+        if self._processes[label].value:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._processes[label].value, signal.SIGKILL)
 
     def _has_exited(self, label: str) -> bool:
         """Whether the process that does the work has ended; the pool does not report one that exits with code 0."""
@@ -165,6 +200,7 @@ class EngineProcesses:
         pool = self._pools.pop(entry.label)
         pool.stop()  # type: ignore[no-untyped-call]  # pebble's has no types
         pool.join()
+        self._end_group(entry.label)
 
     def _verdict(self, exit_code: int | None) -> tuple[Verdict, str]:
         """The verdict and the reason for an engine whose process ended."""
@@ -195,10 +231,8 @@ class EngineProcesses:
     def abandon(self) -> None:
         """End the engines' processes at once, and with them any call that waits for them in another thread."""
         self._closed = True
-        for process in list(self._processes.values()):
-            if process.value:
-                with suppress(ProcessLookupError):
-                    os.kill(process.value, signal.SIGKILL)
+        for label in list(self._processes):
+            self._end_group(label)
 
 
 _busy: list["ctypes.c_long"] = []
@@ -226,6 +260,8 @@ def _start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", co
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, even if the parent handles its own
     faulthandler.disable()
+    if hasattr(os, "setpgid"):
+        os.setpgid(0, 0)
     null = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
     for stream in (1, 2):
         os.dup2(null.fileno(), stream)
@@ -256,8 +292,27 @@ def _call(work: Callable[..., Any], given: Sequence[Any], processor_time: float)
         until = int(used.ru_utime + used.ru_stime + processor_time) + 1
         resource.setrlimit(resource.RLIMIT_CPU, (until, resource.RLIM_INFINITY))
     try:
+        if not _entry[0].absence:
+            _entry[0] = _constructed(_entry[0])
         return work(_entry[0], *given)
-    except Exception as error:  # an engine is somebody else's code
-        raise Failed("crashed", f"{type(error).__name__}: {error}") from None
-    except BaseException as error:  # sys.exit() or an interrupt that an engine raises is not the user's
-        raise Failed("crashed", type(error).__name__) from None
+    except BaseException as error:  # an engine is somebody else's code; sys.exit() or an interrupt that it raises is not the user's
+        raise Failed("crashed", described(error)) from None
+
+
+def _constructed(entry: EngineEntry) -> EngineEntry:
+    """An entry with its engine in place of a stand-in; the working directory comes last on Python's path, after all that is installed.
+
+    Raises:
+        EngineBroken: The engine cannot be imported or constructed, or its code has changed since it was described.
+    """
+    if entry.engine is not None and not isinstance(entry.engine, StandIn):
+        return entry
+    if (here := os.getcwd()) not in sys.path:
+        sys.path.append(here)
+    if entry.engine is None:
+        return entry
+    known, before = entry.engine.traits, frozenset(sys.modules)
+    engine = constructed(known.source, entry.engine.options)
+    if adapter_code(type(engine), frozenset(sys.modules) - before) != known.code:
+        raise EngineBroken(f"the code of {known.source} has changed since the command began; give the command again")
+    return replace(entry, engine=engine)

@@ -10,9 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Diverged, Engine, KnownLimitation
+from comparisons.engines.exceptions import described, printable
+from comparisons.engines.registry import engine as engine_named
 from comparisons.judging.verdicts import Verdict
-from comparisons.running.inputs import SceneLike, as_scene, installed_engine, verify_time_step
-from comparisons.running.verification import BATCH_ULPS, verified_limitations, verified_record, verify_build, verify_start
+from comparisons.running.inputs import SceneLike, as_scene, verify_time_step
+from comparisons.running.verification import (
+    BATCH_ULPS,
+    verified_limitations,
+    verified_record,
+    verified_refusal,
+    verified_settings,
+    verify_build,
+    verify_start,
+)
 from scenarios import DropspinError, Scenario, Trajectory
 
 Array = NDArray[np.float64]
@@ -62,9 +72,9 @@ def simulate(scene: SceneLike, engine: Engine | str, dt: float, every: int = 1) 
         Diverged: The simulation broke down.
     """
     scene = as_scene(scene)
-    chosen = installed_engine(engine)
+    chosen = engine if isinstance(engine, Engine) else engine_named(engine)
     verify_time_step(scene, dt)
-    refusal = chosen.declines(scene)
+    refusal = verified_refusal(chosen.declines(scene))
     if refusal is not None:
         raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
     recording = record(chosen, scene, dt, every)
@@ -93,7 +103,7 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
     with engine.prepare(scene, dt) as simulation:
         if verify:
             verify_build(engine, scene, simulation, dt)
-        settings = dict(simulation.settings)
+        settings = verified_settings(simulation.settings)
         start = time.perf_counter()
         states = verified_record(simulation.record(steps, every), 1 + steps // every)
         seconds = time.perf_counter() - start
@@ -133,7 +143,7 @@ def record_batch(engine: Engine, starts: Sequence[Scenario], dt: float) -> list[
 def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0) -> Recording | Breakdown:
     """Drive an engine through a scene; a refusal, a divergence or an exception is returned, not raised."""
     try:
-        refusal = engine.declines(scene)
+        refusal = verified_refusal(engine.declines(scene))
         if refusal is not None:
             return Breakdown("declined", refusal)
         return record(engine, scene, dt, every, extra_steps=extra_steps)
@@ -144,8 +154,8 @@ def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, ex
 def classify(error: Exception) -> Breakdown:
     """The verdict for what an adapter raised: an engine is somebody else's code, so any exception costs its own row only."""
     if isinstance(error, Diverged):
-        return Breakdown("diverged", str(error))
-    return Breakdown("crashed", f"{type(error).__name__}: {error}")
+        return Breakdown("diverged", printable(str(error)))
+    return Breakdown("crashed", described(error))
 
 
 def divergence(motion: Trajectory) -> Breakdown | None:

@@ -6,12 +6,14 @@ from itertools import product
 from typing import Any, NamedTuple
 
 from comparisons.engines.base import Engine
+from comparisons.engines.stand_in import code_of
 from comparisons.judging.verdicts import verify_expectations
 from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
-from comparisons.results.provenance import adapter_code, provenance
+from comparisons.results.provenance import provenance
 from comparisons.results.results import Results, joined
-from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, engine_entry, ignore, several, verify_time_step
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.progress import OnProgress, Progress
 from comparisons.running.scene_run import run_scene
@@ -36,7 +38,8 @@ def run(
     Args:
         scenes: One scene or several, with different names: each a scene, a catalogue name, the path of a file, or a mapping with the same
             keys.
-        engines: One engine or several: engines, or names with options. One that is not installed is `missing` in the results.
+        engines: One engine or several: engines, or names with options. One that is not installed is `missing` in the
+            results, and one that cannot be imported or constructed `broken`.
         dt: One time step or several [s]; three or more that span a factor of four give orders and asymptotic errors.
         on_progress: Called with scene, engine, time step and the simulations done: before and while an engine works, twice a second, and
             with `finished` after each of the len(scenes) * len(engines) * len(dt) pieces of work.
@@ -124,7 +127,7 @@ def _stamp(prepared: PreparedRun, resources: ResourceLimits) -> dict[str, Any]:
         "dts": list(prepared.dts),
         "time_limit": resources.processor_time,
     }
-    adapters = {entry.label: adapter_code(entry.engine) for entry in prepared.entries if entry.engine is not None}
+    adapters = {entry.label: code_of(entry.engine) for entry in prepared.entries if entry.engine is not None}
     return provenance(asked) | {"names": prepared.names, "adapters": adapters}
 
 

@@ -15,7 +15,8 @@ from comparisons.judging.convergence import (
     study_convergence,
 )
 from comparisons.measuring.metrics import METRICS
-from comparisons.running.inputs import EngineEntry, engine_entry
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import EngineEntry
 from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
 from comparisons.running.processes import EngineProcesses
 from comparisons.running.progress import OnProgress, Progress, reporter

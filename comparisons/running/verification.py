@@ -1,15 +1,19 @@
-"""Verification of an adapter's answers: what was built equals the scene, records and limitations are well formed."""
+"""Verification of an adapter's answers: what was built equals the scene; records, settings, limitations and claims are well formed."""
 
-from collections.abc import Iterable
+import json
+import math
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine, KnownLimitation, Simulation
+from comparisons.engines.exceptions import LONGEST, described, printable
 from scenarios import Scenario
 from scenarios.rotations import length
 from scenarios.state import ORIENTATION, PARTS, SPIN
+from scenarios.validation import shown
 
 ULPS = 8
 BATCH_ULPS = 64
@@ -18,6 +22,8 @@ SPIN_ULPS = 64
 """Of an angular velocity that was rotated to the body's axes and back, by a quaternion whose length is rounded: measured up to 23."""
 UNIT_TOLERANCE = 1e-5
 """How far a quaternion's length may be from 1; single precision drifts by 1e-7."""
+
+LONGEST_SETTINGS = 100_000  # bytes, as JSON
 
 
 class BuildMismatch(Exception):
@@ -78,13 +84,80 @@ def verified_limitations(limitations: Any) -> tuple[KnownLimitation, ...]:
     Raises:
         BuildMismatch: They are not a sequence of sentences and `KnownLimitation`s.
     """
-    allowed = "must be a sequence of sentences, or of dropspin.KnownLimitation"
+    allowed = "must be a sequence of sentences, or of dropspin.KnownLimitation with a sentence and errors by metric"
     if isinstance(limitations, str) or not isinstance(limitations, Iterable):
-        raise BuildMismatch(f"known_limitations is {limitations!r}; it {allowed}")
-    found = tuple(KnownLimitation(one) if isinstance(one, str) else one for one in limitations)
-    if not all(isinstance(one, KnownLimitation) for one in found):
-        raise BuildMismatch(f"known_limitations is {limitations!r}; it {allowed}")
+        raise BuildMismatch(f"known_limitations is {shown(limitations)}; it {allowed}")
+    found = []
+    for given in limitations:
+        one = KnownLimitation(given) if isinstance(given, str) else given
+        if not isinstance(one, KnownLimitation) or not isinstance(one.message, str) or not isinstance(one.explained_errors, Mapping):
+            raise BuildMismatch(f"known_limitations has {shown(given)}; it {allowed}")
+        errors = {str(name): _verified_number(f"known_limitations: {name}", error) for name, error in one.explained_errors.items()}
+        found.append(KnownLimitation(_verified_text("known_limitations", one.message), errors))
+    return tuple(found)
+
+
+def verified_settings(settings: Any) -> dict[str, Any]:
+    """The settings that a simulation reports, as JSON stores them.
+
+    Raises:
+        BuildMismatch: They are not a mapping that JSON can hold, or too long.
+    """
+    try:
+        text = json.dumps(dict(settings))
+        if len(text.encode()) > LONGEST_SETTINGS:
+            raise ValueError(f"they are longer than {LONGEST_SETTINGS} bytes")
+        found: dict[str, Any] = json.loads(text)
+        json.dumps(found, ensure_ascii=False).encode()  # lone surrogates cannot be stored
+    except (TypeError, ValueError, RecursionError) as error:
+        raise BuildMismatch(f"settings cannot be stored as JSON: {described(error)}") from None
     return found
+
+
+def verified_refusal(answer: Any) -> str | None:
+    """What `declines` returns: the reason, or None.
+
+    Raises:
+        BuildMismatch: It is neither.
+    """
+    return None if answer is None else _verified_text("the answer of declines()", answer)
+
+
+def verified_claims(engine: Engine, scene: Scenario) -> tuple[str | None, float | None, type]:
+    """The discretisation, the order and the precision that an engine states for a scene.
+
+    Raises:
+        BuildMismatch: One of them is not of the type that the protocol has.
+    """
+    name, order, precision = engine.discretisation(scene), engine.order_in(scene), engine.precision
+    if precision not in (np.float32, np.float64):
+        raise BuildMismatch(f"precision is {shown(precision)}; it must be numpy.float64 or numpy.float32")
+    if order is not None and not _verified_number("order", order) > 0.0:
+        raise BuildMismatch(f"order is {shown(order)}; it must be None (no claim), a number above 0, or inf (exact)")
+    return None if name is None else _verified_text("discretisation()", name), None if order is None else float(order), precision
+
+
+def verified_predictions(predicted: Mapping[str, Any]) -> dict[str, float]:
+    """The errors by metric that an engine predicts; metrics without a prediction are left out.
+
+    Raises:
+        BuildMismatch: One is not a number.
+    """
+    return {name: _verified_number(f"the predicted error of {name}", value) for name, value in predicted.items() if value is not None}
+
+
+def _verified_text(what: str, text: Any) -> str:
+    if not isinstance(text, str) or not text.strip():
+        raise BuildMismatch(f"{what} is {shown(text)}; it must be a sentence")
+    if printable(text) != text:
+        raise BuildMismatch(f"{what} is {printable(shown(text))}; it must be UTF-8 text of at most {LONGEST} characters")
+    return str(text)
+
+
+def _verified_number(what: str, number: Any) -> float:
+    if isinstance(number, bool) or not isinstance(number, int | float | np.floating) or math.isnan(number):
+        raise BuildMismatch(f"{what} is {shown(number)}; it must be a number")
+    return float(number)
 
 
 def _verify_equal(engine: Engine, what: str, found: NDArray[np.float64], expected: NDArray[np.float64], ulps: int = ULPS) -> None:

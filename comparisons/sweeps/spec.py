@@ -7,8 +7,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from comparisons.engines.registry import engine
 from comparisons.measuring.metrics import METRICS
+from comparisons.running.entries import present_entry
 from comparisons.running.inputs import verify_time_step
 from comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
 from comparisons.sweeps.fields import NoSuchField, verify_field, with_fields
@@ -108,7 +108,7 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
             raise DropspinError(f"{where}: metrics: {metric!r} is measured in every sweep; leave it out.")
     sweep = Sweep(
         scenes=tuple(_scene(where, name, folder) for name in written.scenes),
-        engines=tuple(engine(name) for name in written.engines),
+        engines=tuple(present_entry(name).adapter for name in written.engines),
         dts=written.dts,
         seeds=range(written.seeds) if isinstance(written.seeds, int) else written.seeds,
         axes=(*grid, *random),

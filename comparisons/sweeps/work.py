@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 
 from comparisons.engines.document import Document
+from comparisons.engines.stand_in import code_of
 from comparisons.results.provenance import code, provenance, versions
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
@@ -53,8 +54,9 @@ class Work:
 
     @classmethod
     def of(cls, sweep: Sweep, resources: ResourceLimits) -> "Work":
-        """With the versions that are installed on this machine."""
-        return cls(sweep, resources, installed_versions())
+        """With the versions that are installed on this machine, and hashes of the adapters' code."""
+        adapters = {f"the adapter of {engine.label}": code_of(engine) for engine in sweep.engines if not isinstance(engine, Document)}
+        return cls(sweep, resources, installed_versions() | adapters)
 
     @cached_property
     def identity(self) -> str:
@@ -158,7 +160,9 @@ def installed_versions() -> dict[str, str | None]:
 
 
 def _run_in_process(entry: EngineEntry, sweep: Sweep, first: int, last: int) -> Outcomes:
-    return run_jobs(sweep, first, last)
+    """In the engine's process, where it is in place of its stand-in."""
+    engines = tuple(entry.engine if one.label == entry.label and entry.engine is not None else one for one in sweep.engines)
+    return run_jobs(replace(sweep, engines=engines), first, last)
 
 
 def _as_table(sweep: Sweep, groups: list[Jobs], found: Outcomes) -> pa.Table:

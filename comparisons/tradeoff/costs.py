@@ -41,9 +41,8 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
 
 def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
     """Wall time of some native steps [s]; NaN if the state after them is not finite."""
-    assert entry.engine is not None
     try:
-        taken, state = time_steps(entry.engine, scene, dt, steps)
+        taken, state = time_steps(entry.adapter, scene, dt, steps)
     except Diverged:
         return math.nan
     return taken if np.isfinite(state).all() else math.nan
@@ -54,11 +53,10 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float]) -
 
     In free flight a step takes the same time at any dt; with a floor whole runs are timed, unless they are too long.
     """
-    assert entry.engine is not None
     if scene.floor is not None:
-        return [_timed_batch(entry.engine, scene, dt, scene.steps(dt)) / (scene.steps(dt) * dt) for dt in dts]
+        return [_timed_batch(entry.adapter, scene, dt, scene.steps(dt)) / (scene.steps(dt) * dt) for dt in dts]
     steps = MOST_BATCH_STEPS // BATCH
-    taken = _timed_batch(entry.engine, scene, dts[-1], steps)
+    taken = _timed_batch(entry.adapter, scene, dts[-1], steps)
     return [taken / (steps * dt) for dt in dts]
 
 

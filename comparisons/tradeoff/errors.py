@@ -18,6 +18,7 @@ from comparisons.running.inputs import MOST_STEPS, EngineEntry
 from comparisons.running.processes import EngineProcesses, Failed
 from comparisons.running.recording import record
 from comparisons.running.start_phases import StartPhase, start_phases
+from comparisons.running.verification import verified_refusal
 from comparisons.tradeoff.ladder import Ending, Ladder
 from scenarios import Scenario, truth_for
 
@@ -63,7 +64,10 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
         budget: Processor time of all steps together [s]; the step at which it is exceeded is the last.
         processes: The engine's process.
     """
-    refusal = entry.missing if entry.engine is None else entry.engine.declines(scene)
+    try:
+        refusal = entry.reason if entry.absence else processes.call(entry, _refusal, scene)
+    except Failed as failure:
+        refusal = failure.reason
     if refusal:
         return Ladder(entry.label, (), "not_run", refusal, refusal)
     interval = output_interval(scene)
@@ -92,6 +96,11 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     return Ladder(entry.label, steps, ended, reason, _left_out(tried, metrics[1], reason))
 
 
+def _refusal(entry: EngineEntry, scene: Scenario) -> str | None:
+    """In the engine's process: why it declines a scene."""
+    return verified_refusal(entry.adapter.declines(scene))
+
+
 def _stalled(errors: Sequence[float]) -> int:
     """Over how many of the last steps the errors have stopped falling; 0 if they still fall, or if there are too few to say."""
     patience = PATIENCE if errors and errors[-1] < SMALL else PATIENCE_WHILE_LARGE
@@ -115,7 +124,6 @@ def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: s
 
 def _error(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
     """Absolute values of metrics at a time step, NaN where one is undefined, and the processor time that it took [s]."""
-    assert entry.engine is not None
     start = processor_time()
     truth = truth_for(scene)
     in_flight = scene.floor is None
@@ -123,7 +131,7 @@ def _error(entry: EngineEntry, scene: Scenario, dt: float, division: int, metric
     cases = []
     for phase in phases:
         try:
-            motion = record(entry.engine, phase.scene, dt, division if in_flight else 1).motion
+            motion = record(entry.adapter, phase.scene, dt, division if in_flight else 1).motion
         except Diverged:
             return [math.nan] * len(metrics), processor_time() - start
         cases.append(Comparison.with_truth(phase.scene, motion, phase.truth))

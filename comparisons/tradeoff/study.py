@@ -12,7 +12,8 @@ import numpy as np
 
 from comparisons.engines.base import Engine
 from comparisons.measuring.metrics import leading_metric, metrics_for
-from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, engine_entry, ignore, several
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.tradeoff.costs import cost, costs_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps

@@ -31,7 +31,6 @@ def calibrate_command(
     MuJoCo's contact is a damper over one time step or, with -e mujoco[spring_steps=20], a spring over 20.
     """
     from comparisons.calibration import calibrate
-    from comparisons.engines.registry import engine
     from reports.terminal.progress import status
     from reports.terminal.rows import print_rows
     from reports.views import calibrate as view
@@ -39,13 +38,12 @@ def calibrate_command(
 
     if language is not None and json_output:
         raise click.UsageError("--as prints one text and --json all of them; give one of the two.")
-    chosen = engine(engine_name)
-    with status(f"measuring {chosen.label}"):
-        found = calibrate(chosen, restitution, dt, view.friction(friction), shape)
+    with status(f"measuring {engine_name}"):
+        found = calibrate(engine_name, restitution, dt, view.friction(friction), shape)
     stop_if_interrupted()
     if language is not None:
         if language not in found.programs:
-            raise UnknownName(f"{chosen.label}'s language", language, found.programs)
+            raise UnknownName(f"{found.engine}'s language", language, found.programs)
         click.echo(found.programs[language], nl=False)
         return
     if json_output:

@@ -28,12 +28,12 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
     from rich.console import Console
 
     from comparisons.conformance.checks import CHECKS, conform
-    from comparisons.engines.registry import engine
+    from comparisons.running.entries import present_entry
     from comparisons.running.processes import ResourceLimits
     from reports.terminal.rows import print_row, print_sentences
     from reports.views import conform as view
 
-    chosen, console = engine(engine_name), Console()
+    chosen, console = present_entry(engine_name).adapter, Console()
     found: list[CheckResult] = []
 
     def show(result: "CheckResult") -> None:

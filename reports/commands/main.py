@@ -75,9 +75,9 @@ def _run() -> int:
         if not isinstance(error, DropspinError):
             raise
         click.echo(f"dropspin: {error}", err=True)
-        from comparisons.engines.base import EngineMissing
+        from comparisons.engines.base import EngineBroken, EngineMissing
 
-        return 3 if isinstance(error, EngineMissing) else 2
+        return 3 if isinstance(error, EngineBroken | EngineMissing) else 2
 
 
 class _LazyGroup(click.Group):

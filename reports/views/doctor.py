@@ -3,10 +3,9 @@
 import sys
 from collections.abc import Sequence
 
-from comparisons.engines.base import EngineMissing
-from comparisons.engines.registry import engine
 from comparisons.results.provenance import processor, versions
-from comparisons.running.inputs import EngineEntry, engine_entry
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import EngineEntry
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.recording import simulate
 from scenarios import DropspinError, load
@@ -26,14 +25,12 @@ def rows(engines: Sequence[str]) -> Rows:
 def _health(name: str, processes: EngineProcesses) -> str:
     """Whether an engine steps, tried in a process of its own."""
     try:
-        return processes.call(engine_entry(engine(name)), _fall)
-    except EngineMissing as error:
-        return f"missing: {error}"
+        entry = engine_entry(name)
+        return f"{entry.absence}: {entry.reason}" if entry.absence else processes.call(entry, _fall)
     except (DropspinError, Failed) as error:
         return f"broken: {error}"
 
 
 def _fall(entry: EngineEntry) -> str:
-    assert entry.engine is not None
-    motion = simulate(load("fall-spin"), entry.engine, 4e-3)
+    motion = simulate(load("fall-spin"), entry.adapter, 4e-3)
     return f"works: box at {motion.position[-1, 1]:.4f} m after {motion.t[-1]:g} s"

@@ -19,19 +19,22 @@ def scene_rows() -> Rows:
 
 def engine_rows() -> Rows:
     """The engines that can be named, with their options."""
-    from comparisons.engines.registry import engine, engine_names
+    from comparisons.engines.registry import engine_names
+    from comparisons.engines.stand_in import StandIn
+    from comparisons.running.entries import present_entry
 
     rows = []
     for name in engine_names():
         try:
-            found = engine(name)
+            found = present_entry(name).adapter
         except DropspinError as error:
             rows.append({"engine": name, "options": "", "summary": str(error)})
             continue
         choices = [f"{key} = {' | '.join(values)}" for key, values in found.choices.items()]
         numbers = [f"{key} = {allowed.least:g} … {allowed.most:g}" for key, allowed in found.numbers.items()]
         options = "; ".join(choices + numbers)
-        rows.append({"engine": name, "options": options, "summary": (type(found).__doc__ or "").strip().splitlines()[0]})
+        summary = found.traits.summary if isinstance(found, StandIn) else (type(found).__doc__ or "").strip().partition("\n")[0]
+        rows.append({"engine": name, "options": options, "summary": summary})
     return rows
 
 

@@ -1,11 +1,16 @@
 """`dropspin show` in words: a scene, or what an engine builds of it."""
 
-from comparisons.engines.registry import engine
+from typing import TYPE_CHECKING
+
+from comparisons.engines.base import EngineBroken
 from comparisons.judging.verdicts import verify_expectations
 from reports.views.numbers import bound
 from reports.views.scene import left_out, modelled
 from scenarios import Scenario, truth_for
 from scenarios.model import Expectation
+
+if TYPE_CHECKING:
+    from comparisons.running.inputs import EngineEntry
 
 Rows = list[dict[str, str]]
 
@@ -47,28 +52,44 @@ def _allowed(expectation: Expectation) -> str:
 
 
 def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
-    """What an engine builds of a scene, read back, with its settings."""
+    """What an engine builds of a scene, read back, with its settings.
+
+    Raises:
+        DropspinError: The engine cannot run, or breaks down while it builds the scene.
+    """
+    from comparisons.running.entries import present_entry
     from comparisons.running.inputs import verify_time_step
-    from comparisons.running.verification import verify_build
+    from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 
     verify_time_step(scene, dt)
-    chosen = engine(engine_name)
-    refusal = chosen.declines(scene)
+    entry = present_entry(engine_name)
+    with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
+        try:
+            return processes.call(entry, _built, scene, dt)
+        except Failed as failure:
+            raise EngineBroken(f"{entry.label} cannot build {scene.name}: {failure.reason}.") from None
+
+
+def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
+    """In the engine's process: what it builds."""
+    from comparisons.running.verification import verified_refusal, verified_settings, verify_build
+
+    engine = entry.adapter
+    refusal = verified_refusal(engine.declines(scene))
     if refusal is not None:
-        return [{"what": chosen.label, "is": f"declines {scene.name}: {refusal}"}]
-    with chosen.prepare(scene, dt) as simulation:
-        verify_build(chosen, scene, simulation, dt)
-        built = simulation.as_built()
+        return [{"what": engine.label, "is": f"declines {scene.name}: {refusal}"}]
+    with engine.prepare(scene, dt) as simulation:
+        verify_build(engine, scene, simulation, dt)
+        built, settings = simulation.as_built(), verified_settings(simulation.settings)
         rows = [
-            {"what": "engine", "is": chosen.label, "why": ""},
+            {"what": "engine", "is": engine.label, "why": ""},
             {"what": "velocity lag", "is": f"{simulation.velocity_lag:g} s", "why": "time by which velocity lags position"},
         ]
-        if built is not None:
-            rows += [
-                {"what": "mass", "is": f"{built.mass!r} kg", "why": "read back"},
-                {"what": "inertia", "is": f"{built.inertia.tolist()} kg m²", "why": "read back"},
-                {"what": "gravity", "is": f"{built.gravity.tolist()} m/s²", "why": "read back"},
-            ]
-        reasons = {} if simulation.settings.get("profile") == "default" else chosen.reasons
-        settings = simulation.settings.items()
-        return rows + [{"what": key, "is": str(value), "why": reasons.get(key, "")} for key, value in settings]
+    if built is not None:
+        rows += [
+            {"what": "mass", "is": f"{built.mass!r} kg", "why": "read back"},
+            {"what": "inertia", "is": f"{built.inertia.tolist()} kg m²", "why": "read back"},
+            {"what": "gravity", "is": f"{built.gravity.tolist()} m/s²", "why": "read back"},
+        ]
+    reasons = {} if settings.get("profile") == "default" else engine.reasons
+    return rows + [{"what": key, "is": str(value), "why": str(reasons.get(key, ""))} for key, value in settings.items()]

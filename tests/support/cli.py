@@ -39,7 +39,6 @@ def dropspin(*arguments: object, cwd: Path | str, **environment: str) -> Done:
         stack.enter_context(contextlib.chdir(cwd))
         stack.enter_context(mock.patch.dict(os.environ, {"COLUMNS": "80", **environment}))
         stack.enter_context(mock.patch.object(sys, "argv", ["dropspin", *map(str, arguments)]))
-        stack.enter_context(mock.patch.object(sys, "path", [*sys.path, os.path.realpath(cwd)]))
         stack.enter_context(_unchanged_handlers())
         stack.enter_context(_without_modules_of(Path(cwd)))
         stack.enter_context(contextlib.redirect_stdout(out))

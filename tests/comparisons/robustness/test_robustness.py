@@ -20,7 +20,7 @@ from comparisons.robustness.runner import Runner
 from comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
 from comparisons.robustness.study import RobustnessStudy, find_limits
 from comparisons.robustness.transformations import in_nominal_units
-from comparisons.running.inputs import engine_entry
+from comparisons.running.entries import engine_entry
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from scenarios import DropspinError, Trajectory, load, truth_for
 

@@ -8,7 +8,7 @@ from support import engines as made
 import dropspin as ds
 from comparisons.running import processes
 from comparisons.running.engine_run import TIMING_REPEATS, run_engine
-from comparisons.running.inputs import engine_entry
+from comparisons.running.entries import engine_entry
 from comparisons.running.start_phases import start_phases
 
 DT = 0.01

@@ -48,7 +48,7 @@ def test_slow_scenes_pass_too(name):
     """One slow scene at a time; the one of a thousand seconds at time steps that games use."""
     dts = [1 / 60, 1 / 120, 1 / 240] if name == "rest-long" else [4e-3, 2e-3, 1e-3]
     found = ds.run(name, ["document", "mujoco", "pybullet"], dts)
-    assert set(found.table["verdict"]) <= {"passed", "measured"}, failures_of(found)
+    assert set(found.table["verdict"]) <= {"passed", "measured", "known"}, failures_of(found)
     assert (found.table["verdict"] == "passed").sum() > 30
 
 

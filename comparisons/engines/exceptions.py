@@ -1,0 +1,19 @@
+"""An exception of an adapter as text: its own text may be anything, or raise."""
+
+LONGEST = 1000
+
+
+def described(error: BaseException) -> str:
+    """The type and the text of an exception in one line that any stream and file can take."""
+    try:
+        text = " ".join(str(error).split())
+    except Exception as another:
+        text = f"its text cannot be made, {type(another).__name__}"
+    if isinstance(error, MemoryError):
+        text = " ".join(filter(None, [text, "(the engine's process may not use more memory)"]))
+    return printable(f"{type(error).__name__}: {text}" if text else type(error).__name__)
+
+
+def printable(text: str) -> str:
+    """A text without lone surrogates, which no file takes, and not longer than 1,000 characters."""
+    return text[:LONGEST].encode(errors="backslashreplace").decode()

@@ -1,0 +1,107 @@
+"""Stand-ins: what is known of an engine of one's own outside its process, where none of its code is imported.
+
+The adapter's module is imported, and the engine constructed, in the engine's own process only. There `traits` describes it; elsewhere a
+stand-in has its name, its options and their values, and can be configured, but not run.
+"""
+
+from typing import Annotated, Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from comparisons.engines.adapter_code import adapter_code
+from comparisons.engines.base import Engine, EngineBroken, NumericOption
+from scenarios import DropspinError
+from scenarios.validation import validated
+
+LONGEST_SUMMARY = 500
+Text = Annotated[str, Field(max_length=100)]
+
+
+class Traits(BaseModel):
+    """What an engine's class states, as plain data.
+
+    Attributes:
+        source: What the engine is asked for by: module:Class, or a registered name.
+        name: The name of its label.
+        summary: The first line of its docstring.
+        choices: Each option's values, the default first.
+        numbers: Each numeric option's default and range.
+        accuracy: The values of options that set the accuracy.
+        options: The options that were given and differ from the defaults.
+        code: A hash of every module that the adapter loads, outside the standard library and installed packages.
+    """
+
+    model_config = ConfigDict(strict=True, frozen=True)
+
+    source: str
+    name: Text
+    summary: Annotated[str, Field(max_length=LONGEST_SUMMARY)]
+    choices: dict[Text, tuple[Text, ...]]
+    numbers: dict[Text, NumericOption]
+    accuracy: dict[Text, tuple[Text | float, ...]]
+    options: dict[Text, Text]
+    code: str | None
+
+
+class StandIn(Engine):
+    """An engine of one's own, outside its process."""
+
+    traits: ClassVar[Traits]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self.traits, dict(self.options))
+
+
+def traits(source: str, engine: Engine, loaded: frozenset[str]) -> Traits:
+    """Describe an engine; called in its process.
+
+    Args:
+        source: What it was asked for by, without options.
+        engine: The engine.
+        loaded: Names of the modules that its import loaded.
+
+    Raises:
+        EngineBroken: What it states of itself is not of the types that the protocol has.
+    """
+    kind = type(engine)
+    stated = {
+        "source": source,
+        "name": kind.name,
+        "summary": (kind.__doc__ or "").strip().partition("\n")[0][:LONGEST_SUMMARY],
+        "choices": _plain(kind.choices),
+        "numbers": _plain(kind.numbers),
+        "accuracy": _plain(kind.accuracy),
+        "options": _plain(engine.options),
+        "code": adapter_code(kind, loaded),
+    }
+    try:
+        found = validated(Traits, source, stated)
+    except DropspinError as error:
+        raise EngineBroken(f"{source} cannot be used: {error}") from None
+    label = stand_in(found).label
+    if engine.label != label:
+        raise EngineBroken(f"{source} cannot be used: its label is {engine.label!r:.100}; it must be {label!r}, of its name and options.")
+    return found
+
+
+def _plain(mapping: Any) -> Any:
+    """A mapping as a dict of tuples, which is what the class should state; anything else is left for validation to refuse."""
+    if not hasattr(mapping, "items"):
+        return mapping
+    return {key: tuple(value) if type(value) is list else value for key, value in mapping.items()}
+
+
+def code_of(engine: Engine) -> str | None:
+    """The hash of an engine's code; None for a class that is not in a file."""
+    return engine.traits.code if isinstance(engine, StandIn) else adapter_code(type(engine))
+
+
+def stand_in(known: Traits) -> StandIn:
+    """The stand-in of an engine."""
+    members = {"traits": known, "name": known.name, "choices": known.choices, "numbers": known.numbers, "accuracy": known.accuracy}
+    kind: type[StandIn] = type("StandIn", (StandIn,), members)
+    return kind(known.options)
+
+
+def _restored(known: Traits, options: dict[str, str]) -> StandIn:
+    return stand_in(known.model_copy(update={"options": options}))

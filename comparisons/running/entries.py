@@ -1,0 +1,81 @@
+"""From the names of engines to entries of a run: an engine of one's own is imported and constructed in a process of its own only."""
+
+import sys
+from typing import Literal
+
+from comparisons.engines.base import Engine, EngineBroken, EngineMissing
+from comparisons.engines.registry import engine as engine_named
+from comparisons.engines.registry import is_foreign, parsed
+from comparisons.engines.stand_in import Traits, stand_in, traits
+from comparisons.running.inputs import EngineEntry, described_value
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from scenarios import DropspinError
+
+CONSTRUCTION = ResourceLimits(processor_time=60.0)
+"""What the import and the construction of an engine may use."""
+Refusal = tuple[Literal["missing", "broken", "wrong"], str]
+
+
+def engine_entry(engine: Engine | str, resources: ResourceLimits = CONSTRUCTION) -> EngineEntry:
+    """An engine by its name, or an engine object, as an entry of a run.
+
+    Args:
+        engine: The engine or its name.
+        resources: What the import and the construction of an engine of one's own may use.
+
+    Raises:
+        DropspinError: There is no engine of that name, or it is neither an engine nor a name.
+    """
+    if isinstance(engine, Engine):
+        return EngineEntry(engine.label, engine)
+    if not isinstance(engine, str):
+        raise DropspinError(f"engine: got {described_value(engine)}; give a name such as 'mujoco', or an Engine.")
+    name = engine.strip()
+    try:
+        base, _ = parsed(name)
+        found = _stand_in(name, resources) if is_foreign(base) else engine_named(name)
+    except EngineMissing as error:
+        return EngineEntry(name, None, "missing", str(error))
+    except EngineBroken as error:
+        return EngineEntry(name, None, "broken", str(error))
+    return EngineEntry(found.label, found)
+
+
+def present_entry(engine: Engine | str) -> EngineEntry:
+    """An engine by its name, or an engine object, that can run.
+
+    Raises:
+        EngineMissing: A package that it needs is not installed.
+        EngineBroken: It cannot be imported or constructed.
+        DropspinError: There is no engine of that name, or it is neither an engine nor a name.
+    """
+    entry = engine_entry(engine)
+    if entry.engine is None:
+        raise (EngineMissing if entry.absence == "missing" else EngineBroken)(entry.reason)
+    return entry
+
+
+def _stand_in(name: str, resources: ResourceLimits) -> Engine:
+    """The stand-in of an engine of one's own, described in a process of its own."""
+    with EngineProcesses(resources) as processes:
+        try:
+            found = processes.call(EngineEntry(name, None), _describe, name)
+        except Failed as failure:
+            raise EngineBroken(f"{name} cannot be used: its import or construction failed: {failure.reason}.") from None
+    if isinstance(found, Traits):
+        return stand_in(found)
+    kind, text = found
+    raise {"missing": EngineMissing, "broken": EngineBroken, "wrong": DropspinError}[kind](text)
+
+
+def _describe(entry: EngineEntry, name: str) -> Traits | Refusal:
+    """In a process of its own: what an engine states of itself, or why it cannot take part."""
+    before = frozenset(sys.modules)
+    try:
+        return traits(parsed(name)[0], engine_named(name), frozenset(sys.modules) - before)
+    except EngineMissing as error:
+        return "missing", str(error)
+    except EngineBroken as error:
+        return "broken", str(error)
+    except DropspinError as error:
+        return "wrong", str(error)

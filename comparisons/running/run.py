@@ -12,7 +12,7 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
 from comparisons.results.provenance import provenance
 from comparisons.results.results import Results, joined
-from comparisons.running.entries import engine_entry
+from comparisons.running.entries import CONSTRUCTION, engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.progress import OnProgress, Progress
@@ -54,7 +54,7 @@ def run(
     Raises:
         DropspinError: The request cannot be run: an unknown engine, an impossible time step, equal names.
     """
-    prepared = prepare_run(scenes, engines, dt)
+    prepared = prepare_run(scenes, engines, dt, resources)
     entries, dts = prepared.entries, prepared.dts
     stamp = _stamp(prepared, resources)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if _is_the_same(part.provenance, stamp)}
@@ -84,16 +84,25 @@ class PreparedRun(NamedTuple):
 
 
 def prepare_run(
-    scenes: SceneLike | Iterable[SceneLike], engines: Engine | str | Iterable[Engine | str], dt: float | Iterable[float]
+    scenes: SceneLike | Iterable[SceneLike],
+    engines: Engine | str | Iterable[Engine | str],
+    dt: float | Iterable[float],
+    resources: ResourceLimits = CONSTRUCTION,
 ) -> PreparedRun:
     """Check a request of a run, and find its engines and exact solutions.
+
+    Args:
+        scenes: As for `run`.
+        engines: As for `run`.
+        dt: As for `run`.
+        resources: What the import and the construction of an engine of one's own may use.
 
     Raises:
         DropspinError: The request cannot be run.
     """
     chosen = [as_scene(one) for one in several("scenes", scenes)]
     asked = several("engines", engines)
-    entries = [engine_entry(one) for one in asked]
+    entries = [engine_entry(one, resources) for one in asked]
     dts = several("dt", dt)
     for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
         if not given:

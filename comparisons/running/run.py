@@ -57,7 +57,7 @@ def run(
     prepared = prepare_run(scenes, engines, dt, resources)
     entries, dts = prepared.entries, prepared.dts
     stamp = _stamp(prepared, resources)
-    earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if _is_the_same(part.provenance, stamp)}
+    earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if not what_changed(part.provenance, stamp)}
     report, keep = on_progress or ignore, keep or ignore
     parts = []
     with EngineProcesses(resources) as processes:
@@ -140,10 +140,14 @@ def _stamp(prepared: PreparedRun, resources: ResourceLimits) -> dict[str, Any]:
     return provenance(asked) | {"names": prepared.names, "adapters": adapters}
 
 
-def _is_the_same(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> bool:
-    """Whether two runs had the same engines, time steps, time limit, versions, code and machine."""
-    asked = all(earlier["asked"][what] == stamp["asked"][what] for what in ("engines", "dts", "time_limit"))
-    return asked and all(earlier[what] == stamp[what] for what in ("versions", "python", "cpu", "code", "adapters"))
+def what_changed(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> str:
+    """What differs between the provenance of two runs so that results of one do not belong to the other; empty if nothing does."""
+    adapters = earlier["adapters"] | stamp["adapters"]
+    codes = [f"the code of {label}" for label in adapters if earlier["adapters"].get(label) != stamp["adapters"].get(label)]
+    asked = [name for name in ("engines", "dts", "time_limit") if earlier["asked"][name] != stamp["asked"][name]]
+    words = {"engines": "the engines", "dts": "the time steps", "time_limit": "the time limit", "code": "dropspin", "cpu": "the processor"}
+    rest = [name for name in ("versions", "python", "cpu", "code") if earlier[name] != stamp[name]]
+    return " and ".join([*(words.get(name, name) for name in asked), *([] if asked else codes), *(words.get(name, name) for name in rest)])
 
 
 def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:

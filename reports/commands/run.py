@@ -109,7 +109,7 @@ def _run(
 ) -> "Results":
     """Run, show and write; an interrupted run keeps the scenes that were measured."""
     from comparisons.running.processes import ResourceLimits
-    from comparisons.running.run import DEFAULT_DTS, run
+    from comparisons.running.run import DEFAULT_DTS, run, what_changed
     from reports.run_folder import MeasuredScenes, fill, run_folder
     from reports.terminal.progress import progress_bar, status
 
@@ -118,6 +118,7 @@ def _run(
         with run_folder(output) as folder:
             if not resume:
                 measured.clear()
+            earlier = measured.parts()
             with progress_bar(len(scenes), len(chosen) * len(steps)) as show_progress:
 
                 def on_progress(progress: "Progress") -> None:
@@ -125,10 +126,10 @@ def _run(
                     show_progress(progress)
 
                 resources = ResourceLimits(processor_time=time_limit)
-                results = run(
-                    scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=measured.parts()
-                )
+                results = run(scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=earlier)
             stop_if_interrupted()
+            if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
+                click.echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)
             asked = {**results.provenance["asked"], **drawn}
             named = sorted({name.strip() for name in engines})
             results = replace(results, provenance={**results.provenance, "asked": asked, "named": named})

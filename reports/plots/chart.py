@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers
+from reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers, load_matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -168,6 +168,7 @@ def figure_of(charts: Iterable[Chart], title: str = "") -> "Figure":
 @contextmanager
 def panels(count: int, across: int, size: tuple[float, float]) -> "Iterator[tuple[Figure, list[Axes]]]":
     """A figure in the style of the report with `count` panels of this size [inches], at most `across` in a row."""
+    load_matplotlib()
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine

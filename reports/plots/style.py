@@ -1,6 +1,11 @@
 """The style of plots: colours that the page replaces, line widths that keep coinciding lines visible, axis labels with units."""
 
+import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import chdir
+from importlib import import_module
+from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -49,6 +54,20 @@ WIDEST_LABEL = 26
 LEAST_RATIO, MANY = 5.0, 50.0
 """Least ratio of the ends of a logarithmic axis, and the ratio above which only powers of ten are labelled."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def load_matplotlib() -> None:
+    """Import matplotlib without the settings of the working directory and of the user: a damaged file of them stops its import."""
+    if "matplotlib" not in sys.modules:
+        named = os.environ.get("MATPLOTLIBRC")
+        os.environ["MATPLOTLIBRC"] = os.devnull
+        try:
+            with chdir(Path(__file__).parent):
+                import_module("matplotlib")
+        finally:
+            del os.environ["MATPLOTLIBRC"]
+            if named is not None:
+                os.environ["MATPLOTLIBRC"] = named
 
 
 def ink() -> str:

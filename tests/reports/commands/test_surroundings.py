@@ -1,0 +1,145 @@
+"""Files of the working directory, and packages that are installed and broken, do not disturb a command."""
+
+import json
+
+import pytest
+from support.cli import dropspin, spawn
+
+STRAYS = ("bottleneck", "numexpr", "cloudpickle", "yaml", "colorama", "lxml", "click", "numpy", "matplotlib", "scenarios", "_pytest")
+BALL = """
+duration = 0.1
+[body]
+shape = "sphere"
+radius = 0.1
+mass = 1.0
+[start]
+velocity = [1.0, 0.0, 0.0]
+"""
+RUN = ("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "out")
+
+
+@pytest.fixture
+def strays(tmp_path):
+    """A working directory with modules that leave a mark when they are imported, and settings of matplotlib that cannot be read."""
+    for name in STRAYS:
+        (tmp_path / f"{name}.py").write_text(f"open('imported-{name}', 'w').close()\nraise RuntimeError('a stray was imported')")
+    (tmp_path / "matplotlibrc").write_bytes(b"axes.facecolor: red\n\xff\xfe\x00")
+    (tmp_path / "ball.toml").write_text(BALL)
+    return tmp_path
+
+
+@pytest.mark.parametrize("arguments", [("list", "engines"), ("show", "drop-ball"), ("doctor",), RUN], ids=lambda given: given[0])
+def test_strays_in_the_working_directory_are_not_imported(arguments, strays):
+    done = spawn(*arguments, cwd=strays)
+    assert done.returncode == 0, done.stderr
+    assert not list(strays.glob("imported-*"))
+
+
+def test_plots_ignore_settings_of_the_working_directory(strays):
+    (strays / "elsewhere").mkdir()
+    for name in ("", "elsewhere"):
+        (strays / name / "ball.toml").write_text(BALL)
+        assert spawn(*RUN, cwd=strays / name).returncode == 0
+        done = spawn("report", "out", "--plots", "svg", cwd=strays / name)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == ""
+    first, second = ((strays / name / "out" / "plots") for name in ("", "elsewhere"))
+    drawn = {file.name: file.read_bytes() for file in first.iterdir()}
+    assert drawn
+    assert drawn == {file.name: file.read_bytes() for file in second.iterdir()}
+
+
+@pytest.fixture
+def broken(tmp_path):
+    """A folder with a package pydrake that cannot be imported; to be put on Python's path."""
+    folder = tmp_path / "packages"
+    (folder / "pydrake").mkdir(parents=True)
+    text = "libGL.so.1: cannot open shared object file: No such file or directory"
+    (folder / "pydrake" / "__init__.py").write_text(f"raise ImportError({text!r})")
+    (tmp_path / "ball.toml").write_text(BALL)
+    return folder
+
+
+REASON = "drake is installed, but pydrake cannot be imported: ImportError: libGL.so.1: cannot open shared object file"
+CURE = "apt-get install libgl1"
+
+
+def test_broken_engine_is_a_row_of_doctor_and_of_the_list(broken, tmp_path):
+    done = spawn("doctor", "--json", cwd=tmp_path, PYTHONPATH=str(broken))
+    assert done.returncode == 0, done.stderr
+    rows = {row["what"]: row["found"] for row in json.loads(done.stdout)}
+    assert rows["engine drake"].startswith(f"broken: {REASON}")
+    assert CURE in rows["engine drake"]
+    assert rows["engine document"].startswith("works")
+    done = spawn("list", "engines", "--json", cwd=tmp_path, PYTHONPATH=str(broken))
+    assert done.returncode == 0, done.stderr
+    assert next(row["summary"] for row in json.loads(done.stdout) if row["engine"] == "drake").startswith(REASON)
+
+
+def test_broken_engine_costs_its_own_row(broken, tmp_path):
+    done = spawn(*RUN, "-e", "drake", "--json", cwd=tmp_path, PYTHONPATH=str(broken))
+    assert done.returncode == 3, done.stderr
+    rows = json.loads(done.stdout)
+    [row] = [row for row in rows if row["engine"] == "drake"]
+    assert row["verdict"] == "broken"
+    assert row["reason"].startswith(REASON)
+    assert {row["verdict"] for row in rows if row["engine"] == "document"} <= {"passed", "measured"}
+    assert spawn("run", "ball.toml", "-e", "drake", "-o", "alone", cwd=tmp_path, PYTHONPATH=str(broken)).returncode == 3
+    for command in (("show", "drop-ball", "-e", "drake"), ("conform", "drake")):
+        done = spawn(*command, cwd=tmp_path, PYTHONPATH=str(broken))
+        assert done.returncode == 3
+        assert done.stderr.startswith(f"dropspin: {REASON}")
+        assert len(done.stderr.splitlines()) == 1
+
+
+ADAPTER = """
+import helper_of_drifting
+from dropspin import Engine, Simulation
+
+class Drifting(Simulation):
+    settings = {"version": "1"}
+    def __init__(self, scene, dt):
+        self.now, self.dt = scene.initial_state.copy(), dt
+    def advance(self, steps):
+        self.now[:3] += steps * self.dt * self.now[7:10]
+    def state(self):
+        return self.now.copy()
+
+class Mine(Engine):
+    name = "mine"
+    def prepare(self, scene, dt):
+        return Drifting(scene, dt)
+"""
+SPEC = 'scenes = ["ball.toml"]\nengines = ["drifting:Mine"]\ndts = [0.01]\n[grid]\n"body.mass" = [1.0, 2.0, 3.0]\n'
+
+
+def test_sweep_is_not_resumed_with_another_adapter(tmp_path):
+    """Not even if only a module that it imports has changed."""
+    texts = {"drifting.py": ADAPTER, "helper_of_drifting.py": "x = 1", "ball.toml": BALL, "spec.toml": SPEC}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    assert dropspin("sweep", "spec.toml", "-o", "out", cwd=tmp_path).returncode == 0
+    assert dropspin("sweep", "spec.toml", "-o", "out", "--resume", cwd=tmp_path).returncode == 0
+    (tmp_path / "helper_of_drifting.py").write_text("x = 2")
+    done = dropspin("sweep", "spec.toml", "-o", "out", "--resume", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "holds a sweep that was run with the adapter of mine " in done.stderr
+
+
+def test_run_is_resumed_with_scenes_of_the_same_adapter_only(tmp_path):
+    """A changed one is measured again, which is said."""
+    texts = {"drifting.py": ADAPTER, "helper_of_drifting.py": "x = 1", "ball.toml": BALL}
+    texts["stopping.py"] = "import os, signal\nfrom drifting import Mine as Base\n\nclass Mine(Base):\n    name = 'stopping'\n"
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "later.toml").write_text(BALL)
+    stop = "    def prepare(self, scene, dt):\n        if scene.name == 'later': os.kill(os.getppid(), signal.SIGINT)\n"
+    (tmp_path / "stopping.py").write_text(texts["stopping.py"] + stop + "        return super().prepare(scene, dt)\n")
+    command = ("run", "ball.toml", "later.toml", "-e", "stopping:Mine", "--dt", "0.01", "-o", "out")
+    done = spawn(*command, cwd=tmp_path)
+    assert done.returncode == 130
+    assert "1 of 2 scenes are kept" in done.stderr
+    (tmp_path / "stopping.py").write_text(texts["stopping.py"])
+    done = spawn(*command, "--resume", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "measured again, not resumed: since the interrupted run, the code of stopping changed" in done.stderr

@@ -1,6 +1,7 @@
 """Files of the working directory, and packages that are installed and broken, do not disturb a command."""
 
 import json
+import sys
 
 import pytest
 from support.cli import dropspin, spawn
@@ -50,43 +51,47 @@ def test_plots_ignore_settings_of_the_working_directory(strays):
 
 
 @pytest.fixture
-def broken(tmp_path):
-    """A folder with a package pydrake that cannot be imported; to be put on Python's path."""
+def _broken(tmp_path, monkeypatch):
+    """A package pydrake that cannot be imported comes before the one that may be installed."""
     folder = tmp_path / "packages"
     (folder / "pydrake").mkdir(parents=True)
     text = "libGL.so.1: cannot open shared object file: No such file or directory"
     (folder / "pydrake" / "__init__.py").write_text(f"raise ImportError({text!r})")
     (tmp_path / "ball.toml").write_text(BALL)
-    return folder
+    for name in [name for name in sys.modules if name.partition(".")[0] == "pydrake" or name == "comparisons.engines.drake_engine"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(folder)
 
 
 REASON = "drake is installed, but pydrake cannot be imported: ImportError: libGL.so.1: cannot open shared object file"
 CURE = "apt-get install libgl1"
 
 
-def test_broken_engine_is_a_row_of_doctor_and_of_the_list(broken, tmp_path):
-    done = spawn("doctor", "--json", cwd=tmp_path, PYTHONPATH=str(broken))
+@pytest.mark.usefixtures("_broken")
+def test_broken_engine_is_a_row_of_doctor_and_of_the_list(tmp_path):
+    done = dropspin("doctor", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     rows = {row["what"]: row["found"] for row in json.loads(done.stdout)}
     assert rows["engine drake"].startswith(f"broken: {REASON}")
     assert CURE in rows["engine drake"]
     assert rows["engine document"].startswith("works")
-    done = spawn("list", "engines", "--json", cwd=tmp_path, PYTHONPATH=str(broken))
+    done = dropspin("list", "engines", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert next(row["summary"] for row in json.loads(done.stdout) if row["engine"] == "drake").startswith(REASON)
 
 
-def test_broken_engine_costs_its_own_row(broken, tmp_path):
-    done = spawn(*RUN, "-e", "drake", "--json", cwd=tmp_path, PYTHONPATH=str(broken))
+@pytest.mark.usefixtures("_broken")
+def test_broken_engine_costs_its_own_row(tmp_path):
+    done = dropspin(*RUN, "-e", "drake", "--json", cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     rows = json.loads(done.stdout)
     [row] = [row for row in rows if row["engine"] == "drake"]
     assert row["verdict"] == "broken"
     assert row["reason"].startswith(REASON)
     assert {row["verdict"] for row in rows if row["engine"] == "document"} <= {"passed", "measured"}
-    assert spawn("run", "ball.toml", "-e", "drake", "-o", "alone", cwd=tmp_path, PYTHONPATH=str(broken)).returncode == 3
+    assert dropspin("run", "ball.toml", "-e", "drake", "-o", "alone", cwd=tmp_path).returncode == 3
     for command in (("show", "drop-ball", "-e", "drake"), ("conform", "drake")):
-        done = spawn(*command, cwd=tmp_path, PYTHONPATH=str(broken))
+        done = dropspin(*command, cwd=tmp_path)
         assert done.returncode == 3
         assert done.stderr.startswith(f"dropspin: {REASON}")
         assert len(done.stderr.splitlines()) == 1

@@ -5,52 +5,50 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 
+from comparisons.results.output import unfinished_folder
 from scenarios import DropspinError
+
+SECTION = "section.json"
+"""The file of a study that a report includes."""
 
 
 @contextmanager
 def folder_made(folder: str) -> Iterator[Path]:
-    """Create a folder to write into, so that one that cannot be written fails before the work and not after it.
+    """An empty folder in which to write the files of a study; at the end they take their places in the study's folder.
 
-    On leaving, created folders that stayed empty are removed.
+    The folder is created before the work, so that one that cannot be written fails then. An error or an interrupt leaves the files of an
+    earlier study as they were. On leaving, created folders that stayed empty are removed.
 
     Raises:
-        DropspinError: On entering, if the folder cannot be created or written.
+        DropspinError: The folder or a file in it cannot be written.
     """
     path = Path(folder)
     made: list[Path] = []
     try:
-        try:
-            made = [one for one in (path, *path.parents) if not one.exists()]
-            path.mkdir(parents=True, exist_ok=True)
-            with TemporaryFile(dir=path):
-                pass
-        except OSError as error:
-            raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o.") from None
-        yield path
+        made = [one for one in (path, *path.parents) if not one.exists()]
+        path.mkdir(parents=True, exist_ok=True)
+        with unfinished_folder(path) as unfinished:
+            new = unfinished / "new"
+            new.mkdir()
+            yield new
+            _move_all(new, path)
+    except OSError as error:
+        raise DropspinError(f"{folder}: cannot be written: {error.strerror or error}; choose another folder with -o.") from None
     finally:
         for one in made:
             with suppress(OSError):  # it holds the tables, or other files
                 one.rmdir()
 
 
-@contextmanager
-def written_whole(file: str | Path) -> Iterator[Path]:
-    """A path to write a file to. It takes the place of the file at the end: an error or an interrupt leaves an earlier file as it was.
-
-    Raises:
-        DropspinError: The file cannot be written.
-    """
-    try:
-        with TemporaryDirectory(prefix=".unfinished-", dir=Path(file).parent) as folder:
-            unfinished = Path(folder) / Path(file).name
-            yield unfinished
-            unfinished.replace(file)
-    except OSError as error:
-        raise DropspinError(f"{file}: cannot be written: {error.strerror or error}; choose another file.") from None
+def _move_all(new: Path, folder: Path) -> None:
+    """Move files to a folder. The section, from which a report takes the study, is absent until the others have been moved."""
+    files = sorted(new.iterdir(), key=lambda file: file.name == SECTION)
+    if files and files[-1].name == SECTION:
+        (folder / SECTION).unlink(missing_ok=True)
+    for file in files:
+        file.replace(folder / file.name)
 
 
 def write_table(folder: Path, stem: str, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from comparisons.results.output import OLD, unfinished_folder
 from comparisons.results.results import Results
 from comparisons.results.store import load_results, save
 from reports.html.report import html_report
@@ -79,18 +80,18 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
         _assert_replaceable(folder, target)
         made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = Path(tempfile.mkdtemp(prefix=f".{target.name[:100]}-unfinished-", dir=target.parent))
-        unfinished.chmod(target.stat().st_mode if target.exists() else 0o777 & ~_umask())
+        with unfinished_folder(target.parent, target.name) as unfinished:
+            new = unfinished / "new"
+            new.mkdir()
+            if target.exists():
+                new.chmod(target.stat().st_mode)
+            yield new
+            _assert_replaceable(folder, target)
+            _swap(new, target, unfinished / OLD)
     except OSError as error:
-        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; choose another folder.") from None
-    try:
-        yield unfinished
-        _assert_replaceable(folder, target)
-        _swap(unfinished, target)
-    except OSError as error:
-        raise DropspinError(f"{folder}: cannot be written: {error.strerror}; the folder is unchanged.") from error
+        unchanged = "the folder is unchanged" if target.is_dir() else "choose another folder"
+        raise DropspinError(f"{folder}: cannot be written: {error.strerror or error}; {unchanged}.") from error
     finally:
-        shutil.rmtree(unfinished, ignore_errors=True)
         for parent in made:
             with suppress(OSError):  # it holds the run, or other files
                 parent.rmdir()
@@ -107,7 +108,7 @@ class MeasuredScenes:
 
     def __init__(self, folder: str | Path) -> None:
         target = Path(os.path.realpath(folder))
-        self._path = target.with_name(f".{target.name[:100]}-measured")
+        self._path = target.parent / f".{target.name[:100]}-measured"
 
     def keep(self, part: Results) -> None:
         """Write the results of a scene, completely or not at all."""
@@ -129,26 +130,16 @@ class MeasuredScenes:
         shutil.rmtree(self._path, ignore_errors=True)
 
 
-def _umask() -> int:
-    """The umask of this process, which can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-def _swap(unfinished: Path, target: Path) -> None:
-    """Put the new folder in the place of an old one; if that fails, put the old one back."""
-    if not target.exists():
-        unfinished.rename(target)
-        return
-    old = unfinished.with_name(unfinished.name.replace("-unfinished-", "-old-"))
-    target.rename(old)
+def _swap(new: Path, target: Path, old: Path) -> None:
+    """Put the new folder in the place of an old one, which is put aside; if that fails, put the old one back."""
     try:
-        unfinished.rename(target)
+        if target.exists():
+            target.rename(old)
+        new.rename(target)
     except BaseException:
-        old.rename(target)
+        if old.exists() and not target.exists():
+            old.rename(target)
         raise
-    shutil.rmtree(old, ignore_errors=True)
 
 
 def _assert_replaceable(given: str | Path, target: Path) -> None:

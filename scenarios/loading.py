@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from scenarios.errors import SceneError, did_you_mean
+from scenarios.errors import DropspinError, SceneError, did_you_mean
+from scenarios.files import read_file
 from scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
 from scenarios.validation import Alternatives, first_problem, shown
 
@@ -18,6 +20,8 @@ CATALOGUE = Path(__file__).parent / "catalogue"
 DRAWN = r"draw-([0-9]{1,20})-([0-9]{1,4})"
 """The name of a scene that `draw` draws: its seed and its number."""
 MAX_FILE_SIZE = 1_000_000  # bytes; a scene of ten thousand vertices is smaller
+DEEPEST = 30
+"""Tables and lists within each other in a file; a baseline has six."""
 FEATURES: dict[str, type[BaseModel]] = {
     "floor": Floor,
     "gravity": Gravity,
@@ -73,8 +77,6 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
 
 def _find(scene: str | Path) -> Path:
     text = str(scene)
-    if "\0" in text:
-        raise SceneError(f"scene {text!r}: no file has such a name.")
     if isinstance(scene, str) and re.fullmatch(r"[a-z0-9-]{1,100}", text) and (CATALOGUE / f"{text}.toml").is_file():
         return CATALOGUE / f"{text}.toml"
     path = Path(scene)
@@ -99,21 +101,34 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = MAX_FI
         SceneError: It is not a TOML file, or cannot be read.
     """
     try:
-        with path.open("rb") as file:
-            content = file.read(largest + 1)
-        if len(content) > largest:
-            raise SceneError(f"{given}: more than {largest:,} bytes; no {what} is that long.")
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except IsADirectoryError:
-        raise SceneError(f"{given}: is a directory; a {what} is one TOML file.") from None
-    except OSError as error:
-        raise SceneError(f"{given}: {error.strerror}; give the path of a readable .toml file.") from None
+        content = tomllib.loads(read_file(path, given, what, largest).decode("utf-8-sig"))
+    except DropspinError as error:
+        raise SceneError(str(error)) from None
     except UnicodeDecodeError as error:
         raise SceneError(f"{given}: byte {error.start} is not UTF-8 text; a {what} is a TOML file in UTF-8.") from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{given}: not TOML: {error}.") from None
     except RecursionError:
         raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
+    except ValueError:  # of Python's limit for converting decimal digits
+        raise SceneError(f"{given}: has a whole number {TOO_LARGE}.") from None
+    _verify_sizes(content, given, what)
+    return content
+
+
+TOO_LARGE = "that exceeds the range of floating-point numbers"
+
+
+def _verify_sizes(content: dict[str, Any], given: str, what: str) -> None:
+    """Raise `SceneError` for what no `what` has and messages could not show: deep nesting, whole numbers of thousands of digits."""
+    level: list[Any] = [content]
+    for _ in range(DEEPEST):
+        level = [part for one in level for part in (one.values() if isinstance(one, dict) else one)]
+        if any(type(part) is int and part.bit_length() > sys.float_info.max_exp for part in level):
+            raise SceneError(f"{given}: has a whole number {TOO_LARGE}.")
+        level = [part for part in level if isinstance(part, dict | list)]
+    if level:
+        raise SceneError(f"{given}: nested too deeply to be a {what}.")
 
 
 def _from_mapping(scene: Mapping[str, Any]) -> Scenario:

@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from scenarios.text import Text
 
 TOUCHING = 1e-9
 """Height above the floor, over the body's size, up to which the body counts as touching it."""
@@ -73,7 +74,7 @@ class Ensemble(Table):
     """
 
     size: Annotated[int, Field(strict=True, ge=2, le=10_000_000)]
-    seed: Annotated[int, Field(strict=True, ge=0)]
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**64)]
     turn: Annotated[NotNegative, Field(le=math.pi)] = math.pi
     velocity: Annotated[tuple[NotNegative, ...], Field(min_length=3, max_length=3)] = (0.0, 0.0, 0.0)
     angular_velocity: Annotated[tuple[NotNegative, ...], Field(min_length=3, max_length=3)] = (0.0, 0.0, 0.0)
@@ -85,13 +86,13 @@ class Expectation(Table):
     `dt` names one time step or several [s]. `below` bounds the absolute value; `above` and `within` bound the value with its sign.
     """
 
-    metric: str
-    engine: str | None = None
+    metric: Text
+    engine: Text | None = None
     dt: tuple[Positive, ...] | None = None
     below: Positive | None = None
     above: Number | None = None
     within: Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)] | None = None
-    reason: Annotated[str, Field(min_length=1)]
+    reason: Annotated[Text, Field(min_length=1)]
 
     @field_validator("dt", mode="before")
     @classmethod
@@ -126,11 +127,11 @@ class Scenario(Table):
         expect: Bounds on metrics, each with a reason.
     """
 
-    name: Annotated[str, Field(json_schema_extra={"hidden": "in files"})]
+    name: Annotated[Text, Field(json_schema_extra={"hidden": "in files"})]
     origin: Annotated[str, Field(exclude=True, json_schema_extra={"hidden": "always"})] = ""
-    summary: str = ""
-    source: str = ""
-    tags: tuple[str, ...] = ()
+    summary: Text = ""
+    source: Text = ""
+    tags: tuple[Text, ...] = ()
     duration: Positive
     body: Body
     start: Start = Start()

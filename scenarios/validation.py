@@ -53,7 +53,10 @@ def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: A
 
 def shown(value: Any) -> str:
     """A value in at most 60 characters."""
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except (ValueError, RecursionError):  # thousands of digits, or of lists within each other
+        return f"a {type(value).__name__} too large to be shown"
     return text if len(text) <= 60 else text[:57] + "..."
 
 

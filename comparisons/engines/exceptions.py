@@ -1,5 +1,7 @@
 """An exception of an adapter as text: its own text may be anything, or raise."""
 
+from scenarios.text import printable
+
 LONGEST = 1000
 
 
@@ -11,9 +13,9 @@ def described(error: BaseException) -> str:
         text = f"its text cannot be made, {type(another).__name__}"
     if isinstance(error, MemoryError):
         text = " ".join(filter(None, [text, "(the engine's process may not use more memory)"]))
-    return printable(f"{type(error).__name__}: {text}" if text else type(error).__name__)
+    return short(f"{type(error).__name__}: {text}" if text else type(error).__name__)
 
 
-def printable(text: str) -> str:
-    """A text without lone surrogates, which no file takes, and not longer than 1,000 characters."""
-    return text[:LONGEST].encode(errors="backslashreplace").decode()
+def short(text: str) -> str:
+    """A text in printable characters, at most 1,000."""
+    return printable(text[:LONGEST])

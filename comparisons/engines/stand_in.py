@@ -11,10 +11,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from comparisons.engines.adapter_code import adapter_code
 from comparisons.engines.base import Engine, EngineBroken, NumericOption
 from scenarios import DropspinError
+from scenarios.text import Text
 from scenarios.validation import validated
 
 LONGEST_SUMMARY = 500
-Text = Annotated[str, Field(max_length=100)]
+Short = Annotated[Text, Field(max_length=100)]
 
 
 class Traits(BaseModel):
@@ -34,12 +35,12 @@ class Traits(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)
 
     source: str
-    name: Text
-    summary: Annotated[str, Field(max_length=LONGEST_SUMMARY)]
-    choices: dict[Text, tuple[Text, ...]]
-    numbers: dict[Text, NumericOption]
-    accuracy: dict[Text, tuple[Text | float, ...]]
-    options: dict[Text, Text]
+    name: Short
+    summary: Annotated[Text, Field(max_length=LONGEST_SUMMARY)]
+    choices: dict[Short, tuple[Short, ...]]
+    numbers: dict[Short, NumericOption]
+    accuracy: dict[Short, tuple[Short | float, ...]]
+    options: dict[Short, Short]
     code: str | None
 
 

@@ -6,8 +6,6 @@ only what was moved on purpose. Each line is complete in itself, so that a merge
 
 import datetime
 import math
-import os
-import tempfile
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +19,7 @@ from tomlkit.items import InlineTable, Item
 from comparisons.measuring.metrics import METRICS
 from comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results
 from comparisons.results.ensembles import ENSEMBLE_METRICS
+from comparisons.results.output import written_whole
 from comparisons.results.provenance import digest, versions_behind
 from comparisons.results.results import Results
 from scenarios import DropspinError
@@ -213,16 +212,8 @@ def write_baseline(baseline: Baseline, path: str | Path) -> None:
     Raises:
         DropspinError: The file cannot be written.
     """
-    target = Path(os.path.realpath(path))
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, prefix=f".{target.name}-", delete=False) as file:
-            file.write(_text(baseline))
-        unfinished = Path(file.name)
-        unfinished.chmod(target.stat().st_mode if target.exists() else 0o644)
-        unfinished.replace(target)
-    except OSError as error:
-        raise DropspinError(f"{path}: cannot be written: {error.strerror}; choose another file with --baseline.") from None
+    with written_whole(path) as unfinished:
+        unfinished.write_text(_text(baseline), encoding="utf-8")
 
 
 def _text(baseline: Baseline) -> str:

@@ -34,7 +34,7 @@ from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.progress import OnSimulations
 from comparisons.running.recording import Breakdown
-from scenarios import Scenario
+from scenarios import DropspinError, Scenario
 
 Given = TypeVarTuple("Given")
 Result = TypeVar("Result")
@@ -43,6 +43,7 @@ PROCESSES = Path("/proc")
 POLL, GRACE = 0.5, 2.0  # s, between checks of a process, and for the pool to report its end
 PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096  # bytes
 GIB = 2**30  # bytes
+MOST_SECONDS, MOST_BYTES = 1e7, 2**60
 NEAR_LIMIT = 0.5
 """Share of the memory limit above which a crash mentions it."""
 WALL_TIME_FACTOR = 10.0
@@ -56,10 +57,18 @@ class ResourceLimits:
     Attributes:
         processor_time: Processor time [s]; ten times as much wall time is allowed.
         memory: Memory beyond what its process takes when it starts [bytes].
+
+    Raises:
+        DropspinError: One of them is not above 0, or larger than a system can count.
     """
 
     processor_time: float = 300.0
-    memory: int = 8 * 2**30
+    memory: int = 8 * GIB
+
+    def __post_init__(self) -> None:
+        for name, value, most in (("processor_time", self.processor_time, MOST_SECONDS), ("memory", self.memory, MOST_BYTES)):
+            if not 0.0 < value <= most:
+                raise DropspinError(f"{name}: got {value:g}; give a number above 0 and at most {most:g}.")
 
 
 class Failed(Exception):

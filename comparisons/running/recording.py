@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Diverged, Engine, KnownLimitation
-from comparisons.engines.exceptions import described, printable
+from comparisons.engines.exceptions import described, short
 from comparisons.engines.registry import engine as engine_named
 from comparisons.judging.verdicts import Verdict
 from comparisons.running.inputs import SceneLike, as_scene, verify_time_step
@@ -154,7 +154,7 @@ def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, ex
 def classify(error: Exception) -> Breakdown:
     """The verdict for what an adapter raised: an engine is somebody else's code, so any exception costs its own row only."""
     if isinstance(error, Diverged):
-        return Breakdown("diverged", printable(str(error)))
+        return Breakdown("diverged", short(str(error)))
     return Breakdown("crashed", described(error))
 
 

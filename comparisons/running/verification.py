@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine, KnownLimitation, Simulation
-from comparisons.engines.exceptions import LONGEST, described, printable
+from comparisons.engines.exceptions import LONGEST, described, short
 from scenarios import Scenario
 from scenarios.rotations import length
 from scenarios.state import ORIENTATION, PARTS, SPIN
@@ -149,8 +149,8 @@ def verified_predictions(predicted: Mapping[str, Any]) -> dict[str, float]:
 def _verified_text(what: str, text: Any) -> str:
     if not isinstance(text, str) or not text.strip():
         raise BuildMismatch(f"{what} is {shown(text)}; it must be a sentence")
-    if printable(text) != text:
-        raise BuildMismatch(f"{what} is {printable(shown(text))}; it must be UTF-8 text of at most {LONGEST} characters")
+    if short(text) != text:
+        raise BuildMismatch(f"{what} is {short(shown(text))}; it must be printable text of at most {LONGEST} characters")
     return str(text)
 
 

@@ -32,6 +32,7 @@ COMMANDS = {
 CITATION = """To cite: The dropspin authors, dropspin, version {version};
 for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
 """What to cite; a test compares it with CITATION.cff."""
+LONGEST_ARGUMENT = 4096
 INTERRUPTED = 130  # 128 + SIGINT, as in shells
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor a usage error
 
@@ -52,7 +53,7 @@ def main() -> None:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # Python would flush into the closed pipe at exit
         sys.exit(INTERRUPTED)
     except OSError as error:
-        click.echo(f"dropspin: {error}", err=True)
+        _say(str(error))
         sys.exit(2)
     except Exception:
         click.echo("dropspin: internal error; please report what follows.", err=True)
@@ -63,6 +64,10 @@ def main() -> None:
 def _run() -> int:
     """Run the command, and return the exit code."""
     try:
+        for argument in sys.argv[1:]:
+            if not argument.isprintable() or len(argument) > LONGEST_ARGUMENT:
+                given = f"{argument!r:.60}"
+                raise click.UsageError(f"the argument {given} is not printable text of at most {LONGEST_ARGUMENT} characters.")
         return dropspin(prog_name="dropspin", standalone_mode=False) or 0
     except click.ClickException as error:
         error.show()
@@ -74,10 +79,17 @@ def _run() -> int:
 
         if not isinstance(error, DropspinError):
             raise
-        click.echo(f"dropspin: {error}", err=True)
+        _say(str(error))
         from comparisons.engines.base import EngineBroken, EngineMissing
 
         return 3 if isinstance(error, EngineBroken | EngineMissing) else 2
+
+
+def _say(message: str) -> None:
+    """Print an error in printable characters."""
+    from scenarios.text import printable
+
+    click.echo(f"dropspin: {printable(message)}", err=True)
 
 
 class _LazyGroup(click.Group):

@@ -15,11 +15,28 @@ summary_option = click.option("--summary", metavar="FILE", help="Append a Markdo
 
 
 def write_text(path: str, text: str, *, append: bool = False) -> None:
-    """Write a text to a file, or append it."""
+    """Write a text to a file, or append it.
+
+    Raises:
+        DropspinError: The file cannot be written.
+    """
+    from comparisons.results.output import written_whole
+    from scenarios import DropspinError
+
     target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with target.open("a" if append else "w", encoding="utf-8") as file:
-        file.write(text)
+    if not append and (target.is_file() or not target.exists()):
+        with written_whole(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
+        return
+    try:  # a summary grows, and /dev/stdout is written as it is
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("a" if append else "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise DropspinError(f"{path}: cannot be written: {error.strerror}; choose another file.") from None
+
+
+MOST_SECONDS = 1e7
 
 
 def _finite(context: click.Context, parameter: click.Parameter, value: float) -> float:
@@ -32,7 +49,7 @@ def seconds_option(name: str, default: float, of: str) -> Callable[[Command], Co
     """An option that is a processor time."""
     return click.option(
         name,
-        type=click.FloatRange(min=0.0, min_open=True),
+        type=click.FloatRange(min=0.0, min_open=True, max=MOST_SECONDS),
         default=default,
         show_default=True,
         metavar="SECONDS",

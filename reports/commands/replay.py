@@ -27,9 +27,9 @@ def replay_command(
 
     The page plays, scrubs, slows down and turns the view, and shows contacts and impulses. It is one file and needs no network.
     """
+    from comparisons.results.output import written_whole
     from comparisons.results.store import load_results
     from reports.html.replay import replay_page
-    from reports.output import written_whole
     from reports.plots.figures import time_charts
     from reports.replay import replay_of
     from reports.replay.clip import write_clip
@@ -62,7 +62,6 @@ def replay_command(
         at_this_step = {key: motion for key, motion in results.trajectories.items() if key[2] == one.dt}
         charts.append(time_charts(replace(results, trajectories=at_this_step), one.scene.name))
     file = str(Path(run) / "replay.html") if output is None else output
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
     with written_whole(file) as unfinished:
         unfinished.write_text(replay_page(shown, charts), encoding="utf-8")
     click.echo(f"Written: {file}")

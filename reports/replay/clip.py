@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.output import written_whole
+from comparisons.results.output import written_whole
 from reports.replay.bodies import Outline, outline
 from reports.replay.motions import Motion, Replay
 from scenarios import DropspinError

@@ -217,7 +217,7 @@ def test_gif_is_four_times_slower_than_real_time_by_default():
         (["drop-ball", "--gif", "clip.avi"], "--gif clip.avi: give the file the ending .gif"),
         (["drop-ball", "--gif", "clip.gif", "--speed", "nan"], "more than 5,000 frames; choose a speed of at least 0.0075."),
         (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "a GIF at a speed of 1e-09 has more than 5,000 frames"),
-        (["drop-ball", "--gif", "absent/clip.gif"], "absent/clip.gif: cannot be written: No such file or directory; choose another file."),
+        (["drop-ball", "--gif", "/dev/null/clip.gif"], "/dev/null/clip.gif: cannot be written: File exists; choose another file."),
         (["drop-ball", "--gif", "clip.gif", "-o", "page.html"], "-o page.html is for the page"),
         (["--gif", "clip.gif"], "name it: drop-box-corner"),
         (["drop-ball", "--dt", "-1"], "--dt"),

@@ -36,7 +36,7 @@ def test_unreadable_files_are_rejected(tmp_path):
     """Missing, a directory, too large, nested too deeply."""
     with pytest.raises(SceneError, match=r"absent\.toml: No such file or directory; give the path"):
         load(tmp_path / "absent.toml")
-    with pytest.raises(SceneError, match="is a directory; a scene is one TOML file"):
+    with pytest.raises(SceneError, match="is a directory; a scene is one file"):
         load(tmp_path)
     huge = tmp_path / "huge.toml"
     with huge.open("wb") as file:

@@ -164,7 +164,7 @@ def test_annotations_are_for_github(repository):
         (["check", "absent"], "absent: not the folder of a run"),
         (["check", "out/good", "--baseline", "absent.toml"], "absent.toml: No such file or directory"),
         (["check", "out/good", "--baseline", "my_engine.py"], "my_engine.py: not TOML"),
-        (["check", "out/good", "--baseline", "out"], "out: is a directory; a baseline is one TOML file"),
+        (["check", "out/good", "--baseline", "out"], "out: is a directory; a baseline is one file"),
         (["check", "out/good", "--junit", "my_engine.py/x"], "my_engine.py"),
         (["accept", "out/good"], "Missing option '--reason'"),
         (["accept", "out/good", "--reason", " "], "--reason is empty; say why these results are accepted."),

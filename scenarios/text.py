@@ -1,0 +1,22 @@
+"""Text that terminals, files and pages show as it is: without control characters, marks of direction, or lone surrogates."""
+
+from typing import Annotated
+
+from pydantic import AfterValidator
+
+_LAYOUT = frozenset("\n\t")
+
+
+def printable(text: str) -> str:
+    """A text with a backslash escape in place of each character that is not printable; line ends and tabs stay."""
+    return "".join(one if one.isprintable() or one in _LAYOUT else one.encode("unicode_escape").decode() for one in text)
+
+
+def _verified(text: str) -> str:
+    if printable(text) != text:
+        raise ValueError("must be printable text, without control characters")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_verified)]
+"""A field of a model that holds printable text."""

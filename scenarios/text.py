@@ -12,11 +12,16 @@ def printable(text: str) -> str:
     return "".join(one if one.isprintable() or one in _LAYOUT else one.encode("unicode_escape").decode() for one in text)
 
 
-def _verified(text: str) -> str:
+def verify_printable(text: str) -> str:
+    """A text as it is given.
+
+    Raises:
+        ValueError: It is not printable.
+    """
     if printable(text) != text:
         raise ValueError("must be printable text, without control characters")
     return text
 
 
-Text = Annotated[str, AfterValidator(_verified)]
+Text = Annotated[str, AfterValidator(verify_printable)]
 """A field of a model that holds printable text."""

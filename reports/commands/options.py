@@ -1,6 +1,5 @@
 """Options that several commands share."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -40,8 +39,8 @@ MOST_SECONDS = 1e7
 
 
 def _finite(context: click.Context, parameter: click.Parameter, value: float) -> float:
-    if not math.isfinite(value):
-        raise click.BadParameter(f"{value} is not a finite number of seconds.", context, parameter)
+    if not value <= MOST_SECONDS:
+        raise click.BadParameter(f"{value} is not a finite number of seconds of at most {MOST_SECONDS:g}.", context, parameter)
     return value
 
 
@@ -49,7 +48,7 @@ def seconds_option(name: str, default: float, of: str) -> Callable[[Command], Co
     """An option that is a processor time."""
     return click.option(
         name,
-        type=click.FloatRange(min=0.0, min_open=True, max=MOST_SECONDS),
+        type=click.FloatRange(min=0.0, min_open=True),
         default=default,
         show_default=True,
         metavar="SECONDS",

@@ -1,6 +1,6 @@
 """Markdown pages: the report of a run in short, summaries of checks and comparisons for a pull request, a history."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
@@ -42,9 +42,9 @@ def compare_markdown(changes: Changes) -> str:
     return page("compare.md", held=not len(changes.regressions), tables=compare.tables(changes), sentences=compare.sentences(changes))
 
 
-def history_markdown(runs: int, sentences: Sequence[str], scenes: Sequence[str]) -> str:
-    """A history of runs, with a figure for each scene."""
-    return page("history.md", runs=runs, sentences=sentences, scenes=scenes)
+def history_markdown(runs: int, sentences: Sequence[str], pictures: Mapping[str, str]) -> str:
+    """A history of runs, with a picture for each scene: by name, its file."""
+    return page("history.md", runs=runs, sentences=sentences, pictures=pictures)
 
 
 def _tally(rows: pd.DataFrame) -> dict[str, int]:

@@ -1,5 +1,7 @@
 """Pages from Jinja templates, HTML and Markdown; values in HTML are escaped."""
 
+import base64
+import hashlib
 import re
 from functools import cache
 from typing import Any
@@ -26,9 +28,14 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted", "quantity")}
-    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code}
+    environment.filters |= {"cell": _markdown_cell, "code": _markdown_code, "sha256": _base64_sha256}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": MARKS}
     return environment
+
+
+def _base64_sha256(text: str) -> str:
+    """The hash by which a page's policy allows one script, and no other."""
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
 def _markdown_cell(text: str) -> str:

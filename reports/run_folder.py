@@ -1,6 +1,5 @@
 """The folder of a run: written completely or not at all; it replaces only an earlier run."""
 
-import json
 import os
 import shutil
 import tempfile
@@ -10,7 +9,9 @@ from pathlib import Path
 
 from comparisons.results.output import OLD, unfinished_folder
 from comparisons.results.results import Results
+from comparisons.results.run_file import ARRAY_FILE, FILE, parsed
 from comparisons.results.store import load_results, save
+from comparisons.results.stored_files import read_stored
 from reports.html.report import html_report
 from reports.junit import junit_xml
 from reports.markdown import run_markdown
@@ -161,8 +162,8 @@ def _assert_replaceable(given: str | Path, target: Path) -> None:
 def _files_of_run(folder: Path) -> set[str]:
     """The files that a run wrote to its folder; empty if the folder has no run."""
     try:
-        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        arrays, scenes = {*content["trajectories"], *content["ensembles"]}, content["scenes"]
+        content = parsed(read_stored(folder, FILE))
+        arrays, scenes = {*filter(ARRAY_FILE.fullmatch, [*content["trajectories"], *content["ensembles"]])}, content["scenes"]
     except (OSError, ValueError, TypeError, KeyError):
         return set()
     plots = {f"plots/{number:02d}-{kind}.{ending}" for number in range(len(scenes)) for kind in CHARTS for ending in ("svg", "png")}

@@ -6,12 +6,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import AfterValidator, Field, ValidationError
 
+from comparisons.results.stored_files import file_name, read_stored
 from reports.plots.chart import Chart, figure_of
 from reports.plots.chart_data import chart_data
+from reports.plots.stored_chart import StoredChart, StoredData
 from reports.plots.svg import save_svg
 from scenarios import DropspinError
+from scenarios.text import Text
+from scenarios.validation import first_problem
 
 FILE = "section.json"
 
@@ -60,49 +64,58 @@ class Section:
         """Write the Markdown page, its pictures, and `section.json`, from which a report takes the section."""
         (folder / FILE).write_text(json.dumps({"title": self.title, "parts": self.parts}, indent=1), encoding="utf-8")
         for name, charts in self.pictures.items():
-            save_svg(figure_of(charts), folder / f"{name}.svg")
+            save_svg(figure_of(charts), folder / f"{file_name(name)}.svg")
         page = "\n\n".join([f"# {self.title}", *map(_markdown, self.parts)])
         (folder / f"{stem}.md").write_text(f"{page}\n", encoding="utf-8")
 
 
-class _Prose(BaseModel):
+class _Prose(StoredData):
     kind: Literal["heading", "text"]
-    content: str
+    content: Text
 
 
-class _List(BaseModel):
+class _List(StoredData):
     kind: Literal["list"]
-    items: list[str]
+    items: list[Text]
 
 
-class _Table(BaseModel):
+def _same_columns(rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    if any(list(row) != list(rows[0]) for row in rows):
+        raise ValueError("rows have different columns")
+    return rows
+
+
+class _Table(StoredData):
     kind: Literal["table"]
-    rows: Annotated[list[dict[str, str]], Field(min_length=1)]
+    rows: Annotated[list[dict[Text, Text]], Field(min_length=1), AfterValidator(_same_columns)]
 
 
-class _Charts(BaseModel):
+class _Charts(StoredData):
     kind: Literal["charts"]
-    name: str
-    charts: list[dict[str, Any]]
+    name: Text
+    charts: list[StoredChart]
 
 
-class _File(BaseModel):
-    title: str
+class _File(StoredData):
+    title: Text
     parts: list[Annotated[_Prose | _List | _Table | _Charts, Field(discriminator="kind")]]
 
 
 def read_section(folder: str) -> Section:
-    """The section that a study wrote to its folder.
+    """The section that a study wrote to its folder: texts, which a page escapes, and the data of charts, from which they are drawn.
 
     Raises:
         DropspinError: The folder has no section, or a damaged one.
     """
     try:
-        return Section(**_File.model_validate_json((Path(folder) / FILE).read_bytes()).model_dump())
-    except (OSError, ValueError):
+        found = _File.model_validate_json(read_stored(Path(folder), FILE))
+    except (OSError, ValueError) as error:
+        detail = first_problem(_File, error) if isinstance(error, ValidationError) else getattr(error, "strerror", None) or str(error)
         raise DropspinError(
-            f"{folder}: has no study, or a damaged one; give a folder that dropspin tradeoff or dropspin limits wrote."
+            f"{folder}: has no study, or a damaged one ({FILE}: {detail.removesuffix('.')}); "
+            "give a folder that dropspin tradeoff or dropspin limits wrote."
         ) from None
+    return Section(**found.model_dump(by_alias=True, exclude_unset=True))
 
 
 def _markdown(part: Part) -> str:
@@ -115,5 +128,5 @@ def _markdown(part: Part) -> str:
         lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row.values()] for row in part["rows"])]
         return "\n".join(f"| {' | '.join(line)} |" for line in lines)
     if part["kind"] == "charts":
-        return f"![{part['name']}]({part['name']}.svg)"
+        return f"![{part['name']}]({file_name(part['name'])}.svg)"
     return str(part["content"])

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from comparisons.regressions.history import History
+from comparisons.results.stored_files import file_name
 from comparisons.robustness.study import RobustnessStudy
 from comparisons.tradeoff.points import TradeOff
 from reports.markdown import history_markdown
@@ -50,7 +51,7 @@ def write_history(found: History, folder: Path) -> None:
     known = table.astype(object).where(table.notna(), None)  # JSON has no NaN
     records = [{str(key): value for key, value in row.items()} for row in known.to_dict("records")]
     write_table(folder, "history", [str(name) for name in table], records)
-    scenes = list(dict.fromkeys(found.results["scene"]))
-    for scene in scenes:
-        save_svg(history_figure(found, scene), folder / f"{scene}.svg")
-    (folder / "history.md").write_text(history_markdown(len(found.names), history.sentences(found), scenes), encoding="utf-8")
+    pictures = {scene: f"{file_name(scene)}.svg" for scene in dict.fromkeys(found.results["scene"])}
+    for scene, picture in pictures.items():
+        save_svg(history_figure(found, scene), folder / picture)
+    (folder / "history.md").write_text(history_markdown(len(found.names), history.sentences(found), pictures), encoding="utf-8")

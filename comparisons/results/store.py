@@ -1,63 +1,57 @@
-"""A run as a folder: `run.json`, `results.parquet`, `trajectories/*.npz`, `ensembles/*.npz`."""
+"""A run as a folder: `run.json`, `results.parquet`, `trajectories/*.npz`, `ensembles/*.npz`.
 
-import json
-import re
-from collections.abc import Iterator, Mapping, Sequence
+A folder may be damaged, or somebody else's: all of it is verified on loading, and nothing in it is executed.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
 
-from comparisons.results.ensembles import EnsembleOutcome
-from comparisons.results.measurement import COLUMNS
+from comparisons.results.arrays import Shapes, loaded_arrays, stored_arrays
+from comparisons.results.ensembles import SAMPLES, EnsembleOutcome
 from comparisons.results.results import Results, TrajectoryKey
-from scenarios import DropspinError, Trajectory, load
+from comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
+from comparisons.results.stored_files import file_name, read_stored, sha256
+from comparisons.results.stored_table import loaded_table, verify_rows
+from scenarios import DropspinError, Scenario, Trajectory, load
 
-ARRAYS = ("t", "position", "orientation", "velocity", "angular_velocity", "velocity_lag")
-FORMAT = 4
-"""Of the folder; 1 had no tolerances, 2 no time limit, 3 tolerances in a file of their own."""
-PROVENANCE_KEYS = {
-    "asked",
-    "started",
-    "versions",
-    "wheels",
-    "python",
-    "platform",
-    "cpu",
-    "cores",
-    "commit",
-    "code",
-    "names",
-    "adapters",
-    "settings",
+TRAJECTORY: Shapes = {
+    "t": (None,),
+    "position": (None, 3),
+    "orientation": (None, 4),
+    "velocity": (None, 3),
+    "angular_velocity": (None, 3),
+    "velocity_lag": (),
 }
-ASKED_KEYS = {"scenes", "engines", "dts", "time_limit"}
-"""What a run's provenance must have, and its part about what the run was asked for."""
 OUTCOME = tuple(field.name for field in fields(EnsembleOutcome))
+SAME_TIME = 1e-6
+"""Largest relative difference of a stored time from its multiple of the time step."""
+Kept = TypeVar("Kept")
 
 
 def save(results: Results, folder: Path) -> None:
     """Write a run's data into a folder that exists."""
-    trajectories = _save_arrays(folder, "trajectories", results.trajectories, ARRAYS)
-    ensembles = _save_arrays(folder, "ensembles", results.ensembles, OUTCOME)
-    scenes = {name: scene.model_dump(mode="json", exclude={"name"}, exclude_defaults=True) for name, scene in results.scenes.items()}
-    digests = {name: scene.digest for name, scene in results.scenes.items()}
+    checksums: dict[str, str] = {}
+    trajectories = _save_arrays(folder, "trajectories", results.trajectories, tuple(TRAJECTORY), checksums)
+    ensembles = _save_arrays(folder, "ensembles", results.ensembles, OUTCOME, checksums)
+    pd.concat([results.table, results.predictions, results.agreements]).to_parquet(folder / TABLE, index=False)
+    checksums[TABLE] = sha256((folder / TABLE).read_bytes())
     content = {
         "format": FORMAT,
         "provenance": results.provenance,
         "engines": results.engines,
-        "scenes": scenes,
-        "digests": digests,
+        "scenes": {name: scene.model_dump(mode="json", exclude={"name"}, exclude_defaults=True) for name, scene in results.scenes.items()},
+        "digests": {name: scene.digest for name, scene in results.scenes.items()},
         "origins": {name: scene.origin for name, scene in results.scenes.items()},
         "trajectories": trajectories,
         "ensembles": ensembles,
+        "sha256": checksums,
     }
-    (folder / "run.json").write_text(json.dumps(content, indent=1, default=str), encoding="utf-8")
-    rows = pd.concat([results.table, results.predictions, results.agreements])
-    rows.to_parquet(folder / "results.parquet", index=False)
+    (folder / FILE).write_text(signed(content), encoding="utf-8")
 
 
 def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
@@ -71,65 +65,94 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
         The run, equal to the one that was written.
 
     Raises:
-        DropspinError: The folder holds no run, or one of another format.
+        DropspinError: The folder holds no run, a damaged one, or one of another format.
     """
     try:
-        return _loaded(Path(folder), arrays)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, BadZipFile) as error:
-        detail = " ".join(f"{type(error).__name__}: {error}".split())
-        raise DropspinError(f"{folder}: not the folder of a run, or damaged ({detail}); give one that dropspin run -o wrote.") from None
+        content = parsed(read_stored(Path(folder), FILE))
+        if isinstance(content, dict) and content.get("format") == FORMAT:
+            return _loaded(Path(folder), verified(content), content, arrays)
+    except (OSError, ValueError, DropspinError) as error:
+        detail = " ".join((f"{error.filename}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)).split())
+        raise DropspinError(
+            f"{folder}: not the folder of a run, or damaged ({detail.removesuffix('.')}); give one that dropspin run -o wrote."
+        ) from None
+    raise DropspinError(f"{folder}: has a format of {_writer(content)}, which this version cannot read; run it again.")
 
 
-def _loaded(folder: Path, arrays: bool) -> Results:
-    content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DropspinError(f"{folder}: has a format of {_writer(content)}, which this version cannot read; run it again.")
-    rows = pd.read_parquet(folder / "results.parquet")[list(COLUMNS)].astype(COLUMNS)
-    lacking = PROVENANCE_KEYS - content["provenance"].keys() | ASKED_KEYS - content["provenance"]["asked"].keys()
-    if lacking:
-        raise ValueError(f"its provenance lacks {', '.join(sorted(lacking))}")
-    if not set(rows["scene"]) <= content["scenes"].keys():
-        raise ValueError("its table has scenes that run.json does not have")
-    files = {kind: content[kind] if arrays else {} for kind in ("trajectories", "ensembles")}
-    trajectories = {
-        key: Trajectory(**found | {"velocity_lag": float(found["velocity_lag"])})
-        for key, found in _loaded_arrays(folder, files["trajectories"], ARRAYS)
-    }
-    ensembles = {key: EnsembleOutcome(**found) for key, found in _loaded_arrays(folder, files["ensembles"], OUTCOME)}
-    scenes = {
-        name: load({"name": name, **scene}).model_copy(update={"origin": content["origins"][name]})
-        for name, scene in content["scenes"].items()
-    }
+def _loaded(folder: Path, file: RunFile, content: Mapping[str, Any], arrays: bool) -> Results:
+    scenes = {name: _scene(file, name) for name in file.scenes}
+    rows = _from_file(folder, TABLE, file, loaded_table)
+    verify_rows(rows, scenes, file.engines, file.provenance.asked.dts)
+    trajectories = dict(_arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory))
+    ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, _outcome))
     is_prediction, is_agreement = (rows["kind"] == kind for kind in ("prediction", "agreement"))
     table, *others = (rows[kept].reset_index(drop=True) for kept in (~(is_prediction | is_agreement), is_prediction, is_agreement))
-    return Results(table, scenes, tuple(content["engines"]), trajectories, ensembles, content["provenance"], *others)
+    return Results(table, scenes, tuple(file.engines), trajectories, ensembles, content["provenance"], *others)
+
+
+def _scene(file: RunFile, name: str) -> Scenario:
+    scene = load({**file.scenes[name], "name": name}).model_copy(update={"origin": file.origins[name]})
+    if scene.digest != file.digests[name]:
+        raise ValueError(f"{FILE}: the scene {name!r} is not the one that was run")
+    return scene
+
+
+def _trajectory(content: bytes, scene: Scenario, dt: float) -> Trajectory:
+    found = loaded_arrays(content, TRAJECTORY, scene.duration / dt + 2)
+    if not np.allclose(found["t"], dt * np.arange(len(found["t"])), rtol=SAME_TIME, atol=0.0) or not np.isfinite(found["velocity_lag"]):
+        raise ValueError("its times are not those of its time steps")
+    velocity_lag = float(found.pop("velocity_lag"))
+    return Trajectory(**found, velocity_lag=velocity_lag)
+
+
+def _outcome(content: bytes, scene: Scenario, dt: float) -> EnsembleOutcome:
+    if scene.ensemble is None:
+        raise ValueError("its scene has no ensemble")
+    size = scene.ensemble.size
+    shapes = {"t": (SAMPLES,), "energy": (size, SAMPLES), "rebound": (size,), "rest_time": (size,), "angular_momentum": (size, SAMPLES)}
+    return EnsembleOutcome(**loaded_arrays(content, shapes, size))
+
+
+def _arrays(
+    folder: Path, file: RunFile, files: Mapping[str, Case], scenes: Mapping[str, Scenario], read: Callable[[bytes, Scenario, float], Kept]
+) -> Iterator[tuple[TrajectoryKey, Kept]]:
+    for path, case in files.items():
+        found = _from_file(folder, path, file, lambda content, case=case: read(content, scenes[case.scene], case.dt))  # type: ignore[misc]
+        yield (case.scene, case.engine, case.dt), found
+
+
+def _from_file(folder: Path, path: str, file: RunFile, read: Callable[[bytes], Kept]) -> Kept:
+    """What a file holds, if its checksum is right.
+
+    Raises:
+        ValueError: The file is damaged, or no such file; the text names it.
+    """
+    content = read_stored(folder, path)
+    verify_checksum(path, file.sha256[path], sha256(content))
+    try:
+        return read(content)
+    except Exception as error:  # whatever the parsers of NumPy, zlib and pyarrow raise for a file that is none
+        raise ValueError(f"{path}: {error}") from None
 
 
 def _writer(content: Any) -> str:
     """Which version of dropspin wrote a folder, as far as its run.json says."""
     try:
-        return f"dropspin {content['provenance']['versions']['dropspin']}"
+        return f"dropspin {str(content['provenance']['versions']['dropspin'])[:20]}"
     except (KeyError, TypeError):
         return "another version of dropspin"
 
 
-def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Write one file per item; the result maps each path to its scene, engine and time step."""
+def _save_arrays(
+    folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], names: tuple[str, ...], checksums: dict[str, str]
+) -> dict[str, dict[str, Any]]:
+    """Write one file per item and add its checksum; the result maps each path to its scene, engine and time step."""
     (folder / kind).mkdir()
     files = {}
     for number, ((scene, engine, dt), item) in enumerate(items.items()):
-        path = f"{kind}/{number:03d}-{_file_name(scene)}-{_file_name(engine)}-{dt:g}.npz"
-        np.savez_compressed(folder / path, allow_pickle=False, **{name: getattr(item, name) for name in names})
+        path = f"{kind}/{number:03d}-{file_name(scene)}-{file_name(engine)}-{dt:g}.npz"
+        content = stored_arrays({name: getattr(item, name) for name in names})
+        (folder / path).write_bytes(content)
+        checksums[path] = sha256(content)
         files[path] = {"scene": scene, "engine": engine, "dt": dt}
     return files
-
-
-def _loaded_arrays(folder: Path, files: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Iterator[tuple[TrajectoryKey, Any]]:
-    for path, key in files.items():
-        with np.load(folder / path, allow_pickle=False) as arrays:
-            yield (key["scene"], key["engine"], key["dt"]), {name: arrays[name] for name in names}
-
-
-def _file_name(text: str) -> str:
-    """A name that any file system accepts."""
-    return re.sub(r"[^A-Za-z0-9.=]+", "-", text).strip("-")[:60]

@@ -29,6 +29,7 @@ def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -
     results = load_results(Path(run))
     with run_folder(run) as unfinished:
         fill(results, unfinished, sections, plots)
-        if (Path(run) / "replay.html").exists():
-            shutil.copy2(Path(run) / "replay.html", unfinished)
+        replay = Path(run) / "replay.html"
+        if replay.is_file() and not replay.is_symlink():  # the run may be somebody else's, and the link lead to a private file
+            shutil.copy2(replay, unfinished)
     click.echo(f"Report: {Path(run) / 'report.html'}")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.measuring.metrics import METRICS
+from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.results import Results
 from reports.plots.colours import engine_styles
 
@@ -107,7 +108,7 @@ def at_one_step(
 
 def metric_label(metric: str) -> str:
     """The name and unit of a metric, in lines that fit along an axis."""
-    unit = METRICS[metric].unit
+    unit = (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
     return fill(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"), WIDEST_LABEL)
 
 

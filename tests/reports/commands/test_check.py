@@ -6,7 +6,6 @@ import re
 import shutil
 import xml.etree.ElementTree as ET
 
-import pandas as pd
 import pytest
 from support.cli import dropspin
 
@@ -211,29 +210,6 @@ def test_a_folder_that_is_not_a_run_is_refused(file, content, message, repositor
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
-
-
-def without_names(folder):
-    content = json.loads((folder / "run.json").read_text())
-    del content["provenance"]["names"], content["provenance"]["asked"]["dts"]
-    (folder / "run.json").write_text(json.dumps(content))
-
-
-def of_another_run(folder):
-    frame = pd.read_parquet(folder / "results.parquet")
-    frame.assign(scene="fall-spin").to_parquet(folder / "results.parquet", index=False)
-
-
-@pytest.mark.parametrize(
-    ("damage", "message"), [(without_names, "lacks dts, names"), (of_another_run, "its table has scenes that run.json does not have")]
-)
-def test_files_of_different_runs_are_refused(damage, message, repository, tmp_path):
-    """Each file can be read, but they do not belong together: one line that says so."""
-    shutil.copytree(repository / "out/good", tmp_path / "run")
-    damage(tmp_path / "run")
-    done = dropspin("check", "run", cwd=tmp_path)
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
-    assert message in done.stderr
 
 
 def test_junit_replaces_characters_that_xml_lacks(junit_schema, tmp_path):

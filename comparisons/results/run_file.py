@@ -1,0 +1,179 @@
+"""`run.json`: what a run's folder must say of itself, verified before anything uses it."""
+
+import json
+import re
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import from_json
+
+from comparisons.results.provenance import MEASURING
+from comparisons.results.stored_files import sha256
+from scenarios.text import Text
+from scenarios.validation import validated
+
+FORMAT = 5
+"""Of the folder; 1 had no tolerances, 2 no time limit, 3 tolerances in a file of their own, 4 no checksums."""
+FILE, TABLE = "run.json", "results.parquet"
+ARRAY_FILE = re.compile(r"(trajectories|ensembles)/[A-Za-z0-9][A-Za-z0-9.=_-]*\.npz")
+
+Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Texts = dict[Text, Text]
+
+
+def _time(text: str) -> str:
+    datetime.fromisoformat(text)
+    return text
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+
+class Case(_Table):
+    """What a file of arrays is about."""
+
+    scene: Text
+    engine: Text
+    dt: Seconds
+
+
+class _Asked(_Table):
+    """What a run was asked for; `draw` and `seed` if scenes were drawn."""
+
+    scenes: list[Text]
+    engines: list[Text]
+    dts: Annotated[list[Seconds], Field(min_length=1)]
+    time_limit: Seconds
+    draw: Annotated[int, Field(ge=1)] | None = None
+    seed: Annotated[int, Field(ge=0)] | None = None
+
+
+class _Provenance(_Table):
+    """`Results.provenance`, as `provenance` and the running stage make it."""
+
+    asked: _Asked
+    started: Annotated[Text, AfterValidator(_time)]
+    versions: dict[Text, Text | None]
+    wheels: Texts
+    python: Text
+    platform: Text
+    cpu: Text
+    cores: int | None
+    commit: Text | None
+    code: Text
+    names: Texts
+    adapters: dict[Text, Text | None]
+    settings: dict[Text, dict[Text, dict[Text, Any]]]
+    settings_digests: Texts = {}
+    named: list[Text] = []
+
+    @model_validator(mode="after")
+    def _versions(self) -> Self:
+        if lacking := set(MEASURING) - self.versions.keys():
+            raise ValueError(f"versions: lacks {', '.join(sorted(lacking))}")
+        return self
+
+
+class RunFile(_Table):
+    """The content of `run.json`.
+
+    Attributes:
+        format: `FORMAT`.
+        provenance: As in `Results`.
+        engines: The engines' labels, in order.
+        scenes: The keys of each scene's file, by name.
+        digests: The digest of each scene.
+        origins: Where each scene is from: a name of the catalogue, a path, or empty.
+        trajectories: By path of the file, the scene, the engine and the time step.
+        ensembles: The same.
+        sha256: By path, the checksums of all files that are loaded; that of `run.json` is of its content without this entry.
+    """
+
+    format: int
+    provenance: _Provenance
+    engines: list[Text]
+    scenes: dict[Text, dict[str, Any]]
+    digests: Texts
+    origins: Texts
+    trajectories: dict[str, Case]
+    ensembles: dict[str, Case]
+    sha256: dict[str, str]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        asked, engines = self.provenance.asked, set(self.engines)
+        paths = {*self.trajectories, *self.ensembles}
+        cases = [*self.trajectories.values(), *self.ensembles.values()]
+        drawn = [asked.draw, asked.seed] != [None, None]
+        problems = {
+            "engines: one is listed twice, or none": not engines or len(engines) < len(self.engines),
+            "scenes: there are none": not self.scenes,
+            "digests and origins must be those of the scenes": not self.digests.keys() == self.origins.keys() == self.scenes.keys(),
+            "trajectories and ensembles must be of the run's scenes, engines and time steps": not all(
+                one.scene in self.scenes and one.engine in engines and one.dt in asked.dts for one in cases
+            ),
+            "trajectories and ensembles: a path is none that dropspin writes": not all(map(ARRAY_FILE.fullmatch, paths)),
+            "sha256 must have every file that is loaded": self.sha256.keys() != {FILE, TABLE, *paths},
+            "provenance: has engines that the run does not have": not self.provenance.names.keys() <= engines,
+            "provenance: draw, seed and scenes do not agree": drawn
+            and not (
+                asked.draw is not None
+                and asked.seed is not None
+                and asked.draw <= len(asked.scenes)
+                and asked.scenes == list(self.scenes)
+                and self.provenance.names.keys() == engines
+            ),
+        }
+        if found := [problem for problem, is_one in problems.items() if is_one]:
+            raise ValueError(found[0])
+        return self
+
+
+def signed(content: Mapping[str, Any]) -> str:
+    """The text of a `run.json` with this content, and with its own checksum added to `sha256`."""
+    plain = from_json(json.dumps(content, default=_plain))
+    return json.dumps(plain | {"sha256": plain["sha256"] | {FILE: _checksum(plain)}}, indent=1)
+
+
+def parsed(text: bytes) -> Any:
+    """The content of a `run.json` that is not verified.
+
+    Raises:
+        ValueError: It is not JSON, or nested too deeply.
+    """
+    try:
+        return from_json(text)
+    except ValueError as error:
+        raise ValueError(f"{FILE}: {error}") from None
+
+
+def verified(content: Any) -> RunFile:
+    """The content of a `run.json` as a model.
+
+    Raises:
+        ValueError: Its checksum is wrong.
+        DropspinError: It is not what dropspin writes.
+    """
+    found = validated(RunFile, FILE, content)
+    rest = content | {"sha256": {path: one for path, one in content["sha256"].items() if path != FILE}}
+    verify_checksum(FILE, found.sha256[FILE], _checksum(rest))
+    return found
+
+
+def verify_checksum(path: str, stored: str, found: str) -> None:
+    """Raise `ValueError` if a file is not as it was written."""
+    if stored != found:
+        raise ValueError(f"{path} is damaged: its checksum is not the one in {FILE}")
+
+
+def _plain(value: Any) -> Any:
+    """A value that JSON lacks: a number of NumPy as a number, anything else as text."""
+    return value.item() if isinstance(value, np.generic) else str(value)
+
+
+def _checksum(content: Mapping[str, Any]) -> str:
+    return sha256(json.dumps(content).encode())

@@ -16,8 +16,8 @@ from comparisons.results.ensembles import SAMPLES, EnsembleOutcome
 from comparisons.results.results import Results, TrajectoryKey
 from comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
 from comparisons.results.stored_files import file_name, read_stored, sha256
-from comparisons.results.stored_table import loaded_table, verify_rows
-from scenarios import DropspinError, Scenario, Trajectory, load
+from comparisons.results.stored_table import loaded_table
+from scenarios import DropspinError, Scenario, SceneError, Trajectory, load
 
 TRAJECTORY: Shapes = {
     "t": (None,),
@@ -81,8 +81,7 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
 
 def _loaded(folder: Path, file: RunFile, content: Mapping[str, Any], arrays: bool) -> Results:
     scenes = {name: _scene(file, name) for name in file.scenes}
-    rows = _from_file(folder, TABLE, file, loaded_table)
-    verify_rows(rows, scenes, file.engines, file.provenance.asked.dts)
+    rows = _from_file(folder, TABLE, file, lambda content: loaded_table(content, scenes, file.engines, file.provenance.asked.dts))
     trajectories = dict(_arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory))
     ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, _outcome))
     is_prediction, is_agreement = (rows["kind"] == kind for kind in ("prediction", "agreement"))
@@ -91,7 +90,10 @@ def _loaded(folder: Path, file: RunFile, content: Mapping[str, Any], arrays: boo
 
 
 def _scene(file: RunFile, name: str) -> Scenario:
-    scene = load({**file.scenes[name], "name": name}).model_copy(update={"origin": file.origins[name]})
+    try:
+        scene = load({**file.scenes[name], "name": name}).model_copy(update={"origin": file.origins[name]})
+    except SceneError as error:
+        raise ValueError(f"{FILE}: {error}") from None
     if scene.digest != file.digests[name]:
         raise ValueError(f"{FILE}: the scene {name!r} is not the one that was run")
     return scene

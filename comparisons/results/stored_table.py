@@ -1,7 +1,7 @@
 """`results.parquet`: the columns and types of `COLUMNS`, and in them only what a run writes."""
 
 import io
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import get_args
 
 import numpy as np
@@ -13,16 +13,27 @@ from comparisons.judging.verdicts import VERDICTS
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.measurement import COLUMNS, Kind
+from scenarios import Scenario
 from scenarios.text import printable
+from scenarios.validation import shown
 
 _ARROW = {"str": (pa.string(), pa.large_string()), "float64": (pa.float64(),), "int64": (pa.int64(),)}
 
 
-def loaded_table(content: bytes) -> pd.DataFrame:
-    """The table in a file, by the columns and types of `COLUMNS`.
+def loaded_table(content: bytes, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float]) -> pd.DataFrame:
+    """The table in a file.
+
+    Args:
+        content: The content of the file.
+        scenes: The scenes of the run.
+        engines: Labels of its engines.
+        dts: Its time steps [s].
+
+    Returns:
+        The table, with the columns and types of `COLUMNS`.
 
     Raises:
-        ValueError: It has other columns or types, or gaps.
+        ValueError: It has other columns, types or rows than a run of these scenes with these engines and time steps.
     """
     file = pq.ParquetFile(io.BytesIO(content))
     types = dict(zip(file.schema_arrow.names, file.schema_arrow.types, strict=True))
@@ -31,26 +42,52 @@ def loaded_table(content: bytes) -> pd.DataFrame:
     table = file.read(use_threads=False).replace_schema_metadata(None)
     if any(table[name].null_count for name, kind in COLUMNS.items() if kind != "float64"):  # null is NaN
         raise ValueError("has gaps")
-    return table.to_pandas().astype(COLUMNS)
+    rows = table.to_pandas().astype(COLUMNS)
+    _verify_rows(rows, scenes, engines, dts)
+    return rows
 
 
-def verify_rows(rows: pd.DataFrame, scenes: Collection[str], engines: Collection[str], dts: Collection[float]) -> None:
-    """Raise `ValueError` if a table has rows that a run with these scenes, engines and time steps [s] does not write."""
+def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float]) -> None:
+    """Raise `ValueError` if a table has rows that no such run writes."""
     allowed: dict[str, Collection[object]] = {
         "scene": scenes,
         "engine": engines,
         "verdict": VERDICTS,
-        "kind": get_args(Kind),
+        "kind": [kind for kind in get_args(Kind) if kind != "baseline"],  # which checks add
         "metric": {"", *METRICS, *ENSEMBLE_METRICS},
         "dt": {*dts, np.nan},
     }
     for name, known in allowed.items():
         if not (strange := rows.loc[~rows[name].isin(list(known)), name]).empty:
-            raise ValueError(f"its table has the {name} {strange.iloc[0]!r}, which the run does not have")
-    if lacking := set(scenes) - set(rows["scene"]):
-        raise ValueError(f"its table has no rows of the scene {min(lacking)!r}")
+            raise ValueError(f"has the {name} {shown(strange.iloc[0])}, which the run does not have")
+    if lacking := set(scenes) - set(rows.loc[rows["dt"].notna(), "scene"]):
+        raise ValueError(f"has no rows of the scene {shown(min(lacking))}")
+    for kind, metric, unit in rows[["kind", "metric", "unit"]].drop_duplicates().itertuples(index=False):
+        _verify_kind(kind, metric, unit)
+    of_studies = rows["kind"].isin(["order", "asymptotic_error"])
+    of_ensembles = rows["metric"].isin(list(ENSEMBLE_METRICS))
+    with_ensembles = [name for name, scene in scenes.items() if scene.ensemble is not None]
     texts = {text for name, kind in COLUMNS.items() if kind == "str" for text in rows[name].unique()}
-    if any(printable(text) != text for text in texts):
-        raise ValueError("its table has control characters")
-    if (rows["steps"] < 0).any() or (rows["time_per_step"] < 0.0).any():
-        raise ValueError("its table has negative steps or times")
+    problems = {
+        "two rows of one result": rows[rows["metric"] != ""].duplicated(["scene", "engine", "dt", "metric", "kind", "truth"]).any(),
+        "results without a time step, or fits with one": (rows["dt"].isna() & (rows["metric"] != "") != of_studies).any(),
+        "differences from engines that the run does not have": (~rows.loc[rows["kind"] == "agreement", "truth"].isin(list(engines))).any(),
+        "means of scenes without an ensemble": (of_ensembles & ~rows["scene"].isin(with_ensembles)).any(),
+        "negative steps or times": (rows["steps"] < 0).any() or (rows["time_per_step"] < 0.0).any(),
+        "tolerances that are not above 0": not rows["tolerance"].dropna().between(0.0, np.inf, inclusive="neither").all(),
+        "control characters": any(printable(text) != text for text in texts),
+    }
+    if found := [problem for problem, is_one in problems.items() if is_one]:
+        raise ValueError(f"has {found[0]}")
+
+
+def _verify_kind(kind: str, metric: str, unit: str) -> None:
+    """Raise `ValueError` if no row has this kind of this metric in this unit."""
+    if metric == "":
+        kinds, own = {""}, ""
+    elif metric in ENSEMBLE_METRICS:
+        kinds, own = {"ensemble", "agreement"}, ENSEMBLE_METRICS[metric].unit
+    else:
+        kinds, own = {METRICS[metric].kind, "prediction", "agreement", "order", "asymptotic_error"}, METRICS[metric].unit
+    if kind not in kinds or unit != ("1" if kind == "order" else own):
+        raise ValueError(f"has {metric or 'a remark'} of the kind {kind!r} in the unit {shown(unit)}")

@@ -8,14 +8,17 @@ import json
 import os
 import re
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import fsspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from comparisons.judging.verdicts import VERDICTS
+from comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS
 from scenarios import DropspinError
 
 DESCRIPTION = "sweep.json"
@@ -24,13 +27,29 @@ PARTS_PER_FOLDER = 1000
 """File systems are slow with many files in one folder, and so is listing it."""
 
 
+COLUMNS = MappingProxyType(
+    dict.fromkeys(("key", "scene", "engine", "verdict", "reason"), pa.string())
+    | dict.fromkeys(("job", "seed", "steps"), pa.int64())
+    | dict.fromkeys(("dt", "time_per_step", *STANDARD_METRICS, *STATE_COLUMNS), pa.float64())
+)
+"""The columns of every sweep; axes and requested metrics add others, of numbers or texts."""
+
+
+class _Versions(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow")
+
+    versions: dict[str, str | None]
+
+
 class Description(BaseModel):
     """The required content of `sweep.json`."""
 
-    identity: str
-    jobs: Annotated[int, Field(ge=0)]
-    part_size: Annotated[int, Field(ge=1)]
-    provenance: dict[str, Any]
+    model_config = ConfigDict(strict=True)
+
+    identity: Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
+    jobs: Annotated[int, Field(ge=0, le=2**53)]
+    part_size: Annotated[int, Field(ge=1, le=2**53)]
+    provenance: _Versions
 
 
 class SweepFolder:
@@ -91,7 +110,7 @@ class SweepFolder:
     def write(self, number: int, first: int, last: int, table: pa.Table) -> None:
         """Write a part: the jobs from number `first` up to, not including, `last`."""
         content = io.BytesIO()
-        pq.write_table(table, content, compression="zstd")
+        pq.write_table(table, content, compression="zstd", write_page_checksum=True)
         self._put(self._name(number, first, last), content.getvalue())
 
     def has(self, number: int, first: int, last: int) -> bool:
@@ -117,11 +136,15 @@ class SweepFolder:
         return dict(sorted(paths.items()))
 
     def read(self, path: str, columns: list[str] | None = None) -> pa.Table:
-        """Read a part."""
+        """Read a part.
+
+        Raises:
+            DropspinError: It is damaged, or not a part of a sweep.
+        """
+        content = self._files.cat_file(path)
         try:
-            # Without threads of pyarrow: engine processes are forked in the meantime, and parts are read one at a time.
-            return pq.read_table(io.BytesIO(self._files.cat_file(path)), columns=columns, use_threads=False, pre_buffer=False)
-        except pa.ArrowInvalid:
+            return _read_part(content, columns)
+        except Exception:  # whatever pyarrow raises for a file that is none
             raise DropspinError(f"{path}: is damaged; delete it, and run its jobs again with --resume.") from None
 
     def _name(self, number: int, first: int, last: int) -> str:
@@ -149,3 +172,16 @@ class SweepFolder:
             raise DropspinError(
                 f"{self.where}: is not writable: {error.strerror or error}; the parts written so far are complete."
             ) from None
+
+
+def _read_part(content: bytes, columns: list[str] | None) -> pa.Table:
+    """A part, or some of its columns, if it has those of a sweep."""
+    # Without threads of pyarrow: engine processes are forked in the meantime, and parts are read one at a time.
+    file = pq.ParquetFile(io.BytesIO(content), page_checksum_verification=True)
+    types = dict(zip(file.schema_arrow.names, file.schema_arrow.types, strict=True))
+    if not COLUMNS.items() <= types.items() or not {*types.values()} <= {*COLUMNS.values()}:
+        raise ValueError("has other columns or types than a sweep")
+    verdicts = file.read(columns=["verdict"], use_threads=False)["verdict"]
+    if not set(verdicts.unique().to_pylist()) <= set(VERDICTS):
+        raise ValueError("has other verdicts than a sweep")
+    return file.read(columns=columns, use_threads=False).replace_schema_metadata(None)

@@ -145,7 +145,7 @@ def test_folder_that_holds_something_else_is_refused(tmp_path):
         run_sweep(load_sweep(SPEC | {"dts": [2e-3]}), where, resume=True)
     about = Path(where, "sweep.json")
     content = json.loads(about.read_text())
-    content["provenance"]["versions"]["mujoco"], content["identity"] = "3.1", "another"
+    content["provenance"]["versions"]["mujoco"], content["identity"] = "3.1", "0123456789ab"
     about.write_text(json.dumps(content))
     with pytest.raises(DropspinError, match=r"holds a sweep that was run with mujoco 3.1, now \d.*; choose another folder"):
         run_sweep(load_sweep(SPEC), where, resume=True)

@@ -50,6 +50,15 @@ def dropspin(*arguments: object, cwd: Path | str, **environment: str) -> Done:
     return Done(code if isinstance(code, int) else 0 if code is None else 1, out.getvalue(), err.getvalue())
 
 
+def assert_refused(done: Done, words: str) -> None:
+    """Verify that a command ended with exit code 2 and one line, which has these words."""
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    [line] = done.stderr.splitlines()
+    assert line.startswith("dropspin: ")
+    assert words in line
+
+
 def spawn(*arguments: object, cwd: Path | str, timeout: float = 300.0, **environment: str) -> "subprocess.CompletedProcess[str]":
     """Run the installed command in a process of its own."""
     return subprocess.run(

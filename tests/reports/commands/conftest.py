@@ -1,10 +1,15 @@
 """A user's repository with an engine and three runs of it, for check, accept, compare and history."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 import xmlschema
 from support.cli import dropspin
+
+from comparisons.running.run import run
+from reports.run_folder import write_report
+from scenarios import load
 
 MY_ENGINE = '''
 import os
@@ -59,3 +64,33 @@ def repository(shared, exit_codes):
 def junit_schema():
     """The schema by which Jenkins' xUnit plugin reads JUnit XML; pytest validates its own files by it too."""
     return xmlschema.XMLSchema(str(Path(__file__).parents[1] / "junit-10.xsd"))
+
+
+ENSEMBLE = {
+    "name": "few",
+    "duration": 0.2,
+    "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0},
+    "floor": {"restitution": 0.5, "friction": 0.3},
+    "gravity": {"acceleration": [0.0, -9.81, 0.0]},
+    "start": {"position": [0.0, 0.15, 0.0]},
+    "ensemble": {"size": 3, "seed": 1},
+}
+
+
+@pytest.fixture(scope="session")
+def small():
+    """A run of two scenes, one of them an ensemble."""
+    spin = load("spin-principal").model_dump(exclude_none=True, exclude={"expect"}) | {"duration": 0.2}
+    return run([spin, ENSEMBLE], ["document", "mujoco"], 1e-2)
+
+
+@pytest.fixture(scope="session")
+def small_folder(small, tmp_path_factory):
+    """The run, written."""
+    return write_report(small, tmp_path_factory.mktemp("out") / "run").parent
+
+
+@pytest.fixture
+def copied(small_folder, tmp_path):
+    """A copy of the run, in a folder of its own."""
+    return shutil.copytree(small_folder, tmp_path / "run")

@@ -248,6 +248,24 @@ def test_texts_of_a_study_are_texts_and_pages_load_nothing(opened):
     assert policy.startswith("default-src 'none'; ")
 
 
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_run_no_script_but_their_own(browser, folder, tmp_path, name):
+    """A script, an event handler or an address of a script that got into a page does nothing; without the policy each would run."""
+    marks = "document.documentElement.dataset.ran = 'yes'"
+    added = f'<body><script>{marks}</script><svg onload="{marks}"></svg><img src="data:," onerror="{marks}">'
+    page = (folder / name).read_text(encoding="utf-8")
+    policy = re.search("<meta http-equiv=.*>", page)[0]
+    ran = []
+    for kept in (policy, ""):
+        (tmp_path / name).write_text(page.replace(policy, kept).replace("<body>", added), encoding="utf-8")
+        tab = browser.new_page()
+        tab.goto((tmp_path / name).as_uri())
+        ran.append(tab.locator("html").get_attribute("data-ran"))
+        assert tab.locator("[data-charts] button, [data-replay] button").count() > 0
+        tab.close()
+    assert ran == [None, "yes"]
+
+
 def test_report_without_javascript_shows_all_but_filters_plots_and_replays(opened, results):
     tab = opened("report.html", java_script_enabled=False).tab
     assert tab.locator("#scenes > details:visible").count() == len(results.scenes)

@@ -3,6 +3,8 @@
 The file is longer than 300 lines because its tests share one written folder.
 """
 
+import base64
+import hashlib
 import json
 import re
 import shutil
@@ -17,10 +19,12 @@ import pytest
 from comparisons.results.store import load_results
 from comparisons.running.run import run
 from reports import run_folder
+from reports.html.replay import replay_page
 from reports.html.report import html_report
 from reports.markdown import run_markdown
 from reports.plots import figures
 from reports.plots.figures import report_charts
+from reports.replay import replay_of
 from reports.run_folder import write_report
 from reports.terminal.run_table import print_table
 from reports.views.findings import profile_comparisons
@@ -116,6 +120,15 @@ def test_names_with_markup_are_inert(folder):
     assert "&lt;script&gt;alert(1)&lt;/script&gt;$x_{" in text
     markdown = (folder / "report.md").read_text(encoding="utf-8")
     assert not re.search(r"(?<!\\)<", markdown)
+
+
+def test_the_policy_allows_the_script_of_the_page_alone(results, folder):
+    """By its hash; markup that got into a page could not run one."""
+    replays = [replay_of(results, scene) for scene in results.scenes]
+    for text in ((folder / "report.html").read_text(encoding="utf-8"), replay_page(replays, [[]] * len(replays))):
+        [script] = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        assert f"default-src 'none'; script-src 'sha256-{digest}'; style-src" in text
 
 
 def test_the_page_states_the_verdict_before_any_table(results, folder):

@@ -251,7 +251,7 @@ def _name(row: Mapping[Hashable, Any]) -> str:
 
 def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
     value, tolerance = float(row["value"]), float(f"{row['tolerance']:.2g}")
-    digits = EXTRA_DIGITS if value == 0.0 else max(EXTRA_DIGITS, EXTRA_DIGITS + math.ceil(math.log10(abs(value) / tolerance)))
+    digits = EXTRA_DIGITS if value == 0.0 else max(EXTRA_DIGITS, EXTRA_DIGITS + math.ceil(math.log10(abs(value)) - math.log10(tolerance)))
     line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": row["by"]}
     return line | ({"known_failure": True} if row["known_failure"] else {})
 

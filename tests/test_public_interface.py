@@ -197,7 +197,7 @@ def test_repr_of_an_error_budget_is_a_sentence(errors, start):
         (lambda: ds.run([], "mujoco"), "scenes: got none; give at least one."),
         (lambda: ds.truth_for("drop-ball"), "scene: got 'drop-ball' (str); give a Scenario, as load() returns it."),
         (lambda: ds.measure("drop-ball", 3), "motion: got a int; give a Trajectory, such as simulate() returns."),
-        (lambda: ds.load_results("absent"), "absent: not the folder of a run, or damaged (FileNotFoundError"),
+        (lambda: ds.load_results("absent"), "absent: not the folder of a run, or damaged (absent/run.json: No such file"),
     ],
 )
 def test_a_wrong_argument_ends_in_one_sentence(call, message):

@@ -26,6 +26,7 @@ from scenarios import DropspinError
 from scenarios.body import Table
 from scenarios.errors import did_you_mean
 from scenarios.loading import read_toml
+from scenarios.text import Text
 from scenarios.validation import validated
 
 FORMAT = 3
@@ -33,6 +34,8 @@ FORMAT = 3
 LARGEST_FILE = 50_000_000  # bytes
 EXTRA_DIGITS = 3
 """A value is written with this many digits more than its tolerance needs: the error of writing it is at most 1/200 of the tolerance."""
+LARGEST_RATIO = 1e17
+"""Of a value to its tolerance: more digits than those of a floating-point number say nothing."""
 KEY_LENGTH = 7
 """Digits of the hash that names an acceptance."""
 HEADER = (
@@ -48,8 +51,8 @@ class Acceptance(Table):
     """The date, the reason and the versions of an acceptance."""
 
     date: datetime.date
-    reason: Annotated[str, Field(min_length=1)]
-    versions: dict[str, str]
+    reason: Annotated[Text, Field(min_length=1)]
+    versions: dict[Text, Text]
 
     @property
     def key(self) -> str:
@@ -71,9 +74,9 @@ class _File(Table):
 
     format: Literal[3]
     accepted: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    engines: dict[str, str] = Field(default_factory=dict)
-    scenes: dict[str, str] = Field(default_factory=dict)
-    results: dict[str, dict[str, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
+    engines: dict[Text, Text] = Field(default_factory=dict)
+    scenes: dict[Text, Text] = Field(default_factory=dict)
+    results: dict[Text, dict[Text, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
 
 
 COLUMNS = {**dict.fromkeys(KEY, "str"), "value": "float64", "tolerance": "float64", "unit": "str", "by": "str", "known_failure": "bool"}
@@ -251,7 +254,8 @@ def _name(row: Mapping[Hashable, Any]) -> str:
 
 def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
     value, tolerance = float(row["value"]), float(f"{row['tolerance']:.2g}")
-    digits = EXTRA_DIGITS if value == 0.0 else max(EXTRA_DIGITS, EXTRA_DIGITS + math.ceil(math.log10(abs(value)) - math.log10(tolerance)))
+    ratio = min(max(abs(value) / tolerance, 1.0), LARGEST_RATIO)
+    digits = EXTRA_DIGITS + math.ceil(math.log10(ratio))
     line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": row["by"]}
     return line | ({"known_failure": True} if row["known_failure"] else {})
 

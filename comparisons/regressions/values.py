@@ -63,6 +63,7 @@ def _dts(results: Results) -> list[float]:
     return sorted(map(float, results.provenance["asked"]["dts"]), reverse=True)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # an engine may return 1e300, and a baseline have such a tolerance
 def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     """Results compared with earlier ones.
 

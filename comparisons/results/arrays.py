@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Shapes = Mapping[str, tuple[int | None, ...]]
-"""By name of the array; None is the number of rows, which all arrays share."""
+Shapes = Mapping[str, tuple[int, ...]]
+"""By name of the array."""
 FORMAT = (1, 0)
 """Of NumPy's header; the others are for headers of more than 64 KiB."""
 
@@ -22,13 +22,12 @@ def stored_arrays(arrays: Mapping[str, object]) -> bytes:
     return content.getvalue()
 
 
-def loaded_arrays(content: bytes, shapes: Shapes, most: float) -> dict[str, Array]:
+def loaded_arrays(content: bytes, shapes: Shapes) -> dict[str, Array]:
     """The arrays in a .npz file.
 
     Args:
         content: The content of the file.
         shapes: Names and shapes of the arrays.
-        most: Largest number of rows.
 
     Raises:
         ValueError: It has other arrays, or is damaged.
@@ -36,21 +35,17 @@ def loaded_arrays(content: bytes, shapes: Shapes, most: float) -> dict[str, Arra
     with ZipFile(io.BytesIO(content)) as archive:
         if sorted(archive.namelist()) != sorted(f"{name}.npy" for name in shapes):
             raise ValueError(f"has other arrays than {', '.join(shapes)}")
-        found = {name: _array(archive, name, shape, most) for name, shape in shapes.items()}
-    if len({len(found[name]) for name, shape in shapes.items() if None in shape}) > 1:
-        raise ValueError("its arrays have different lengths")
-    return found
+        return {name: _array(archive, name, shape) for name, shape in shapes.items()}
 
 
-def _array(archive: ZipFile, name: str, shape: tuple[int | None, ...], most: float) -> Array:
+def _array(archive: ZipFile, name: str, shape: tuple[int, ...]) -> Array:
     with archive.open(f"{name}.npy") as file:
         if np.lib.format.read_magic(file) != FORMAT:
             raise ValueError(f"{name}: a format that dropspin does not write")
         given, in_columns, dtype = np.lib.format.read_array_header_1_0(file)
-        rows = given[0] if given and shape[:1] == (None,) and 0 < given[0] <= most else -1
-        if dtype != np.dtype("<f8") or given != tuple(rows if one is None else one for one in shape):
-            raise ValueError(f"{name}: has type {dtype} and shape {given}")
-        data = file.read(8 * math.prod(given))
+        if dtype != np.dtype("<f8") or given != shape:
+            raise ValueError(f"{name}: has type {dtype} and shape {given}; must have float64 and {shape}")
+        data = file.read(8 * math.prod(shape))
         if file.read(1):
-            raise ValueError(f"{name}: has more numbers than its shape {given}")
-    return np.frombuffer(bytearray(data), dtype="<f8").reshape(given, order="F" if in_columns else "C")
+            raise ValueError(f"{name}: has more numbers than its shape {shape}")
+    return np.frombuffer(bytearray(data), dtype="<f8").reshape(shape, order="F" if in_columns else "C")

@@ -60,7 +60,7 @@ def _locked_folder(place: Path, prefix: str) -> tuple[Path, FileLock]:
 
 def _remove_if_abandoned(left: Path, target: Path) -> None:
     """Remove the folder of a process that was killed; an output that it had put aside is put back."""
-    if not left.is_dir():
+    if left.is_symlink() or not left.is_dir():  # a link may lead to any folder
         left.unlink(missing_ok=True)
         return
     try:

@@ -11,32 +11,30 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from comparisons.results.arrays import Shapes, loaded_arrays, stored_arrays
+from comparisons.results.arrays import loaded_arrays, stored_arrays
 from comparisons.results.ensembles import SAMPLES, EnsembleOutcome
 from comparisons.results.results import Results, TrajectoryKey
 from comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
 from comparisons.results.stored_files import file_name, read_stored, sha256
 from comparisons.results.stored_table import loaded_table
 from scenarios import DropspinError, Scenario, SceneError, Trajectory, load
+from scenarios.rotations import length
 
-TRAJECTORY: Shapes = {
-    "t": (None,),
-    "position": (None, 3),
-    "orientation": (None, 4),
-    "velocity": (None, 3),
-    "angular_velocity": (None, 3),
-    "velocity_lag": (),
-}
+TRAJECTORY = tuple(field.name for field in fields(Trajectory))
 OUTCOME = tuple(field.name for field in fields(EnsembleOutcome))
+FEWEST_ROWS = 2
+"""Of a trajectory: metrics take the time step from them."""
 SAME_TIME = 1e-6
 """Largest relative difference of a stored time from its multiple of the time step."""
+SAME_LENGTH = 1e-4
+"""Largest difference of a stored quaternion's length from 1."""
 Kept = TypeVar("Kept")
 
 
 def save(results: Results, folder: Path) -> None:
     """Write a run's data into a folder that exists."""
     checksums: dict[str, str] = {}
-    trajectories = _save_arrays(folder, "trajectories", results.trajectories, tuple(TRAJECTORY), checksums)
+    trajectories = _save_arrays(folder, "trajectories", results.trajectories, TRAJECTORY, checksums)
     ensembles = _save_arrays(folder, "ensembles", results.ensembles, OUTCOME, checksums)
     pd.concat([results.table, results.predictions, results.agreements]).to_parquet(folder / TABLE, index=False)
     checksums[TABLE] = sha256((folder / TABLE).read_bytes())
@@ -100,10 +98,15 @@ def _scene(file: RunFile, name: str) -> Scenario:
 
 
 def _trajectory(content: bytes, scene: Scenario, dt: float) -> Trajectory:
-    found = loaded_arrays(content, TRAJECTORY, scene.duration / dt + 2)
-    if not np.allclose(found["t"], dt * np.arange(len(found["t"])), rtol=SAME_TIME, atol=0.0) or not np.isfinite(found["velocity_lag"]):
-        raise ValueError("its times are not those of its time steps")
+    rows = scene.steps(dt) + 1
+    vectors = dict.fromkeys(("position", "velocity", "angular_velocity"), (rows, 3))
+    found = loaded_arrays(content, {"t": (rows,), **vectors, "orientation": (rows, 4), "velocity_lag": ()})
     velocity_lag = float(found.pop("velocity_lag"))
+    if rows < FEWEST_ROWS or not np.allclose(found["t"], dt * np.arange(rows), rtol=SAME_TIME, atol=0.0) or not np.isfinite(velocity_lag):
+        raise ValueError("its times are not those of its time steps")
+    is_finite = all(np.isfinite(found[name]).all() for name in ("orientation", *vectors))  # what a diverged engine returns is kept
+    if is_finite and not np.allclose(length(found["orientation"]), 1.0, rtol=0.0, atol=SAME_LENGTH):
+        raise ValueError("its orientations are not unit quaternions")
     return Trajectory(**found, velocity_lag=velocity_lag)
 
 
@@ -112,7 +115,7 @@ def _outcome(content: bytes, scene: Scenario, dt: float) -> EnsembleOutcome:
         raise ValueError("its scene has no ensemble")
     size = scene.ensemble.size
     shapes = {"t": (SAMPLES,), "energy": (size, SAMPLES), "rebound": (size,), "rest_time": (size,), "angular_momentum": (size, SAMPLES)}
-    return EnsembleOutcome(**loaded_arrays(content, shapes, size))
+    return EnsembleOutcome(**loaded_arrays(content, shapes))
 
 
 def _arrays(

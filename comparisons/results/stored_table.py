@@ -59,7 +59,7 @@ def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Co
     }
     for name, known in allowed.items():
         if not (strange := rows.loc[~rows[name].isin(list(known)), name]).empty:
-            raise ValueError(f"has the {name} {shown(strange.iloc[0])}, which the run does not have")
+            raise ValueError(f"has the {name} {shown(strange.tolist()[0])}, which the run does not have")
     if lacking := set(scenes) - set(rows.loc[rows["dt"].notna(), "scene"]):
         raise ValueError(f"has no rows of the scene {shown(min(lacking))}")
     for kind, metric, unit in rows[["kind", "metric", "unit"]].drop_duplicates().itertuples(index=False):

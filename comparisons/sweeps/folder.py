@@ -79,8 +79,9 @@ class SweepFolder:
         Raises:
             DropspinError: The folder holds something else.
         """
+        file = f"{self._root}/{DESCRIPTION}"
         try:
-            text = self._files.cat_file(f"{self._root}/{DESCRIPTION}")
+            text = self._files.cat_file(file) if self._files.isfile(file) or not self._files.exists(file) else b""  # a pipe could block
         except FileNotFoundError:
             if self._files.exists(self._root) and (not self._files.isdir(self._root) or self._holds_other_files()):
                 raise DropspinError(
@@ -141,9 +142,11 @@ class SweepFolder:
         Raises:
             DropspinError: It is damaged, or not a part of a sweep.
         """
-        content = self._files.cat_file(path)
+        first, last = map(int, os.path.basename(path).split("-")[:2])
         try:
-            return _read_part(content, columns)
+            if not self._files.isfile(path):  # reading a pipe could last for ever
+                raise ValueError("is not a regular file")
+            return _read_part(self._files.cat_file(path), range(first, last), columns)
         except Exception:  # whatever pyarrow raises for a file that is none
             raise DropspinError(f"{path}: is damaged; delete it, and run its jobs again with --resume.") from None
 
@@ -174,14 +177,14 @@ class SweepFolder:
             ) from None
 
 
-def _read_part(content: bytes, columns: list[str] | None) -> pa.Table:
-    """A part, or some of its columns, if it has those of a sweep."""
+def _read_part(content: bytes, jobs: range, columns: list[str] | None) -> pa.Table:
+    """A part, or some of its columns, if it has those of a sweep, and these jobs."""
     # Without threads of pyarrow: engine processes are forked in the meantime, and parts are read one at a time.
     file = pq.ParquetFile(io.BytesIO(content), page_checksum_verification=True)
     types = dict(zip(file.schema_arrow.names, file.schema_arrow.types, strict=True))
     if not COLUMNS.items() <= types.items() or not {*types.values()} <= {*COLUMNS.values()}:
         raise ValueError("has other columns or types than a sweep")
-    verdicts = file.read(columns=["verdict"], use_threads=False)["verdict"]
-    if not set(verdicts.unique().to_pylist()) <= set(VERDICTS):
-        raise ValueError("has other verdicts than a sweep")
+    known = file.read(columns=["job", "verdict"], use_threads=False)
+    if known["job"].to_pylist() != list(jobs) or not set(known["verdict"].unique().to_pylist()) <= set(VERDICTS):
+        raise ValueError("has other jobs or verdicts than a sweep")
     return file.read(columns=columns, use_threads=False).replace_schema_metadata(None)

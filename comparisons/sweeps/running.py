@@ -77,9 +77,12 @@ def read_sweep(where: str) -> pd.DataFrame:
         One row a job.
 
     Raises:
-        DropspinError: The folder does not hold a sweep.
+        DropspinError: The folder does not hold a sweep, none of its jobs has been run, or a part is damaged.
     """
-    return pa.concat_tables(read_sweep_parts(where)).to_pandas()
+    tables = list(read_sweep_parts(where))
+    if not tables:
+        raise DropspinError(f"{where}: no job has been run yet; run the sweep with --resume.")
+    return pa.concat_tables(tables).to_pandas()
 
 
 def read_sweep_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
@@ -93,11 +96,15 @@ def read_sweep_parts(where: str, columns: list[str] | None = None) -> Iterator[p
         An iterator over the parts, in the order of the jobs, each a PyArrow table.
 
     Raises:
-        DropspinError: The folder does not hold a sweep.
+        DropspinError: The folder does not hold a sweep, or a part is damaged.
     """
-    folder = SweepFolder(where)
+    folder, schema = SweepFolder(where), None
     for _, path in _parts(where):
-        yield folder.read(path, columns)
+        table = folder.read(path, columns)
+        schema = schema or table.schema
+        if table.schema != schema:
+            raise DropspinError(f"{path}: has other columns than the parts before it; delete it, and run its jobs again with --resume.")
+        yield table
 
 
 def _parts(where: str) -> Iterator[tuple[int, str]]:

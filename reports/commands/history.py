@@ -62,7 +62,10 @@ def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
 def _load_runs(found: dict[str, Path]) -> dict[str, Any]:
     """The results of runs, by the shortest names that are unique."""
     from comparisons.results.store import load_results
+    from scenarios.text import printable
 
-    short = {place: path.resolve().name for place, path in found.items()}
+    short = {place: printable(path.resolve().name) for place, path in found.items()}
     alike = Counter(short.values())
-    return {short[place] if alike[short[place]] == 1 else place: load_results(path, arrays=False) for place, path in found.items()}
+    return {
+        short[place] if alike[short[place]] == 1 else printable(place): load_results(path, arrays=False) for place, path in found.items()
+    }

@@ -40,6 +40,9 @@ def replay_command(
         raise click.UsageError(f"--gif {gif}: give the file the ending .gif.")
     if gif is not None and output is not None:
         raise click.UsageError(f"-o {output} is for the page, which is not written beside a GIF; leave it out.")
+    file = Path(run) / "replay.html" if output is None else Path(output)
+    if output is None and file.is_symlink():  # the run may be somebody else's, and the link lead to any file
+        raise DropspinError(f"{file}: is a link; delete it, or choose a file with -o.")
     results = load_results(Path(run))
     found = [replay_of(results, name, dt) for name in scenes or results.scenes]
     shown = [one for one in found if one is not None]
@@ -61,9 +64,8 @@ def replay_command(
     for one in shown:
         at_this_step = {key: motion for key, motion in results.trajectories.items() if key[2] == one.dt}
         charts.append(time_charts(replace(results, trajectories=at_this_step), one.scene.name))
-    file = str(Path(run) / "replay.html") if output is None else output
     with written_whole(file) as unfinished:
         unfinished.write_text(replay_page(shown, charts), encoding="utf-8")
     click.echo(f"Written: {file}")
     if opens:
-        click.launch(file)
+        click.launch(str(file))

@@ -54,6 +54,7 @@ def plot_rest_of_ensemble(results: Results, scene_name: str, axes: "Axes") -> No
     draw(rest_of_ensemble(results, scene_name), axes)
 
 
+@np.errstate(all="ignore")  # an engine may return 1e300
 def _spread(t: Array, values: Array, style: dict[str, Any]) -> Line:
     every = stride(len(t))
     low, middle, high = np.quantile(values[:, ::every], [0.1, 0.5, 0.9], axis=0)

@@ -170,16 +170,17 @@ def first(name):
     return lambda folder: replace_file(folder, f"{name}/{min(path.name for path in (folder / name).iterdir())}", b"")
 
 
+ROWS = ("t", "position", "orientation", "velocity", "angular_velocity")
 ARRAYS = {
     "empty trajectory": first("trajectories"),
     "empty ensemble": first("ensembles"),
     "huge shape": huge,
     "too few rows in one array": arrays("trajectories", position=lambda x: x[:-1]),
-    "no rows": arrays("trajectories", **dict.fromkeys(("t", "position", "orientation", "velocity", "angular_velocity"), lambda x: x[:0])),
-    "too many rows": arrays(
-        "trajectories",
-        **dict.fromkeys(("t", "position", "orientation", "velocity", "angular_velocity"), lambda x: np.concatenate([x, x])),
-    ),
+    "no rows": arrays("trajectories", **dict.fromkeys(ROWS, lambda x: x[:0])),
+    "one row": arrays("trajectories", **dict.fromkeys(ROWS, lambda x: x[:1])),
+    "one row less": arrays("trajectories", **dict.fromkeys(ROWS, lambda x: x[:-1])),
+    "too many rows": arrays("trajectories", **dict.fromkeys(ROWS, lambda x: np.concatenate([x, x]))),
+    "orientations of length 2": arrays("trajectories", orientation=lambda x: 2.0 * x),
     "other shape": arrays("trajectories", position=lambda x: x[:, :2]),
     "other type": arrays("trajectories", position=lambda x: x.astype("f4")),
     "objects": arrays("trajectories", position=lambda x: x.astype(object)),
@@ -267,3 +268,25 @@ def test_a_link_to_a_private_file_is_not_copied(copied, tmp_path):
     assert dropspin("report", "run", cwd=tmp_path).returncode == 0
     assert not (copied / "replay.html").exists()
     assert (tmp_path / "private").read_text() == "secret"
+
+
+def test_a_replay_is_not_written_through_a_link(copied, tmp_path):
+    """The link of a stranger's folder may lead to any file of the user."""
+    (tmp_path / "private").write_text("secret")
+    (copied / "replay.html").unlink(missing_ok=True)
+    (copied / "replay.html").symlink_to(tmp_path / "private")
+    assert_refused(dropspin("replay", "run", "--no-open", cwd=tmp_path), "run/replay.html: is a link")
+    assert (tmp_path / "private").read_text() == "secret"
+    assert dropspin("replay", "run", "--no-open", "-o", "page.html", cwd=tmp_path).returncode == 0
+
+
+def test_links_in_place_of_unfinished_folders_are_removed_alone(copied, tmp_path):
+    """They look like those of a killed process; what they lead to stays."""
+    private = tmp_path / "private"
+    (private / "old").mkdir(parents=True)
+    (tmp_path / ".run-unfinished-abcdefgh").symlink_to(private)
+    (tmp_path / ".out-unfinished-abcdefgh").symlink_to(private)
+    assert dropspin("report", "run", cwd=tmp_path).returncode == 0
+    assert dropspin("replay", "run", "--no-open", "-o", "out", cwd=tmp_path).returncode == 0
+    assert sorted(private.rglob("*")) == [private / "old"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "private", "run"]

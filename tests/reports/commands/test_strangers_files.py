@@ -1,9 +1,13 @@
 """Studies, sweeps and baselines of somebody else, and the names in runs: refused in one line, or written as text only."""
 
 import json
+import os
+import re
 import shutil
 
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from support.cli import assert_refused, dropspin
 from support.run_folders import contents
@@ -83,6 +87,18 @@ def test_section_of_anything_else_is_refused(content, copied, tmp_path):
     assert contents(tmp_path) == before
 
 
+def test_names_of_runs_are_printed_without_control_characters(small_folder, tmp_path):
+    """The name of a folder may be of any characters, and be no text."""
+    for name in (b"one\x1b[2J", b"two\xff"):
+        shutil.copytree(small_folder, tmp_path / "runs" / os.fsdecode(name))
+    done = dropspin("history", "runs", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "one\\x1b[2J" in (tmp_path / "out/history.csv").read_text(encoding="utf-8") + (tmp_path / "out/history.md").read_text(
+        encoding="utf-8"
+    )
+    assert not any("\x1b" in text for text in (done.stdout, done.stderr, *map(bytes.decode, contents(tmp_path / "out").values())))
+
+
 @pytest.fixture(scope="module")
 def sweep(tmp_path_factory):
     """A sweep of two jobs."""
@@ -92,9 +108,15 @@ def sweep(tmp_path_factory):
     return where
 
 
-def sweep_table(**columns):
+def sweep_table(change=lambda table: table, **columns):
+    """Change the table of a part, or replace columns by one value each."""
+
     def damage(part):
-        pd.read_parquet(part).assign(**columns).to_parquet(part, index=False)
+        table = change(pq.read_table(part))
+        for name, value in columns.items():
+            old = table.schema.get_field_index(name)
+            table = (table.remove_column(old) if old >= 0 else table).append_column(name, pa.array([value] * len(table)))
+        pq.write_table(table, part)
 
     return damage
 
@@ -109,6 +131,11 @@ def sweep_table(**columns):
         sweep_table(verdict="fine"),
         sweep_table(engine=1.0),
         sweep_table(steps="many"),
+        sweep_table(job=1),
+        sweep_table(lambda table: table[:1]),
+        sweep_table(lambda table: table.take([0, 1, 1])),
+        lambda part: (part.unlink(), os.mkfifo(part)),
+        lambda part: (part.unlink(), part.mkdir()),
     ],
 )
 def test_damaged_part_of_a_sweep_is_refused(damage, sweep, tmp_path):
@@ -116,6 +143,43 @@ def test_damaged_part_of_a_sweep_is_refused(damage, sweep, tmp_path):
     [part] = copied.rglob("*.parquet")
     damage(part)
     with pytest.raises(DropspinError, match=r"\.parquet: is damaged; delete it, and run its jobs again with --resume\.$"):
+        read_sweep(str(copied))
+
+
+def test_part_of_another_sweep_is_refused(sweep, tmp_path):
+    """Its columns are those of a sweep, and not of this one."""
+    copied = shutil.copytree(sweep, tmp_path / "out")
+    [part] = copied.rglob("*.parquet")
+    _, second, identity = part.name.split("-")
+    other = shutil.copy(part, part.with_name(f"{second}-{int(second) + 2:016d}-{identity}"))
+    sweep_table(lambda table: table.set_column(0, "job", pa.array([2, 3])))(other)
+    assert list(read_sweep(str(copied))["job"]) == [0, 1, 2, 3]
+    sweep_table(other=1.0)(other)
+    with pytest.raises(DropspinError, match="has other columns than"):
+        read_sweep(str(copied))
+
+
+def test_changed_part_with_the_columns_of_a_sweep_is_read(sweep, tmp_path):
+    """The reference of the refused ones."""
+    copied = shutil.copytree(sweep, tmp_path / "out")
+    [part] = copied.rglob("*.parquet")
+    sweep_table(verdict="passed")(part)
+    assert list(read_sweep(str(copied))["verdict"]) == ["passed"] * 2
+
+
+def test_description_of_a_sweep_that_is_a_pipe_is_refused(sweep, tmp_path):
+    """Reading it would block for ever."""
+    copied = shutil.copytree(sweep, tmp_path / "out")
+    (copied / "sweep.json").unlink()
+    os.mkfifo(copied / "sweep.json")
+    with pytest.raises(DropspinError, match=r"its sweep\.json is not a valid description of a sweep"):
+        read_sweep(str(copied))
+
+
+def test_sweep_without_a_part_has_no_table(sweep, tmp_path):
+    copied = shutil.copytree(sweep, tmp_path / "out")
+    shutil.rmtree(copied / "parts")
+    with pytest.raises(DropspinError, match="no job has been run"):
         read_sweep(str(copied))
 
 
@@ -143,6 +207,10 @@ def test_damaged_description_of_a_sweep_is_refused(name, value, sweep, tmp_path)
         b"format = 3\n[results.a.b.c.d]\nvalue = 1",
         b"format = 3\n[scenes]\na = 'x'\n[results.a.b.'0.01'.energy_error]\nvalue = nan\ntolerance = 1.0\nby = 'x'",
         b"format = 3\nx = " + DEEP.encode(),
+        b"format = 3\n[engines]\na = '\\u001b[2J'".replace(b"'", b'"'),
+        b'format = 3\n[scenes]\n"\\u001b[2J" = "x"',
+        b'format = 3\n[scenes]\na = "x"\n[results.a."\\u001b[2J"]',
+        b'format = 3\n[accepted.k]\ndate = 2026-01-01\nreason = "\\u001b[2J"\nversions = {}',
         b"\xff\xfe",
     ],
 )
@@ -150,3 +218,21 @@ def test_damaged_baseline_is_refused(content, copied, tmp_path):
     (tmp_path / "b.toml").write_bytes(content)
     done = dropspin("check", "run", "--baseline", "b.toml", cwd=tmp_path)
     assert_refused(done, "b.toml")
+
+
+@pytest.mark.parametrize(("value", "tolerance"), [("1e308", "5e-324"), ("1e308", "1e308"), ("5e-324", "1e308")])
+@pytest.mark.parametrize("engine", ["mujoco", "other"])
+def test_extreme_numbers_of_a_baseline_are_compared_and_kept(engine, value, tolerance, copied, tmp_path):
+    """Of results that the run has, which are compared with them, and of those that it lacks, which are written again."""
+    assert dropspin("accept", "run", "--baseline", "b.toml", "--reason", "x", cwd=tmp_path).returncode == 0
+    text = (tmp_path / "b.toml").read_text()
+    line = next(line for line in text.splitlines() if line.startswith("results.few.mujoco"))
+    extreme = re.sub("value = .*, tolerance = .*, by", f"value = {value}, tolerance = {tolerance}, by", line)
+    kept = text.replace(line, extreme) if engine == "mujoco" else text + extreme.replace("mujoco", engine) + "\n"
+    for verb in (["check", "run"], ["accept", "run", "--reason", "y"]):
+        (tmp_path / "b.toml").write_text(kept)
+        done = dropspin(*verb, "--baseline", "b.toml", cwd=tmp_path)
+        assert done.returncode in (0, 1), done.stderr
+        assert done.stderr == ""
+    if engine == "other":
+        assert extreme.replace("mujoco", engine).partition(" = ")[0] in (tmp_path / "b.toml").read_text()

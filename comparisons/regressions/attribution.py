@@ -6,6 +6,7 @@ from itertools import chain
 from typing import Any, Literal
 
 from comparisons.results.provenance import MEASURING
+from scenarios.text import printable
 
 Stamp = Mapping[str, Any]
 Origin = Literal["engine", "adapter", "settings", "surroundings", "either", "absent", "nothing"]
@@ -43,7 +44,9 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
     """What differs of an engine itself, the most likely cause first."""
     found: dict[Origin, str] = {}
     before, after = (stamp["settings"].get(engine, {}) for stamp in (old, new))
-    versions = [{str(settings["version"]) for settings in stamped.values() if "version" in settings} for stamped in (before, after)]
+    versions = [
+        {printable(str(settings["version"])) for settings in stamped.values() if "version" in settings} for stamped in (before, after)
+    ]
     name = engine.split("[", maxsplit=1)[0]
     if versions[0] != versions[1] and all(versions):
         found["engine"] = f"{name} {_listed(versions[0])} → {_listed(versions[1])}"
@@ -92,7 +95,7 @@ def _changed_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> li
     pairs = [(before[case], after[case]) for case in before if case in after]
     names = dict.fromkeys(name for pair in pairs for settings in pair for name in settings)
     differ = [name for name in names if any(one.get(name) != other.get(name) for one, other in pairs)]
-    return [name for name in differ if name not in ("version", "numba")]
+    return [printable(name) for name in differ if name not in ("version", "numba")]
 
 
 def _listed(versions: Collection[Any]) -> str:

@@ -11,6 +11,8 @@ from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from typing import Any
 
+from scenarios.text import printable
+
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 STAMPED = (*MEASURING, "mujoco", "pybullet", "rapier3d", "dartpy", "drake")
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))
@@ -43,7 +45,7 @@ def versions_behind(stamp: Mapping[str, Any]) -> dict[str, str]:
     engines = {label.split("[")[0]: settings.get("version") for label, settings in first_settings(stamp).items()}
     engines.pop("document", None)  # part of dropspin
     packages = {package: stamp["versions"][package] for package in MEASURING}
-    return {name: str(found) for name, found in (packages | engines | {"python": stamp["python"]}).items() if found}
+    return {name: printable(str(found)) for name, found in (packages | engines | {"python": stamp["python"]}).items() if found}
 
 
 def first_settings(stamp: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:

@@ -67,7 +67,7 @@ class _Provenance(_Table):
     code: Text
     names: Texts
     adapters: dict[Text, Text | None]
-    settings: dict[Text, dict[Text, dict[Text, Any]]]
+    settings: dict[Text, dict[Text, dict[str, Any]]]
     settings_digests: Texts = {}
     named: list[Text] = []
 

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from support.cli import assert_refused, dropspin
-from support.run_folders import contents
+from support.run_folders import change_json, change_table, contents
 
 from comparisons.running.run import run
 from comparisons.sweeps.running import read_sweep, run_sweep
@@ -35,6 +35,23 @@ def test_history_writes_only_into_its_folder(name, small, tmp_path):
     page = (tmp_path / "deep/er/out/history.md").read_text()
     assert f"]({picture})" in page
     assert "<img" not in page.replace("\\<", "")
+
+
+@pytest.mark.parametrize("verb", [("compare", "good", "run"), ("history", "good", "run", "-o", "out")])
+def test_settings_are_printed_without_control_characters(verb, small_folder, copied, tmp_path):
+    """They are what an engine's adapter reported: their names and values may be of any characters."""
+    shutil.copytree(small_folder, tmp_path / "good")
+
+    def change(content):
+        for settings in content["provenance"]["settings"]["mujoco"].values():
+            settings |= {"version": "\x1b[2J", "\x1b[3J": "\x1b[4J"}
+
+    change_json(copied, change)
+    change_table(copied, lambda frame: frame.assign(value=frame["value"] + 1.0))
+    done = dropspin(*verb, cwd=tmp_path)
+    assert done.returncode in (0, 1), done.stderr
+    assert "\\x1b[2J" in done.stdout
+    assert not any("\x1b" in text for text in (done.stdout, done.stderr))
 
 
 def chart(**changes):

@@ -36,7 +36,7 @@ COLUMNS = MappingProxyType(
 
 
 class _Versions(BaseModel):
-    model_config = ConfigDict(strict=True, extra="allow")
+    model_config = ConfigDict(strict=True)
 
     versions: dict[str, str | None]
 

@@ -23,7 +23,7 @@ SPIN_ULPS = 64
 UNIT_TOLERANCE = 1e-5
 """How far a quaternion's length may be from 1; single precision drifts by 1e-7."""
 
-LONGEST_SETTINGS = 100_000  # bytes, as JSON
+LONGEST_SETTINGS, DEEPEST_SETTINGS = 100_000, 20  # bytes as JSON; tables and lists within each other
 
 
 class BuildMismatch(Exception):
@@ -108,10 +108,18 @@ def verified_settings(settings: Any) -> dict[str, Any]:
         if len(text.encode()) > LONGEST_SETTINGS:
             raise ValueError(f"they are longer than {LONGEST_SETTINGS} bytes")
         found: dict[str, Any] = json.loads(text)
+        if _depth(found) > DEEPEST_SETTINGS:
+            raise ValueError(f"they are nested more than {DEEPEST_SETTINGS} deep")
         json.dumps(found, ensure_ascii=False).encode()  # lone surrogates cannot be stored
     except (TypeError, ValueError, RecursionError) as error:
         raise BuildMismatch(f"settings cannot be stored as JSON: {described(error)}") from None
     return found
+
+
+def _depth(content: Any) -> int:
+    """How deep mappings and lists are nested."""
+    inner = content.values() if isinstance(content, dict) else content if isinstance(content, list) else None
+    return 0 if inner is None else 1 + max(map(_depth, inner), default=0)
 
 
 def verified_refusal(answer: Any) -> str | None:

@@ -61,6 +61,7 @@ RETURNED = [
     ("Drifting.settings = {'n': 10**5000}", "settings cannot be stored as JSON: ValueError"),
     ("Drifting.settings = {'s': '\\ud800'}", "settings cannot be stored as JSON: Unicode"),
     ("Drifting.settings = {'s': 'x' * 10**6}", "longer than 100000 bytes"),
+    ("Drifting.settings = {'deep': " + "[" * 50 + "]" * 50 + "}", "nested more than 20 deep"),
     ("Drifting.settings = 7", "settings cannot be stored as JSON: TypeError"),
     (CYCLE, "settings cannot be stored as JSON: ValueError"),
     (DEEP, "settings cannot be stored as JSON: RecursionError"),

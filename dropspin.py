@@ -120,7 +120,7 @@ _LOCATIONS = {
     for module, names in _HOMES.items()
     for public, home in ((name, name) if isinstance(name, str) else name for name in names)
 }
-"""Of each public name the module it is defined in, and its name there."""
+"""For each public name, the module that defines it, and its name there."""
 
 __all__ = sorted(_LOCATIONS)  # noqa: PLE0605 - a list of strings, computed
 
@@ -141,8 +141,8 @@ def __dir__() -> list[str]:
 def main() -> None:
     """Run the command line.
 
-    Neither the working directory nor a user's folder on PYTHONPATH hides dropspin's modules or installed packages: the first is not on
-    Python's path, except in the processes of engines of one's own, and the others come last.
+    Neither the working directory nor a user's folder on PYTHONPATH can hide dropspin's modules or installed packages. The working directory
+    is on Python's path only in the processes of the user's own engines, and folders on PYTHONPATH come last.
     """
     home, here = os.path.dirname(os.path.abspath(__file__)), os.getcwd()
     named = [os.path.abspath(place) for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]

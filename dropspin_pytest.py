@@ -1,9 +1,9 @@
-"""The pytest plugin: comparisons of engines with exact solutions, as tests. docs/pytest.md says how to use it.
+"""The pytest plugin: comparisons of engines with exact solutions, as tests. docs/pytest.md documents its use.
 
-dropspin runs in processes of its own. A user's repository may have packages named `scenarios`, `reports` or `comparisons`, which pytest
-imports in this process; so this process never imports dropspin's packages of these names, and dropspin never imports the user's.
+dropspin runs in separate processes. A user's repository may have packages named `scenarios`, `reports` or `comparisons`, which pytest
+imports in this process. Therefore this process never imports dropspin's packages of these names, and dropspin never imports the user's.
 
-The plugin is one file, although a long one: a second file would be one more top-level module in every user's environment.
+The plugin is a single long file, because a second file would be another top-level module in every user's environment.
 """
 
 import hashlib
@@ -31,16 +31,16 @@ STOPPED = BREAKDOWNS | {"declined", "missing"}
 BASELINE = "dropspin-baseline.toml"
 """The file that `dropspin accept` writes by default."""
 MOST_FAILURES = 12
-"""Failures that the message of one test lists."""
+"""Largest number of failures in the message of a test."""
 REPRODUCE_OUTPUT = ("-o", "out/again")
-"""Options of the command that reproduces a failure: it must not replace a run that somebody wants to keep."""
+"""Options of the command that reproduces a failure, which must not replace a run that the user wants to keep."""
 SUBJECTS = {
     "order": "order of",
     "asymptotic_error": "asymptotic",
     "accepted order": "accepted order of",
     "accepted asymptotic error": "accepted asymptotic",
 }
-"""What precedes the metric's name in a message, by a row's kind, for accepted results by its column `truth`."""
+"""The prefix of the metric's name in a message, by the kind of a row, or, for accepted results, by the column `truth`."""
 MARKER = "dropspin(*scenes, engine=None, dt=None): call the test once for each scene and engine, with the run as dropspin_result."
 
 Row = dict[str, Any]
@@ -53,11 +53,11 @@ class Result:
 
     Attributes:
         scene: Name of the scene.
-        rows: The rows that `dropspin run --json` prints: one for each measurement, with its value, bounds, verdict and reason.
-        folder: The run's folder, with the report and the data; `dropspin check` and `dropspin accept` take it.
-        given: The scene's name or path, as the command line takes it.
-        engines: For each engine label in the rows, the name the engine is run by.
-        dts: The time steps that were asked for [s]; empty for the default ones.
+        rows: The rows that `dropspin run --json` prints, one for each measurement, with value, bounds, verdict and reason.
+        folder: The run's folder, with the report and the data; `dropspin check` and `dropspin accept` accept it as their argument.
+        given: The scene's name or path, as given on the command line.
+        engines: The names by which engines are run, by the label in the rows.
+        dts: The requested time steps [s]; empty for the default ones.
     """
 
     scene: str
@@ -76,7 +76,7 @@ class Result:
             engine: Label of the engine in the rows; optional if only one engine ran.
 
         Raises:
-            LookupError: The metric was not measured, or for several engines.
+            LookupError: The metric was not measured, or was measured for several engines.
         """
         measured = [row for row in self.rows if row["kind"] in ("truth", "invariant", "ensemble") and engine in (None, row["engine"])]
         found = [row for row in measured if row["metric"] == metric and (dt is None or math.isclose(row["dt"], dt, rel_tol=1e-9))]
@@ -93,7 +93,7 @@ class Result:
 
 
 class Runs:
-    """The runs of this session; each is made once, by the worker of pytest-xdist that needs it first."""
+    """The runs of this session. Each is made once, by the worker of pytest-xdist that first needs it."""
 
     def __init__(self, config: pytest.Config) -> None:
         self.config, self.root = config, config.rootpath
@@ -109,7 +109,7 @@ class Runs:
         self._results: dict[str, Result] = {}
 
     def _readable(self, given: str) -> str:
-        """A file of the command line, as a path from the root directory, where dropspin is started."""
+        """A file given on the command line, as a path relative to the root directory, in which dropspin is started."""
         path = self.config.invocation_params.dir / given
         try:
             path.open("rb").close()
@@ -119,14 +119,14 @@ class Runs:
 
     @property
     def folder(self) -> Path:
-        """The folder of the runs: in pytest's cache, or without a cache a temporary one of this session."""
+        """The folder of the runs, in pytest's cache, or, without a cache, a temporary folder of this session."""
         cache = getattr(self.config, "cache", None)
         folder = Path(tempfile.gettempdir(), f"{NAME}-{self.session}") if cache is None else cache.mkdir(NAME)
         folder.mkdir(exist_ok=True)
         return folder
 
     def run(self, scene: Scene, engines: Sequence[str] | None = None, dts: Sequence[float] | None = None) -> Result:
-        """Run a scene, or return the run if this session has made it already."""
+        """Run a scene, or return the run if this session has already made it."""
         __tracebackhide__ = True
         from filelock import FileLock
 
@@ -174,7 +174,7 @@ class Runs:
             node: The test.
             result: The run.
             rows: The rows.
-            pytrace: Whether the failure shows the lines of the test that called.
+            pytrace: Whether the failure shows the lines of the calling test.
         """
         __tracebackhide__ = True
         fails = FAILING | {"missing"} if self.named else FAILING
@@ -189,7 +189,7 @@ class Runs:
             pytest.skip(reasons[0] if reasons else "the scene has no expectation at these time steps")
 
     def _failure(self, result: Result, failing: Sequence[Row]) -> str:
-        """What fails, with the commands that reproduce and accept it."""
+        """The failures, with the commands that reproduce and accept them."""
         orders = {(row["scene"], row["engine"], row["metric"]): row["value"] for row in result.rows if row["kind"] == "order"}
         lines = []
         for row in failing[:MOST_FAILURES]:
@@ -230,7 +230,7 @@ def _title(scene: Scene) -> str:
 
 
 def _error(done: subprocess.CompletedProcess[str]) -> str:
-    """Why a command failed: the last line for bad input and missing engines, all of stderr for an internal error."""
+    """The reason why a command failed: the last line for bad input and missing engines, all of stderr for an internal error."""
     error = done.stderr.strip()
     return error.splitlines()[-1] if done.returncode in (2, 3) and error else error or f"dropspin ended with exit code {done.returncode}"
 
@@ -246,7 +246,7 @@ def _written(folder: Path, scene: Mapping[str, Any]) -> Path:
 
 
 def _bound(row: Row) -> float | None:
-    """The bound that a value is nearest to, or beyond."""
+    """The bound that a value exceeds, or to which it is nearest."""
     value, lower, upper = row["value"], row["lower"], row["upper"]
     if value is None or lower is None or upper is None:
         return upper if lower is None else lower
@@ -254,7 +254,7 @@ def _bound(row: Row) -> float | None:
 
 
 def _share(row: Row) -> float:
-    """The value as a share of what is allowed: above 1 it fails; 0 without a bound."""
+    """The value relative to its bound, above 1 if it fails; 0 without a bound."""
     value, bound = row["value"], _bound(row)
     if value is None:
         return math.inf
@@ -298,7 +298,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker, and check the options; bad ones end the session with one line."""
+    """Register the marker, and check the options; invalid ones end the session with one line."""
     config.addinivalue_line("markers", MARKER)
     config.stash[RUNS] = Runs(config)
 
@@ -310,7 +310,7 @@ def pytest_configure_node(node: Any) -> None:
 
 
 def _arguments(*scenes: Scene, engine: str | Sequence[str] | None = None, dt: float | Sequence[float] | None = None) -> tuple[Any, ...]:
-    """The arguments of the marker; Python refuses all others."""
+    """The arguments of the marker; Python refuses other arguments."""
     return scenes, engine, dt
 
 
@@ -336,7 +336,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture(scope="session")
 def dropspin_run(pytestconfig: pytest.Config) -> Callable[..., Result]:
-    """Call it with a scene, and with engine= and dt= if they are not the session's; it returns the run: .rows, .value(metric), .folder."""
+    """Call with a scene, and with engine= and dt= if they differ from the session's; returns the run: .rows, .value(metric), .folder."""
 
     def run(scene: Scene, engine: str | Sequence[str] | None = None, dt: float | Sequence[float] | None = None) -> Result:
         __tracebackhide__ = True
@@ -347,7 +347,7 @@ def dropspin_run(pytestconfig: pytest.Config) -> Callable[..., Result]:
 
 @pytest.fixture
 def dropspin_check(request: pytest.FixtureRequest, dropspin_run: Callable[..., Result]) -> Callable[..., Result]:
-    """Call it like dropspin_run, or with a run; it fails the test if a row of the run fails."""
+    """Call like dropspin_run, or with a run; fails the test if a row of the run fails."""
 
     def check(scene: Scene | Result, engine: str | Sequence[str] | None = None, dt: float | Sequence[float] | None = None) -> Result:
         __tracebackhide__ = True
@@ -360,7 +360,7 @@ def dropspin_check(request: pytest.FixtureRequest, dropspin_run: Callable[..., R
 
 @pytest.fixture
 def dropspin_result(request: pytest.FixtureRequest, dropspin_run: Callable[..., Result]) -> Result:
-    """The run of the scene and engine that a test marked with dropspin is called for."""
+    """The run of the scene and engine for which a test marked with dropspin is called."""
     if not hasattr(request, "param"):
         pytest.fail("dropspin_result needs a marker with a scene, such as @pytest.mark.dropspin('drop-ball')", pytrace=False)
     result = dropspin_run(*request.param)
@@ -372,7 +372,7 @@ def dropspin_result(request: pytest.FixtureRequest, dropspin_run: Callable[..., 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Attach the judged rows to the report, which carries them from workers of pytest-xdist too."""
+    """Attach the judged rows to the report, which also transfers them from workers of pytest-xdist."""
     report = yield
     if rows := item.stash.get(JUDGED, []):
         vars(report)[NAME] = rows[:]

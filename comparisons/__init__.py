@@ -1,1 +1,1 @@
-"""Engines run, measured and judged: stages, and the studies on top of them. The public interface is the module `dropspin`."""
+"""The stages that run, measure and judge engines, and the studies that use them. The public interface is the module `dropspin`."""

@@ -1,6 +1,6 @@
-"""Calibration: the settings that give an engine a restitution, ready to paste, and what was measured with them.
+"""Calibration: the settings that give a coefficient of restitution, ready to paste, and results measured with them.
 
-The measured program is the one that is pasted: it is executed here, and its motion is measured.
+The program to paste is executed here, and its motion is measured.
 """
 
 import math
@@ -21,7 +21,9 @@ from scenarios import DropspinError, Scenario, load
 
 Array = NDArray[np.float64]
 Motion = Callable[[float, int, float], tuple[list[float], list[float]]]
-"""From the height of a fall [m], steps and time step [s] to heights of the lowest point [m] and vertical speeds [m/s]."""
+"""A function of the height of a fall [m], the number of steps and the time step [s], that returns heights of the lowest point [m] and
+vertical speeds [m/s].
+"""
 Shape = Literal["ball", "box"]
 
 HALF_HEIGHT = 0.1  # m
@@ -39,9 +41,9 @@ LONG = 3.0  # s
 DROPS = 8
 SUNK = 0.1  # m
 GAIN = 1.02
-"""Relative to the height of the drop; a body that rises higher has gained energy."""
+"""Height, relative to the drop height, above which a body counts as having gained energy."""
 FINELY = 1.01
-"""The ratio to which the largest stable step is bisected."""
+"""The ratio to which the largest stable time step is bisected."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Calibration:
-    """The settings of an engine for a restitution, and what was measured with them.
+    """The settings of an engine for a coefficient of restitution, and the results measured with them.
 
     Attributes:
         engine: The engine's label.
@@ -82,18 +84,18 @@ def calibrate(
     *,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
 ) -> Calibration:
-    """The settings that give a restitution at a time step, measured.
+    """Compute the settings that give a coefficient of restitution at a time step, and measure their effect.
 
     Args:
         engine: The engine or its name; its options choose among its contact models.
-        restitution: From 0 to 1.
+        restitution: Coefficient of restitution, from 0 to 1.
         dt: Time step [s].
         friction: `none`, `infinite` or a Coulomb coefficient.
         shape: The body that falls flat onto a floor: `ball` or `box`.
         resources: The processor time [s] and memory [bytes] that the measurement may use.
 
     Returns:
-        The settings, the reason for each, programs to paste, and what was measured with them.
+        The settings, the reason for each, programs to paste, and the results measured with them.
 
     Raises:
         DropspinError: The engine has no such settings, or broke down with them.
@@ -125,7 +127,7 @@ def drop(restitution: float, friction: str | float = "none", shape: Shape = "bal
 
 
 def _calibrated(entry: EngineEntry, scene: Scenario, dt: float) -> Calibration | str:
-    """In the engine's process: its settings with the programs, and the measurements of these; or why there are none."""
+    """The settings of the engine, the programs and their measurements, or the reason why there are none; runs in its process."""
     engine = entry.adapter
     refusal = verified_refusal(engine.declines(scene))
     if refusal is not None:
@@ -150,25 +152,25 @@ def measurements(motion: Motion, dt: float) -> list[Measured]:
     if not rests:
         low, slow = np.full_like(low, np.nan), np.full_like(slow, np.nan)
     half, _, _ = _bounces(motion, dt / 2.0)
-    at_impact = f"over {START_PHASES} drops from {DROP:g} m, whose impacts are spread evenly within a step"
+    at_impact = f"over {START_PHASES} drops from {DROP:g} m, whose impacts are spread evenly within a time step"
     at_rest = f"dropped from {1e3 * LOW_DROP:g} mm, in the fifth second" if rests else "the body does not come to rest within 5 s"
     step, how = _largest_step(motion, dt)
     return [
         Measured("restitution", float(speeds.mean()), "1", f"speed just after the impact over the speed just before, mean {at_impact}"),
-        Measured("restitution, least", float(speeds.min()), "1", "of those"),
-        Measured("restitution, most", float(speeds.max()), "1", "of those"),
-        Measured("restitution by height", float(heights.mean()), "1", "√(height of the rebound / height of the drop), mean of those"),
-        Measured("penetration", deepest, "m", f"deepest of those; at impact a step covers {IMPACT * dt:.3g} m"),
+        Measured("restitution, least", float(speeds.min()), "1", "of these drops"),
+        Measured("restitution, most", float(speeds.max()), "1", "of these drops"),
+        Measured("restitution by height", float(heights.mean()), "1", "√(rebound height / drop height), mean over these drops"),
+        Measured("penetration", deepest, "m", f"largest of these drops; at impact the body falls {IMPACT * dt:.3g} m in one step"),
         Measured("depth at rest", float(-low.mean()), "m", at_rest),
         Measured("jitter at rest", float(np.ptp(low)), "m", f"highest minus lowest position, {at_rest}"),
         Measured("speed at rest", float(np.abs(slow).max()), "m/s", f"greatest, {at_rest}"),
-        Measured("restitution at half the step", float(half.mean()), "1", "with the same settings, which may hold for their step only"),
+        Measured("restitution at half the step", float(half.mean()), "1", "with the same settings, which may be valid for one step only"),
         Measured("largest stable step", step, "s", how),
     ]
 
 
 def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
-    """Ratios of speeds, roots of ratios of heights, and the greatest depth [m], of drops whose impacts are spread within a step."""
+    """Ratios of speeds, roots of ratios of heights, and the largest depth [m], of drops that strike at different times in a step."""
     ratios, roots, deepest = [], [], 0.0
     for part in (np.arange(START_PHASES) + 0.5) / START_PHASES:
         drop = DROP + IMPACT * dt * part
@@ -185,7 +187,7 @@ def _bounces(motion: Motion, dt: float) -> tuple[Array, Array, float]:
 def _largest_step(motion: Motion, dt: float) -> tuple[float, str]:
     """The largest time step at which a body neither gains energy nor sinks, and how it was found."""
     if not _is_stable(motion, dt):
-        return math.nan, f"at {dt:g} s already the body gains 2 % of its height, or sinks by {SUNK:g} m"
+        return math.nan, f"unstable already at {dt:g} s: the body gains 2 % of its height, or sinks by {SUNK:g} m"
     stable = dt
     while (longer := min(2.0**0.125 * stable, LARGEST_STEP)) > stable and _is_stable(motion, longer):
         stable = longer

@@ -1,6 +1,6 @@
 """The method of Huamin Wang's lecture note "Rigid Body Dynamics", executable: arrays in, arrays out.
 
-This package knows no scene and no engine. README.md in this folder lists for each equation its function and its test.
+This package imports no code of scenes or engines. README.md in this folder lists the function and the test of each equation.
 """
 
 from reference_impl import sources  # noqa: F401  # isort: skip  # before anything that is compiled from them

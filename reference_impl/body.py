@@ -1,4 +1,4 @@
-"""The body and the world that acts on it: the public description, and the form in which kernels take it."""
+"""The body and the world that acts on it: the public description, and the form that the kernels use."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -20,8 +20,9 @@ class Body:
     Attributes:
         mass: M [kg], or shape (B,).
         inertia: I_body about the centre of mass, in the body frame [kg m²], shape (3, 3) or (B, 3, 3).
-        points: Vertices from the centre of mass, in the body frame [m], shape (n, 3) or (B, n, 3).
-        radius: Rounding radius of the vertices [m], or shape (B,): 0 in the lecture note; a ball is one point at its centre, rounded by R.
+        points: Vertices relative to the centre of mass, in the body frame [m], shape (n, 3) or (B, n, 3).
+        radius: Rounding radius of the vertices [m], or shape (B,): 0 in the lecture note; a ball is one vertex at its centre with the
+            rounding radius R.
     """
 
     mass: float | Array
@@ -38,7 +39,7 @@ class Floor(NamedTuple):
     friction: float | Array
     """Coulomb's coefficient: 0 for a frictionless floor (eq 15), infinity for sticking (eq 17)."""
     rest_speed: float | Array = 0.0
-    """Normal speed [m/s] below which restitution is 0 (section 3.2); 0 switches the rule off."""
+    """Normal speed [m/s] below which restitution is 0 (section 3.2); 0 disables this rule."""
 
 
 @dataclass(frozen=True)
@@ -58,15 +59,15 @@ class World:
 
 
 class KernelBody(NamedTuple):
-    """A body as the kernels see it."""
+    """A body in the form that the kernels use."""
 
     mass: float
     inertia: Mat3
     inverse_inertia: Mat3
     moments: Vec3
-    """Principal moments [kg m²], the one that differs most from the others last."""
+    """Principal moments [kg m²]; the last one is the one that differs most from the others."""
     axes: Quat
-    """From the principal frame to the body's."""
+    """Rotation from the principal frame to the body frame."""
     points: Array
     radius: float
     reach: float

@@ -8,7 +8,10 @@ N = Vec3(0.0, 1.0, 0.0)
 
 @compiled
 def along_normal(a):
-    """The component along N, a · N. Written out, because a compiler that follows IEEE rules keeps the products with N's zeros."""
+    """The component along N, a · N.
+
+    It is written out, because a compiler that follows IEEE rules also computes the products with the zeros of N.
+    """
     return a.y
 
 

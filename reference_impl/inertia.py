@@ -1,4 +1,4 @@
-"""Mass and inertia: eq 2 and 8 of the lecture note, and the solids that engines build from a shape."""
+"""Mass and inertia: eq 2 and 8 of the lecture note, and the solid bodies that engines build from a shape."""
 
 import math
 
@@ -14,10 +14,10 @@ def total_mass(masses: NDArray[np.float64]) -> float:
 def vertex_inertia(points: NDArray[np.float64], masses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Eq 8 with its masses: I_body = Σ mᵢ (pᵢᵀpᵢ 1 − pᵢpᵢᵀ).
 
-    The lecture note prints the formula without mᵢ; masses of 1 give it as printed, for any mass of the body.
+    The lecture note prints the formula without mᵢ; masses of 1 give the printed formula, for any mass of the body.
 
     Args:
-        points: Vertices in the body frame, from the centre of mass [m], shape (n, 3).
+        points: Vertices relative to the centre of mass, in the body frame [m], shape (n, 3).
         masses: Mass of each vertex [kg], shape (n,).
 
     Returns:

@@ -58,7 +58,7 @@ class Parts:
 def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[..., int]:
     """The loop that records each `every`-th state of the bodies of some blocks, and counts the steps whose contact did not converge.
 
-    Its arrays hold `width` bodies to a block, as `blocks` arranges them: one (a number is then a float), or `lanes.WIDTH`.
+    Its arrays hold `width` bodies in each block, as `blocks` arranges them: one (a number is then a float), or `lanes.WIDTH`.
     """
     gravity_of = read_gravity if parts.gravity else read_nothing
     damping_of = read_damping if parts.damping else read_nothing
@@ -124,12 +124,12 @@ def _record(recorded, block, row, x, q, v, w):
 
 
 def blocks(array: Array, width: int) -> Array:
-    """An array of shape (B, …), arranged as a kernel of that width takes it."""
+    """An array of shape (B, …), arranged for a kernel of the given width."""
     return np.ascontiguousarray(array) if width == 1 else lanes.side_by_side(array)
 
 
 def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callable[..., Any]:
-    """Compile a kernel: IEEE rules (1/0 is inf), no reassociation, Python's lock let go, kept on disk where that can be written.
+    """Compile a kernel with IEEE rules (1/0 is inf), without reassociation and without Python's lock; cache it if the disk allows.
 
     Args:
         function: The kernel.
@@ -141,7 +141,7 @@ def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callab
 
 @contextmanager
 def _cache_folder(other_sources: tuple[Path, ...]) -> Iterator[bool]:
-    """Point numba at this package's own folder while a kernel is declared; the user's setting is left as it was."""
+    """Make numba use this package's cache folder while a kernel is declared; the user's setting is restored afterwards."""
     with _declaring:
         kept = config.CACHE_DIR
         base = Path(kept) if kept else sources.PACKAGE / "__pycache__"

@@ -1,7 +1,8 @@
 """SIMD lanes: `WIDTH` bodies in one processor register, for the ensemble kernel.
 
 `Lanes` is a number to numba and a vector of doubles to LLVM. The kernels, written for one number, compile for it unchanged. Each operation
-is the IEEE operation in each lane, so a body in an ensemble has the same bits as alone. Nothing in this module runs in plain Python.
+is the IEEE operation in each lane, so the motion of a body in an ensemble is bit for bit that of a single body. Nothing in this module runs
+in plain Python.
 
 It is longer than other modules because numba must be given each operator, function and memory access of the new type.
 """
@@ -28,11 +29,11 @@ Array = NDArray[np.float64]
 
 FEATURES = cpu_target.target_context.codegen().magic_tuple()[2].split(",")  # of the processor that numba compiles for
 WIDTH = 16 if "+avx512f" in FEATURES else 8 if "+avx" in FEATURES else 4
-"""Two registers: while one operation is in progress, the next can start."""
+"""Two registers, so that one operation can start while another is in progress."""
 
 
 class LanesType(NumberLike):
-    """A float64 of each of `WIDTH` bodies."""
+    """A float64 for each of `WIDTH` bodies."""
 
     def __init__(self) -> None:
         super().__init__("lanes")
@@ -45,7 +46,7 @@ class LanesType(NumberLike):
 
 
 class MaskType(types.Type):
-    """A truth value of each of `WIDTH` bodies."""
+    """A truth value for each of `WIDTH` bodies."""
 
     def __init__(self) -> None:
         super().__init__("mask")

@@ -1,4 +1,4 @@
-"""The methods by name: which leaf stands at which place of Algorithm 1, and what its module declares about itself."""
+"""The methods by name: the module that implements each step of Algorithm 1, and the properties that the module declares."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from reference_impl.rotations import note as note_rotation
 from reference_impl.step import DAMPING_ORDER, TRANSLATION_DISCRETISATION, TRANSLATION_ORDER
 
 Leaf = ModuleType
-"""A module with one method, and the facts about it:
+"""A module with one method and its properties:
 
 - `ORDER`: its order of accuracy in dt, infinite if it is exact, None if it claims none.
-- `RUNS_IN_LANES`: whether it can work on many bodies in the lanes of a register.
+- `RUNS_IN_LANES`: whether it can process many bodies in the lanes of a register.
 - `DISCRETISATION`, of a rotation: the name of the discretisation, which engines of the same discretisation share.
 - `ANY_FRICTION`, of a law: whether it takes a coefficient of friction between 0 and infinity.
 """
 KernelFunction = Callable[..., Any]
-"""A function of kernel values that can stand at one place of `step.advance`."""
+"""A function of kernel values that can be called at one place of `step.advance`."""
 
 ROTATIONS: Mapping[str, Leaf] = {
     "note": note_rotation,
@@ -44,10 +44,10 @@ COLLIDE: Mapping[str, Mapping[str, KernelFunction]] = {
 
 @dataclass(frozen=True)
 class Methods:
-    """One leaf for each place; the defaults are those of the lecture note.
+    """One method for each place of the algorithm; the defaults are those of the lecture note.
 
     Raises:
-        ValueError: There is no such leaf, or the contact does not work with the law.
+        ValueError: A method does not exist, or the contact treatment does not work with the law.
     """
 
     rotation: str = "note"
@@ -70,7 +70,7 @@ class Methods:
 
     @property
     def runs_in_lanes(self) -> bool:
-        """Whether bodies can be worked on in the lanes of a register."""
+        """Whether bodies can be processed in the lanes of a register."""
         return all(leaf.RUNS_IN_LANES for leaf in (ROTATIONS[self.rotation], *self._floor_leaves))
 
     @property
@@ -79,7 +79,7 @@ class Methods:
         return bool(LAWS[self.law].ANY_FRICTION)
 
     def order(self, *, gravity: bool, damping: bool, floor: bool) -> float | None:
-        """Order of accuracy in dt of a motion: the lowest of the parts that it needs; None if one of them claims none."""
+        """Order of accuracy in dt of a motion: the lowest of the parts that are used; None if one of them claims none."""
         orders: list[float | None] = [ROTATIONS[self.rotation].ORDER]
         orders += [TRANSLATION_ORDER] if gravity else []
         orders += [DAMPING_ORDER] if damping else []
@@ -88,11 +88,11 @@ class Methods:
         return min(claimed) if len(claimed) == len(orders) else None
 
     def discretisation(self, *, tumbles: bool) -> str:
-        """Name of the discretisation of a flight: the rotation's, or where its choice does not matter the translation's."""
+        """Name of the discretisation of a flight: that of the rotation, or that of the translation if the rotation has no effect."""
         return str(ROTATIONS[self.rotation].DISCRETISATION if tumbles else TRANSLATION_DISCRETISATION)
 
     @property
     def _floor_leaves(self) -> list[Leaf]:
-        """The leaves that act on a floor only."""
+        """The methods that are used only with a floor."""
         correction = CORRECTIONS[self.correction]
         return [LAWS[self.law], CONTACTS[self.contact], *([correction] if correction else [])]

@@ -1,4 +1,4 @@
-"""Parameters that may differ from body to body: checked, packed into rows of numbers, and read by the kernels."""
+"""Parameters that may differ from body to body. They are checked and packed into rows of numbers, which the kernels read."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -84,7 +84,7 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
         "rest_speed": (floor.rest_speed, (), "0 or more, in m/s", _is_not_negative),
         "mass": (body.mass, (), "a number above 0, in kg", _is_above_zero),
         "inertia": (body.inertia, (3, 3), "a symmetric, positive definite 3 x 3 matrix, in kg m²", _is_inertia),
-        "points": (points, (vertices, 3), "finite numbers, in m, for one vertex at least", is_finite),
+        "points": (points, (vertices, 3), "finite numbers, in m, for at least one vertex", is_finite),
         "radius": (body.radius, (), "0 or more, in m", _is_not_negative),
     }
 
@@ -103,7 +103,7 @@ def _is_not_negative(values: Array) -> NDArray[np.bool_]:
 
 
 MIN_MOMENT_RATIO = 1e-13
-"""Least moment over the largest: a smaller one is 0 but for rounding, as about the line of collinear points."""
+"""Smallest ratio of two moments of inertia; a smaller one is 0 up to rounding, as for collinear points."""
 MIN_LARGEST_MOMENT = 1e-290  # kg m²; so that the inverse is finite too
 MAX_ASYMMETRY = 1e-12  # of the largest entry
 
@@ -243,5 +243,5 @@ def _read_matrix(load, columns, block, first):
 
 @compiled
 def read_nothing(load, columns, block):
-    """A part that the world does not have."""
+    """A value for a part that the world does not have."""
     return None

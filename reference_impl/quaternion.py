@@ -7,7 +7,7 @@ from reference_impl.vectors import Mat3, Quat, Vec3, compiled, transpose
 
 @compiled
 def product(a, b):
-    """Eq 5: the rotation by b, then by a."""
+    """Eq 5: the rotation by b followed by that by a."""
     return Quat(
         a.w * b.x + b.w * a.x + (a.y * b.z - a.z * b.y),
         a.w * b.y + b.w * a.y + (a.z * b.x - a.x * b.z),
@@ -57,17 +57,17 @@ def rotation_matrix(q):
 
 @compiled
 def to_world(q, a):
-    """R a, from the body's frame to the world's.
+    """R a, from the body frame to the world frame.
 
-    Divided by q·q, which rounding leaves off 1, always to the same side: without the division, a spin that is transformed to the body and
-    back at every step would drift.
+    The result is divided by q·q, which differs from 1 by rounding, always with the same sign. Without the division, an angular velocity
+    that is transformed to the body frame and back at every step would drift.
     """
     return (rotation_matrix(q) @ a) / _square(q)
 
 
 @compiled
 def to_body(q, a):
-    """Rᵀ a, from the world's frame to the body's."""
+    """Rᵀ a, from the world frame to the body frame."""
     return (transpose(rotation_matrix(q)) @ a) / _square(q)
 
 

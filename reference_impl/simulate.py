@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class UnsolvedContact(RuntimeWarning):
-    """In some steps the impulses of `contact=sequential` did not converge."""
+    """The impulses of `contact=sequential` did not converge in some steps."""
 
 
 def step(
@@ -40,13 +40,13 @@ def step(
         world: What acts on it.
         dt: Time step [s], a number or shape (B,).
         forces: Force on each vertex, in the world frame [N], shape (n, 3) or (B, n, 3) (eq 9). None: no forces.
-        methods: The method at each place of the algorithm. None: those of the lecture note.
+        methods: The methods. None: those of the lecture note.
 
     Returns:
         The next states, shape (13,) or (B, 13).
 
     Raises:
-        ValueError: An argument is not a number, has the wrong shape, or describes no possible body. The text names it.
+        ValueError: An argument is not a number, has the wrong shape, or describes no possible body. The message names the argument.
 
     Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithms 1 and 2.
     """
@@ -68,8 +68,8 @@ def simulate(
 ) -> Array:
     """Advance one state, or an ensemble of them, by many steps, recording each `every`-th.
 
-    An argument that is given for each of B bodies (states, masses, time steps, …) makes it an ensemble of B; an argument that is given
-    once applies to all. A body moves in an ensemble exactly as it does alone, to the last bit, for any number of threads.
+    If an argument (states, masses, time steps, …) is given for each of B bodies, the simulation is an ensemble of B; an argument that is
+    given once applies to all bodies. A body moves in an ensemble exactly as it does alone, to the last bit, for any number of threads.
 
     Args:
         states: As in `step`, shape (13,) or (B, 13).
@@ -77,9 +77,9 @@ def simulate(
         world: What acts on it.
         dt: Time step [s], a number or shape (B,).
         steps: Number of steps.
-        every: Steps between two rows of the result. A remainder of steps at the end is not taken.
+        every: Number of steps between two rows of the result. Remaining steps at the end are not taken.
         methods: As in `step`.
-        threads: Number of threads that share an ensemble. None: as many as this process may use processors, where that saves time.
+        threads: Number of threads that share an ensemble. None: the number of processors that this process may use, if this saves time.
             Ctrl-C takes effect between blocks of bodies; one body runs to its end.
 
     Returns:
@@ -89,7 +89,7 @@ def simulate(
         ValueError: As in `step`.
 
     Warns:
-        UnsolvedContact: `contact=sequential` reached its limit of sweeps; the text says in how many steps.
+        UnsolvedContact: `contact=sequential` reached its limit of sweeps; the message gives the number of these steps.
     """
     simulator = Simulator(body, world, dt, methods)
     rows = simulator.run(states, steps, every, threads=threads)
@@ -98,7 +98,7 @@ def simulate(
 
 
 class Simulator:
-    """Bodies in a world, checked and converted once, for many simulations.
+    """Bodies in a world, which are checked and converted once for many simulations.
 
     Attributes:
         unsolved_steps: Number of steps so far in which the impulses of `contact=sequential` did not converge.
@@ -118,7 +118,7 @@ class Simulator:
         self.unsolved_steps = 0
 
     def run(self, states: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None, threads: int | None = None) -> Array:
-        """The states from `states` on, shape (…, 1 + steps // every, 13); arguments as in `simulate`, and `forces` as in `step`."""
+        """The states, beginning with `states`, shape (…, 1 + steps // every, 13); arguments as in `simulate`, and `forces` as in `step`."""
         columns, points, is_ensemble = self._parameters
         starts = checked("state", states, (13,), "finite numbers, the orientation not the zero quaternion", _is_state)
         on_vertices = None if forces is None else checked("forces", forces, points.shape[1:], "finite numbers, in N", is_finite)
@@ -183,13 +183,13 @@ def _assert_law_fits(methods: Methods, friction: Array) -> None:
 
 
 def _can_fall_without_turning(body: Body, world: World) -> bool:
-    """Whether the bodies are balls that only their own spin or sliding can turn: no gravity along a floor with friction."""
+    """Whether the bodies are balls that rotate only if they do so initially or slide: there is no gravity along a floor with friction."""
     is_ball = np.all(np.asarray(body.radius) > 0.0) and not np.any(body.points)
     return bool(is_ball and (not _grips(world) or world.gravity is None or not np.any(np.asarray(world.gravity)[..., [0, 2]])))
 
 
 def _is_without_spin(states: Array, world: World) -> bool:
-    """Whether no body spins, nor slides on a floor with friction; such balls never turn, and the rotation is left out."""
+    """Whether no body rotates initially, and none slides on a floor with friction; if so, the rotation is left out."""
     return not np.any(states[:, SPIN]) and not (_grips(world) and np.any(states[:, [7, 9]]))
 
 

@@ -1,13 +1,15 @@
-"""Processors that this process may use, and blocks of work shared among threads."""
+"""The number of processors that this process may use, and the distribution of work among threads."""
 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 STEPS_PER_TASK = 3_000_000
-"""Steps, of all its bodies, in one task of a thread: few enough to share the work evenly, and to stop soon at Ctrl-C."""
+"""Number of steps, over all bodies, in one task of a thread, small enough for even distribution of the work and for prompt stops at
+Ctrl-C.
+"""
 MIN_STEPS_FOR_THREADS = 300_000
-"""Steps, of all bodies, below which starting threads takes longer than they save."""
+"""Number of steps, over all bodies, below which starting threads takes longer than it saves."""
 
 
 def usable_cores() -> int:
@@ -19,10 +21,10 @@ def share_out(fill: Callable[[int, int], int], count: int, work: int, threads: i
     """Fill all blocks and add up what the calls return.
 
     Args:
-        fill: Fills the blocks from one number up to, not including, another.
+        fill: A function that fills the blocks from one number up to, but not including, another.
         count: Number of blocks.
-        work: Steps of all bodies in one block.
-        threads: Number of threads. None: as many as this process may use processors, where the work is worth it.
+        work: Number of steps of all bodies in one block.
+        threads: Number of threads. None: the number of processors that this process may use, if there is enough work.
     """
     if count == 1:
         return fill(0, 1)

@@ -1,8 +1,8 @@
-"""The value types that the equations are written in: `Vec3`, `Quat`, `Mat3`.
+"""The value types of the equations: `Vec3`, `Quat`, `Mat3`.
 
-Each is a named tuple with operators, so that a line of a kernel reads as in the lecture note: `v + dt * g`, `R @ I_body @ transpose(R)`. An
-operator is one plain function: the method of the class calls it in Python, and numba compiles the same source, so that interpreted and
-compiled arithmetic round alike.
+Each is a named tuple with operators, so that a line of a kernel has the form of the lecture note: `v + dt * g`, `R @ I_body @
+transpose(R)`. An operator is a plain function. In Python the method of the class calls it, and numba compiles the same source, so that
+interpreted and compiled arithmetic have the same rounding.
 """
 
 import operator
@@ -15,7 +15,7 @@ from numba.extending import overload, register_jitable
 compiled = register_jitable(forceinline=True)
 """Decorates a function of kernel values: plain Python when called from Python, inlined into the loop of any kernel that calls it.
 
-A call that is not inlined passes the state and the body, about sixty numbers, through memory, which takes half of a step's time.
+A call that is not inlined passes the state and the body, about sixty numbers, through memory, which takes half of the time of a step.
 """
 
 
@@ -136,7 +136,7 @@ class Mat3(NamedTuple):
 def select(mask, a, b):
     """`a` where the mask is true, else `b`; numbers or vectors.
 
-    Kernels branch with `select` and `any_`: both sides are evaluated, so that the same source serves one body and the lanes of many.
+    Kernels branch with `select` and `any_`, which evaluate both sides, so that the same source is valid for one body and for many in lanes.
     """
     return a if mask else b
 
@@ -172,7 +172,7 @@ def cross_matrix(r):
 
 @compiled
 def transpose(m):
-    """The matrix with rows and columns exchanged."""
+    """The transposed matrix."""
     return Mat3(
         Vec3(m.row1.x, m.row2.x, m.row3.x),
         Vec3(m.row1.y, m.row2.y, m.row3.y),

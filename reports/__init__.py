@@ -1,1 +1,1 @@
-"""What people and CI read: commands, views, the terminal, HTML, plots, replays, JUnit and Markdown."""
+"""The output for users and CI: commands, views, the terminal, HTML, plots, replays, JUnit and Markdown."""

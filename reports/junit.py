@@ -1,4 +1,4 @@
-"""JUnit XML of a run's checks, as CI servers read it: a suite for each engine, a case for each row that was judged."""
+"""JUnit XML of a run's checks for CI servers: a test suite for each engine, a test case for each row that was judged."""
 
 import math
 from collections.abc import Hashable, Mapping
@@ -21,7 +21,7 @@ def junit_xml(results: Results, baseline: str | None = None) -> bytes:
 
     Args:
         results: The run, with the rows of a check if there was one.
-        baseline: The baseline file it was compared with, for the commands that reproduce failures.
+        baseline: The baseline file it was compared with, for the commands that reproduce failures; None if there was none.
     """
     document = JUnitXml("dropspin")
     frame = results.table.assign(broke_down=results.breakdowns)
@@ -63,5 +63,5 @@ def _with_text(result: Failure | Error, text: str) -> Failure | Error:
 
 
 def _printable(text: str) -> str:
-    """A text without the characters that XML cannot contain; an engine's error message may have any."""
+    """A text without the characters that XML cannot contain; the error message of an engine may contain such characters."""
     return "".join(sign if sign in "\n\t" or sign.isprintable() else "�" for sign in text)

@@ -1,4 +1,4 @@
-"""Markdown pages: the report of a run in short, summaries of checks and comparisons for a pull request, a history."""
+"""Markdown pages: a short report of a run, summaries of checks and comparisons for pull requests, and histories."""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,7 +14,7 @@ from reports.views.failures import Failure, grouped
 from reports.views.run import Overview
 
 MOST_SENTENCES = 24
-"""Sentences on the failures of one engine in a summary; JUnit and JSON have all."""
+"""Largest number of sentences on the failures of one engine in a summary; JUnit and JSON have all failures."""
 
 
 def run_markdown(results: Results, summary: Overview) -> str:
@@ -38,7 +38,7 @@ def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Seq
 
 
 def compare_markdown(changes: Changes) -> str:
-    """What changed between two runs."""
+    """The changes between two runs."""
     return page("compare.md", held=not len(changes.regressions), tables=compare.tables(changes), sentences=compare.sentences(changes))
 
 
@@ -48,5 +48,5 @@ def history_markdown(runs: int, sentences: Sequence[str], pictures: Mapping[str,
 
 
 def _tally(rows: pd.DataFrame) -> dict[str, int]:
-    """How many checks of an engine passed, failed, and so on."""
+    """The number of checks of an engine with each verdict."""
     return {str(verdict): int(count) for verdict, count in rows["verdict"].value_counts().items()}

@@ -1,4 +1,4 @@
-"""Output of studies: a folder that is created before the work, and tables as CSV and JSON."""
+"""Output of studies: a folder that is created before the study runs, and tables as CSV and JSON."""
 
 import csv
 import json
@@ -11,15 +11,15 @@ from comparisons.results.output import unfinished_folder
 from scenarios import DropspinError
 
 SECTION = "section.json"
-"""The file of a study that a report includes."""
+"""The file from which a report reads a study."""
 
 
 @contextmanager
 def folder_made(folder: str) -> Iterator[Path]:
-    """An empty folder in which to write the files of a study; at the end they take their places in the study's folder.
+    """An empty folder for the files of a study, which are moved to the study's folder at the end.
 
-    The folder is created before the work, so that one that cannot be written fails then. An error or an interrupt leaves the files of an
-    earlier study as they were. On leaving, created folders that stayed empty are removed.
+    The study's folder is created before the study runs, so that a folder that cannot be written is reported at once. After an error or an
+    interrupt, the files of an earlier study are unchanged, and created folders that are empty are removed.
 
     Raises:
         DropspinError: The folder or a file in it cannot be written.
@@ -43,7 +43,7 @@ def folder_made(folder: str) -> Iterator[Path]:
 
 
 def _move_all(new: Path, folder: Path) -> None:
-    """Move files to a folder. The section, from which a report takes the study, is absent until the others have been moved."""
+    """Move files to a folder. The section, from which a report reads the study, is moved last."""
     files = sorted(new.iterdir(), key=lambda file: file.name == SECTION)
     if files and files[-1].name == SECTION:
         (folder / SECTION).unlink(missing_ok=True)
@@ -52,7 +52,7 @@ def _move_all(new: Path, folder: Path) -> None:
 
 
 def write_table(folder: Path, stem: str, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows twice: as CSV, and as JSON with numbers as numbers."""
+    """Write rows as CSV, and as JSON, in which numbers stay numbers."""
     with (folder / f"{stem}.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns)
         writer.writeheader()

@@ -44,7 +44,7 @@ def _markdown_cell(text: str) -> str:
 
 
 def _markdown_code(text: str) -> str:
-    """Text as Markdown code; the fence is longer than any run of backticks in it."""
+    """Text as Markdown code; the fence is longer than any sequence of backticks in the text."""
     fence = "`" * (1 + max((len(found) for found in re.findall("`+", text)), default=0))
     room = " " if len(fence) > 1 else ""
     return f"{fence}{room}{text}{room}{fence}"

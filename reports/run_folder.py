@@ -1,4 +1,4 @@
-"""The folder of a run: written completely or not at all; it replaces only an earlier run."""
+"""The folder of a run. It is written completely or not at all, and replaces only an earlier run."""
 
 import os
 import shutil
@@ -34,13 +34,13 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Sectio
     Args:
         results: The run.
         folder: The folder; it is created if it does not exist.
-        sections: Sections of studies, for the report.
+        sections: Sections of studies to include in the report.
 
     Returns:
         The path of report.html.
 
     Raises:
-        DropspinError: The folder holds something that is not a run, or cannot be written.
+        DropspinError: The folder holds files that are not of a run, or cannot be written.
     """
     with run_folder(folder) as unfinished:
         fill(results, unfinished, sections)
@@ -70,10 +70,10 @@ def _write_plots(results: Results, folder: Path, kinds: Collection[str]) -> None
 
 @contextmanager
 def run_folder(folder: str | Path) -> Iterator[Path]:
-    """An empty temporary folder beside the requested one. If the block succeeds, it replaces the requested folder; else it is deleted.
+    """An empty temporary folder, which replaces the requested folder if the block succeeds, and is deleted otherwise.
 
     Raises:
-        DropspinError: On entering, if the folder holds something else or cannot be written.
+        DropspinError: The requested folder holds files that are not of a run, or cannot be written; raised on entering the block.
     """
     target = Path(os.path.realpath(folder))
     made = []
@@ -102,9 +102,9 @@ PARTS = "[0-9]*"
 
 
 class MeasuredScenes:
-    """The scenes of a run that were measured already, on disk beside the folder of the run.
+    """The results of the scenes that were already measured, stored beside the folder of the run.
 
-    A run that is interrupted or killed leaves them there, for `--resume`; a run that succeeds removes them.
+    If a run is interrupted or killed, they stay there for `--resume`; a run that succeeds removes them.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -123,16 +123,16 @@ class MeasuredScenes:
         return len(list(self._path.glob(PARTS)))
 
     def parts(self) -> list[Results]:
-        """The results of the scenes that were kept."""
+        """The stored results, by scene."""
         return [load_results(path) for path in sorted(self._path.glob(PARTS))]
 
     def clear(self) -> None:
-        """Remove them."""
+        """Remove the stored results."""
         shutil.rmtree(self._path, ignore_errors=True)
 
 
 def _swap(new: Path, target: Path, old: Path) -> None:
-    """Put the new folder in the place of an old one, which is put aside; if that fails, put the old one back."""
+    """Replace an old folder by the new one; if this fails, restore the old one."""
     try:
         if target.exists():
             target.rename(old)
@@ -144,13 +144,13 @@ def _swap(new: Path, target: Path, old: Path) -> None:
 
 
 def _assert_replaceable(given: str | Path, target: Path) -> None:
-    """Raise `DropspinError` if writing a run there would destroy something else."""
+    """Raise `DropspinError` if writing a run there would delete files that are not of a run."""
     if not target.exists():
         return
     if not target.is_dir():
-        raise DropspinError(f"{given}: is a file; choose a folder.")
+        raise DropspinError(f"{given}: this is a file; choose a folder.")
     if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
-        raise DropspinError(f"{given}: the working directory, or a mount point, cannot be replaced; choose a folder inside it.")
+        raise DropspinError(f"{given}: the working directory and mount points cannot be replaced; choose a folder inside it.")
     known = _files_of_run(target)
     strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
     if strangers:

@@ -1,4 +1,4 @@
-"""The section of a study: a Markdown page of its own, and a part of the report of a run."""
+"""The section of a study: a separate Markdown page, which is also a part of the report of a run."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -28,9 +28,9 @@ class Section:
 
     Attributes:
         title: The title.
-        parts: Each with its `kind`: `heading` and `text` (content), `list` (items), `table` (rows: texts by column) or `charts` (name, and
-            charts, the data of each).
-        pictures: The charts of each picture, by name, as long as they are not from a file.
+        parts: Mappings with a `kind` and the keys of this kind: `heading` and `text` have `content`, `list` has `items`, `table` has `rows`
+            (texts by column), and `charts` has `name` and `charts` (the data of each chart).
+        pictures: The charts of each picture, by name; empty for a section that was read from a file.
     """
 
     title: str
@@ -61,7 +61,7 @@ class Section:
         self.pictures[name] = charts
 
     def write(self, folder: Path, stem: str) -> None:
-        """Write the Markdown page, its pictures, and `section.json`, from which a report takes the section."""
+        """Write the Markdown page, its pictures, and `section.json`, from which a report reads the section."""
         (folder / FILE).write_text(json.dumps({"title": self.title, "parts": self.parts}, indent=1), encoding="utf-8")
         for name, charts in self.pictures.items():
             save_svg(figure_of(charts), folder / f"{file_name(name)}.svg")
@@ -105,7 +105,7 @@ def read_section(folder: str) -> Section:
     """The section that a study wrote to its folder: texts, which a page escapes, and the data of charts, from which they are drawn.
 
     Raises:
-        DropspinError: The folder has no section, or a damaged one.
+        DropspinError: The folder has no section, or its section is damaged.
     """
     try:
         found = _File.model_validate_json(read_stored(Path(folder), FILE))

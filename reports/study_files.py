@@ -1,4 +1,4 @@
-"""The files of the studies: tables as CSV and JSON, a Markdown page, figures, and the section for the report of a run."""
+"""The files that a study writes: tables as CSV and JSON, a Markdown page, figures, and the section for the report of a run."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +18,7 @@ from reports.views import history, limits, tradeoff
 def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
     """Write `limits.csv`, `limits.json`, `limits.md` and a figure per scene."""
     write_table(folder, "limits", limits.COLUMNS, [row for one in found for row in limits.rows(one)])
-    section = Section("Where engines break")
+    section = Section("Where engines break down")
     if steps := limits.step_rows(found):
         section.add_heading("The largest steps")
         section.add_table(steps)

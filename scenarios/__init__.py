@@ -1,4 +1,4 @@
-"""What is simulated, and its exact solution: the scene model, the catalogue, trajectories and exact solutions (truths)."""
+"""Scenes and their exact solutions: the scene model, the catalogue, trajectories and exact solutions (truths)."""
 
 from scenarios.ensemble import members
 from scenarios.errors import DropspinError, SceneError, UnknownName

@@ -1,4 +1,4 @@
-"""The `[body]` table: a body's shape, and the mass, inertia and vertices that follow from it."""
+"""The `[body]` table: the shape of a body, and its mass, inertia and vertices."""
 
 import math
 from functools import cached_property
@@ -18,7 +18,7 @@ Vector = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
 PositiveVector = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
 
 FLAT = 1e-14
-"""Thickness of a set of points, over its size, that is rounding."""
+"""Largest thickness of a set of points, relative to its size, that is attributed to rounding."""
 
 
 class Table(BaseModel):
@@ -53,17 +53,17 @@ class _Body(Table):
 
     @property
     def vertices(self) -> Array:
-        """The points that may touch the floor, from the centre of mass [m], shape (n, 3)."""
+        """The points that may touch the floor, relative to the centre of mass [m], shape (n, 3)."""
         raise NotImplementedError
 
     @property
     def hull(self) -> Array:
-        """Those of the vertices that can be the lowest, the corners of the convex hull, in their order [m], shape (m, 3)."""
+        """The corners of the convex hull of the vertices, in the order of the vertices [m], shape (m, 3)."""
         return self.vertices
 
     @property
     def rounding(self) -> float:
-        """Distance of the surface from the vertices [m]: a ball is one point, rounded by its radius."""
+        """Distance of the surface from the vertices [m]: the radius of a ball, which has one vertex; 0 for other bodies."""
         return 0.0
 
     @property
@@ -109,7 +109,7 @@ class Sphere(_Body):
 
 
 class Box(_Body):
-    """A box; its half extents lie along its own x, y and z."""
+    """A box; its half extents lie along the x, y and z axes of the body frame."""
 
     shape: Literal["box"]
     half_extents: PositiveVector
@@ -134,7 +134,7 @@ class Box(_Body):
 
 
 class Vertices(_Body):
-    """A rigid set of points, of equal masses unless they are given."""
+    """A rigid set of points, which have equal masses unless masses are given."""
 
     shape: Literal["vertices"]
     points: Annotated[tuple[Vector, ...], Field(min_length=2, max_length=10_000)]
@@ -154,7 +154,7 @@ class Vertices(_Body):
         if self.masses is not None and len(self.masses) != len(self.points):
             raise ValueError(f"masses has {len(self.masses)} entries for {len(self.points)} points; each point needs one")
         if self.masses is not None and not np.isclose(self.mass, np.sum(self.masses), rtol=1e-9, atol=0):
-            raise ValueError(f"mass is {self.mass:g} but masses add up to {np.sum(self.masses):g}; they must agree")
+            raise ValueError(f"mass is {self.mass:g} but masses add up to {np.sum(self.masses):g}; the two must be equal")
         moments = np.linalg.eigvalsh(self.inertia_tensor)
         if moments[0] <= 1e-12 * moments[2]:
             raise ValueError("the points lie on one line, about which they have no inertia; they must span at least a plane")
@@ -196,7 +196,7 @@ class Vertices(_Body):
 
 
 def hull_corners(points: Array) -> NDArray[np.intp]:
-    """Ascending numbers of the points, shape (n, 3), that are corners of their convex hull; it may be flat, a line or a point."""
+    """Ascending indices of the points, shape (n, 3), that are corners of their convex hull, which may be flat, a line or a point."""
     from scipy.spatial import ConvexHull, QhullError
 
     centred = points - points.mean(axis=0)

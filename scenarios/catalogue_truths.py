@@ -1,6 +1,7 @@
 """The name of each catalogue scene's exact solution, for the list of scenes.
 
-`truth_for` gives the same names, and a test compares the two; but it solves for the impacts, which takes half a second and imports SciPy.
+`truth_for` returns solutions with the same names, and a test compares them. It also computes the impacts, which takes half a second and
+imports SciPy, so the list of scenes does not use it.
 """
 
 _SCENES = {
@@ -29,4 +30,4 @@ _SCENES = {
     "tipping": ("tip-box",),
 }
 CATALOGUE_TRUTHS = {scene: truth for truth, scenes in _SCENES.items() for scene in scenes}
-"""By name of the scene; a scene without an exact solution is absent."""
+"""Names of exact solutions by name of the scene; a scene without an exact solution is absent."""

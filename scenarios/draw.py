@@ -1,33 +1,35 @@
-"""Scenes drawn at random, each with an exact solution, so that no engine can be fitted to a list of scenes.
+"""Random scenes, each with an exact solution. An engine can be tuned to a fixed list of scenes, but not to random ones.
 
-Ten families follow each other in turn. U(a, b) is uniform, LU(a, b) is uniform in the logarithm; directions and attitudes are uniform
-(G. Marsaglia, Annals of Mathematical Statistics 43 (1972), by normal variates).
+The scenes are taken from ten families in turn. U(a, b) is a uniform, LU(a, b) a log-uniform distribution; directions and orientations are
+uniform (from normal variates: G. Marsaglia, Annals of Mathematical Statistics 43 (1972)). Spin is the initial angular velocity.
 
-    all           mass LU(0.01, 1000) kg; diameters and edges LU(0.1, 1) m; points are normal with a standard deviation of half of that
-    moments       solid or of eight corner masses in one of three boxes each, else of masses whose mean square along each axis is
-                  U(0.1, 1) of the half extent's; these are the drawn moments
-    flights       velocity U(0, 3) m/s and spin LU(0.5, 12) rad/s of any direction; no gravity in three of ten, else of any direction and
-                  LU(0.5, 30) m/s²; duration U(0.5, 1) s
+    all           mass LU(0.01, 1000) kg; diameters and edge lengths LU(0.1, 1) m; points are normally distributed, with half of such a
+                  length as standard deviation
+    moments       of boxes, one third each: those of the solid body; those of eight corner masses; random moments, which are those
+                  of a mass distribution whose mean square along each axis is U(0.1, 1) times the square of the half extent
+    flights       velocity U(0, 3) m/s and spin LU(0.5, 12) rad/s in any direction; no gravity in three of ten flights, otherwise gravity
+                  LU(0.5, 30) m/s² in any direction; duration U(0.5, 1) s
     floors        gravity LU(0.5, 30) m/s² downwards; restitution U(0.1, 0.95); infinite friction or none
-    falls         fall of U(0.12, 0.3) s from an upward velocity of U(-0.5, 0.5) of half the impact's, horizontal velocity U(0, 2) m/s;
-                  the end is U(0.5, 0.8) of the last flight, which counts up to 0.3 s
-    tilted        in three of ten falls of balls and corners gravity is inclined by U(0, 0.5) rad
+    falls         time of the fall T = U(0.12, 0.3) s; initial upward velocity U(-0.5, 0.5) times g T/2; horizontal velocity U(0, 2) m/s;
+                  the scene ends after U(0.5, 0.8) of the last flight, of which at most 0.3 s are used
+    tilted        in three of ten falls of balls and corners, gravity is inclined by U(0, 0.5) rad
 
     free-tensor   a flight of 4 to 8 points of unequal masses, whose axes are not principal axes
-    free-axes     a flight of a ball, or of a box, whose three principal moments are drawn
-    damped        a flight with decay rates U(0.1, 2) 1/s of velocity and of angular velocity; any of these bodies
-    ball          a ball on a frictionless floor, one to three impacts; spin LU(0.5, 12) rad/s; half of them with three drawn moments
-    rough-ball    a solid ball with spin; one impact; infinite friction, or a coefficient U(0.05, 0.6)
+    free-axes     a flight of a ball or a box with random moments
+    damped        a flight of any of these bodies, with decay rates U(0.1, 2) 1/s of velocity and of angular velocity
+    ball          a ball on a frictionless floor, one to three impacts; spin LU(0.5, 12) rad/s; half of the balls have random moments
+    rough-ball    a solid ball with spin, one impact; infinite friction, or a friction coefficient U(0.05, 0.6)
     flat-box      a box that lands on a face, one to three impacts; without friction it has spin U(-10, 10) rad/s about the vertical
-    corner        a box, or in one of three cases a set of points, of any attitude; one impact; spin U(0, 3) rad/s
-    edge          a box that lands on an edge; one impact; no spin
-    on-floor      a box that slides, or turns about the vertical, with a coefficient of friction U(0.1, 0.6); it stops after U(0.2, 0.6) s
-                  and lies for a tenth of that
-    standing      a box that falls over from an edge, U(0.05, 0.3) rad from its balance, for U(0.5, 0.8) of the time until it lands; the
-                  edge sticks or slips; restitution 0
+    corner        a box, or in one of three cases a set of points, of any orientation; one impact; spin U(0, 3) rad/s
+    edge          a box that lands on an edge, one impact; no spin
+    on-floor      a box that slides, or turns about the vertical, with a friction coefficient U(0.1, 0.6); it stops after T = U(0.2, 0.6) s,
+                  and the scene ends at 1.1 T
+    standing      a box that falls over from an edge; the initial angle from balance is U(0.05, 0.3) rad, and the scene ends after
+                  U(0.5, 0.8) of the time until the box lands; the edge sticks or slips; restitution 0
 
-A draw is repeated until its exact solution is known for the whole duration and the default time steps resolve it: 16 steps of 4 ms in each
-flight, at most 0.1 rad a step, and no second corner within a step's fall of the floor when one strikes it.
+A draw is repeated until its exact solution is known for the whole duration and the default time steps resolve the scene: each flight has
+at least 16 steps of 4 ms; the body rotates by at most 0.1 rad in a step; and when one corner strikes the floor, every other corner is
+higher above the floor than the distance that the body falls in a step.
 
 Source of the exact solutions: `scenarios.truths`.
 """
@@ -54,8 +56,8 @@ def draw(count: int, seed: int) -> list[Scenario]:
     Scene k depends on the seed and on k only. Its name, such as `draw-7-012` for scene 12 of seed 7, loads it again.
 
     Args:
-        count: How many, from 1 to 1000.
-        seed: From 0 to 2⁶⁴ - 1; the same seed draws the same scenes with the same versions of dropspin and NumPy.
+        count: Number of scenes, from 1 to 1000.
+        seed: Seed, from 0 to 2⁶⁴ - 1. The same seed gives the same scenes with the same versions of dropspin and NumPy.
 
     Returns:
         The scenes, numbered from 1.
@@ -65,7 +67,7 @@ def draw(count: int, seed: int) -> list[Scenario]:
     """
     for name, given, least, most in (("count", count, 1, MOST_SCENES), ("seed", seed, 0, LARGEST_SEED)):
         if isinstance(given, bool) or not isinstance(given, int) or not least <= given <= most:
-            raise DropspinError(f"{name}: got {given!r}; it is a whole number from {least} to {most}.")
+            raise DropspinError(f"{name}: got {given!r}; give a whole number from {least} to {most}.")
     return [drawn_scene(seed, number) for number in range(1, count + 1)]
 
 
@@ -91,7 +93,7 @@ def drawn_scene(seed: int, number: int) -> Scenario:
 
 
 def _ended(scene: Scenario, last_impact: int, share: float) -> Scenario | None:
-    """The scene, with its end at a share of the time from one of its impacts to the next; None if it does not get so far."""
+    """The scene, which ends at a random time between one of its impacts and the next; None if it has too few impacts."""
     truth = truth_for(scene)
     if truth is None or len(truth.events) < last_impact:
         return None
@@ -115,7 +117,7 @@ def _is_resolved(scene: Scenario) -> bool:
 
 
 def _strikes_alone(scene: Scenario, impact: Impact) -> bool:
-    """Whether no other corner comes so near to the floor at an impact that a step could take both for one."""
+    """Whether, at every impact, all other corners are so far from the floor that no time step contains two contacts."""
     points = rotate(impact.before[ORIENTATION], scene.body.vertices)
     heights = impact.before[POSITION][1] + points[:, 1] - scene.body.rounding
     speeds = impact.before[VELOCITY][1] + np.cross(impact.before[SPIN], points)[:, 1]

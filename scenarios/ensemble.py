@@ -1,4 +1,4 @@
-"""The starts of an ensemble, for scenes whose single trajectories are too sensitive to compare."""
+"""The random initial states of an ensemble, for scenes whose single trajectories are too sensitive to be compared."""
 
 import math
 from functools import cache
@@ -19,7 +19,7 @@ RATE_DRAWS = tuple(f"{kind} {axis}" for kind in ("velocity", "angular velocity")
 
 
 def members(scene: Scenario) -> list[Scenario]:
-    """The scene from each start of its ensemble; the starts are the same for every engine and time step.
+    """The scene with each initial state of its ensemble; the initial states are the same for every engine and time step.
 
     Rotations up to the angle `turn` are uniform in the Haar measure: the axis is uniform on the sphere and the angle has the density
     1 - cos θ (R. E. Miles, Biometrika 52 (1965), 636).
@@ -42,9 +42,9 @@ def members(scene: Scenario) -> list[Scenario]:
 
 
 def spread_start(scene: Scenario, number: int) -> Array:
-    """The numbered start from the distribution of a scene's ensemble, shape (13,).
+    """The initial state with a given number from the distribution of a scene's ensemble, shape (13,).
 
-    The distribution is that of `members`, but a start depends on its number only, not on how many starts there are.
+    The distribution is that of `members`, but an initial state depends only on its number, not on the number of initial states.
 
     Raises:
         ValueError: The scene has no ensemble.
@@ -60,15 +60,15 @@ def spread_start(scene: Scenario, number: int) -> Array:
 def spread_starts(
     states: Array, spread: Ensemble, numbers: NDArray[np.int64], vertices: Array, rounding: float | Array, floor: bool
 ) -> Array:
-    """Numbered starts, as by `spread_start`, for many scenes at once that share their ensemble.
+    """The initial states that `spread_start` returns, for many scenes that share an ensemble.
 
     Args:
-        states: The scenes' starts, shape (B, 13).
+        states: The initial states of the scenes, shape (B, 13).
         spread: The ensemble.
-        numbers: The number of each start, shape (B,).
+        numbers: The number of each initial state, shape (B,).
         vertices: Vertices of one body, shape (n, 3), or of each, shape (B, n, 3) [m].
         rounding: Rounding radius of the vertices [m], or of each body's, shape (B,).
-        floor: Whether there is a floor; each start then has the clearance of its scene.
+        floor: Whether there is a floor; if so, each initial state has the clearance of its scene.
     """
     height, around, share, *sideways = (uniform(spread.seed, name, numbers) for name in ("axis height", "axis angle", "share", *RATE_DRAWS))
     found = states.copy()
@@ -84,7 +84,7 @@ def spread_starts(
 
 
 def _turn(height: float, around: float, angle: float) -> list[float]:
-    """The rotation by an angle [rad] about a uniform axis from two uniform draws (Archimedes: the height of the axis is uniform)."""
+    """The rotation by an angle [rad] about a uniformly distributed axis, from two uniform draws (the height of the axis is uniform)."""
     up = 2.0 * height - 1.0
     sideways, half = math.sqrt(1.0 - up * up), 0.5 * angle
     axis = sideways * math.cos(2.0 * math.pi * around), up, sideways * math.sin(2.0 * math.pi * around)
@@ -98,7 +98,7 @@ def clearances(states: Array, vertices: Array, rounding: float | Array) -> Array
 
 
 def _angles(shares: Array, largest: float) -> Array:
-    """Quantiles of the angle [rad] of uniform rotations up to the largest, for shares in [0, 1]."""
+    """Quantiles of the angle [rad] of uniform rotations by at most the largest angle, for probabilities in [0, 1]."""
     if largest == 0.0:
         return np.zeros_like(shares)
     shares_below, grid = _shares(largest)
@@ -107,7 +107,7 @@ def _angles(shares: Array, largest: float) -> Array:
 
 @cache
 def _shares(largest: float) -> tuple[Array, Array]:
-    """Cube roots of the cumulative distribution, and its angles; the cube root is nearly linear, because the distribution rises as θ³."""
+    """Cube roots of the cumulative distribution, and the angles; the cube root is nearly linear in θ."""
     grid = largest * np.linspace(0.0, 1.0, GRID_SIZE)
     below = np.array([_angle_minus_sine(angle, largest) if largest < SERIES_BELOW else angle - math.sin(angle) for angle in grid])
     return np.cbrt(below / below[-1]), grid
@@ -119,7 +119,7 @@ def _angle_minus_sine(angle: float, unit: float) -> float:
 
 
 def _at_clearance_of(member: Scenario, scene: Scenario) -> Array:
-    """The member's start, moved vertically to the clearance of the scene."""
+    """The initial state of a member, moved vertically so that it has the clearance of the scene."""
     start = member.initial_state
     start[1] += scene.clearance - member.clearance
     return start

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 
 class DropspinError(Exception):
-    """Bad input. The message is one line that says where, what was given, what is allowed."""
+    """Bad input. The message is one line with the place, the value given and the values allowed."""
 
 
 class SceneError(DropspinError):
@@ -18,12 +18,12 @@ class SceneError(DropspinError):
 
 
 class UnknownName(DropspinError):
-    """A name that is not in its list.
+    """A name that is not in the list of known names.
 
     Args:
-        what: What the name is of, such as `engine`.
+        what: The kind of thing that the name denotes, such as `engine`.
         given: The name.
-        known: All names; the nearest is suggested.
+        known: All known names; the nearest one is suggested.
     """
 
     def __init__(self, what: str, given: str, known: Iterable[str]) -> None:

@@ -1,7 +1,7 @@
-"""Ten families of scenes with exact solutions, of which `scenarios.draw` draws; its docstring states the distributions.
+"""Ten families of random scenes with exact solutions. The docstring of `scenarios.draw` states the distributions.
 
-A family returns the content of a scene whose duration is the longest that it may have, and the impact after which the scene ends, 0 for
-the start; None if it has the whole duration.
+A family returns the content of a scene with the longest allowed duration, and the number of the impact after which the scene ends: 0 if it
+ends in the flight before the first impact, None if the scene lasts for the whole duration.
 """
 
 import math
@@ -24,11 +24,11 @@ FALL_TIME = (0.12, 0.3)  # s
 FLIGHT_TIME = 0.3  # s, the longest after each impact
 RESTITUTION = (0.1, 0.95)
 FACES = (np.array([0.0, 0.0, 0.0, 1.0]), about(np.eye(3)[0], np.array(0.5 * math.pi)), about(np.eye(3)[2], np.array(0.5 * math.pi)))
-"""Attitudes with each of a box's axes vertical."""
+"""Orientations in which one axis of a box is vertical, for each axis."""
 
 
 class Draws:
-    """Random draws of one scene; all of them come from uniform or normal variates of one generator."""
+    """Random draws for one scene, all from uniform or normal variates of one generator."""
 
     def __init__(self, generator: np.random.Generator) -> None:
         self._generator = generator
@@ -50,7 +50,7 @@ class Draws:
         return int(count * float(self._generator.random()))
 
     def direction(self, dimensions: int = 3) -> Array:
-        """A unit vector; of four dimensions, an attitude."""
+        """A unit vector; of four dimensions, an orientation."""
         vector = self._generator.normal(size=dimensions)
         return vector / np.linalg.norm(vector)
 
@@ -70,7 +70,7 @@ def free_tensor(draws: Draws) -> Drawn:
 
 
 def free_axes(draws: Draws) -> Drawn:
-    """A flight of a ball or a box with drawn principal moments."""
+    """A flight of a ball or a box with random principal moments."""
     body = _ball(draws) if draws.happens(0.5) else _box(draws)
     sizes = body.get("half_extents", [body.get("radius")] * 3)
     return _flight(draws, body | {"inertia": _moments(draws, body["mass"], sizes)}), None
@@ -154,7 +154,7 @@ def standing(draws: Draws) -> Drawn:
 
 FAMILIES: dict[str, tuple[str, Callable[[Draws], Drawn]]] = {
     "free-tensor": ("Points of unequal masses in free flight", free_tensor),
-    "free-axes": ("A body with drawn principal moments in free flight", free_axes),
+    "free-axes": ("A body with random principal moments in free flight", free_axes),
     "damped": ("A body in free flight with damping", damped),
     "ball": ("A ball bounces on a frictionless floor", ball),
     "rough-ball": ("A spinning ball strikes a rough floor", rough_ball),
@@ -164,7 +164,7 @@ FAMILIES: dict[str, tuple[str, Callable[[Draws], Drawn]]] = {
     "on-floor": ("A box slides or turns on a rough floor until it stops", on_floor),
     "standing": ("A box falls over from an edge", standing),
 }
-"""What each family is, and the function that draws it."""
+"""The summary of each family, and the function that draws it."""
 
 
 def _ball(draws: Draws) -> Table:
@@ -203,7 +203,7 @@ def _flight(draws: Draws, body: Table) -> Table:
 def _fall(
     draws: Draws, body: Table, attitude: Array, spin: Array, impacts: int = 1, *, may_tilt: bool = False, straight: bool = False
 ) -> Table:
-    """A fall from above the floor, by default with horizontal velocity too, long enough for some impacts."""
+    """A fall from above the floor, by default with a horizontal velocity, that is long enough for some impacts."""
     g, time, lifted = draws.log_uniform(*GRAVITY), draws.uniform(*FALL_TIME), draws.uniform(-0.5, 0.5)
     sideways = draws.uniform(0.0, 2.0) * draws.heading()
     tilt = draws.uniform(0.0, 0.5) if may_tilt and draws.happens(0.3) else 0.0
@@ -228,12 +228,12 @@ def _floor(draws: Draws, friction: str | float) -> Table:
 
 
 def _flat(draws: Draws) -> Array:
-    """An attitude of a box with a face down."""
+    """An orientation of a box with a face down."""
     return multiply(about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi))), FACES[draws.one_of(3)])
 
 
 def _height(body: Table, attitude: Array) -> float:
-    """Height at which a body of this attitude touches the floor [m]."""
+    """Height at which a body of this orientation touches the floor [m]."""
     from pydantic import TypeAdapter
 
     from scenarios.body import Body

@@ -1,4 +1,4 @@
-"""Reading files that somebody else may have written: regular files only, of a limited size."""
+"""Reading of input files: only regular files of a limited size."""
 
 from pathlib import Path
 
@@ -6,16 +6,16 @@ from scenarios.errors import DropspinError
 
 
 def read_file(path: Path, given: str, what: str, largest: int) -> bytes:
-    """The content of a regular file. A pipe or a device is refused before it is opened: reading it could last for ever.
+    """The content of a regular file. A pipe or a device is refused before it is opened, because reading it might never end.
 
     Args:
         path: The file.
         given: The path as the user gave it, for messages.
-        what: The word for such a file, for messages.
+        what: The word for this kind of file in messages.
         largest: Largest allowed size [bytes].
 
     Raises:
-        DropspinError: It is not a regular file, is too large, or cannot be read.
+        DropspinError: The path is not a regular file, the file is too large, or it cannot be read.
     """
     try:
         if path.is_dir():
@@ -28,7 +28,7 @@ def read_file(path: Path, given: str, what: str, largest: int) -> bytes:
     except OSError as error:
         raise DropspinError(f"{given}: {error.strerror}; give the path of a readable file.") from None
     except ValueError:
-        raise DropspinError(f"{given!r}: no file has such a name.") from None
+        raise DropspinError(f"{given!r}: this cannot be the name of a file.") from None
     if len(content) > largest:
-        raise DropspinError(f"{given}: more than {largest:,} bytes; no {what} is that long.")
+        raise DropspinError(f"{given}: larger than {largest:,} bytes, the limit for a {what}.")
     return content

@@ -1,4 +1,4 @@
-"""Loading a `Scenario` by its name in the catalogue, or as a drawn scene, from a TOML file, or from a mapping."""
+"""Loading of a `Scenario` by the name of a catalogue scene or a random scene, from a TOML file, or from a mapping."""
 
 import os
 import re
@@ -18,10 +18,10 @@ from scenarios.validation import Alternatives, first_problem, shown
 
 CATALOGUE = Path(__file__).parent / "catalogue"
 DRAWN = r"draw-([0-9]{1,20})-([0-9]{1,4})"
-"""The name of a scene that `draw` draws: its seed and its number."""
+"""The name of a random scene of `draw`, with its seed and its number."""
 MAX_FILE_SIZE = 1_000_000  # bytes; a scene of ten thousand vertices is smaller
 DEEPEST = 30
-"""Tables and lists within each other in a file; a baseline has six."""
+"""Largest depth of nested tables and lists in a file; a baseline has six."""
 FEATURES: dict[str, type[BaseModel]] = {
     "floor": Floor,
     "gravity": Gravity,
@@ -41,7 +41,7 @@ def names() -> list[str]:
     """The names of the catalogue's scenes.
 
     Returns:
-        Sorted, each of which `load` takes.
+        The names, sorted; `load` accepts each of them.
     """
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
@@ -50,14 +50,14 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
     """Load a scene.
 
     Args:
-        scene: Its catalogue name or the name of a drawn scene, the path of a TOML file, or a mapping with the same keys. A mapping may
-            have arrays for lists, and a `name`, which is `scene` by default.
+        scene: The name of a catalogue scene or a random scene, the path of a TOML file, or a mapping with the same keys. A mapping may have
+            arrays instead of lists, and a key `name`, which is `scene` by default.
 
     Returns:
         The scene; all values are in SI units.
 
     Raises:
-        SceneError: The scene is not valid. The text says which file or mapping, the key, the value and what is allowed.
+        SceneError: The scene is not valid. The message gives the file or mapping, the key, the value and the allowed values.
     """
     if isinstance(scene, Mapping):
         return _from_mapping(scene)
@@ -98,7 +98,7 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = MAX_FI
         largest: Largest allowed size [bytes].
 
     Raises:
-        SceneError: It is not a TOML file, or cannot be read.
+        SceneError: The path is not a TOML file, or cannot be read.
     """
     try:
         content = tomllib.loads(read_file(path, given, what, largest).decode("utf-8-sig"))
@@ -132,7 +132,7 @@ def _verify_sizes(content: dict[str, Any], given: str, what: str) -> None:
 
 
 def _from_mapping(scene: Mapping[str, Any]) -> Scenario:
-    """The scene of a mapping, whose values may be NumPy's."""
+    """The scene of a mapping, whose values may be NumPy arrays and scalars."""
     if "origin" in scene:
         raise SceneError(f"scene['origin']: got {shown(scene['origin'])}; the key is not allowed.")
     try:
@@ -142,7 +142,7 @@ def _from_mapping(scene: Mapping[str, Any]) -> Scenario:
 
 
 def _without_numpy(value: Any) -> Any:
-    """A value with arrays as lists, and NumPy's scalars as Python's."""
+    """A value with NumPy arrays converted to lists and NumPy scalars to Python numbers."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, Mapping):
@@ -151,12 +151,12 @@ def _without_numpy(value: Any) -> Any:
 
 
 def from_table(name: str, origin: str, content: dict[str, Any]) -> Scenario:
-    """The scene of a file's content.
+    """The scene of the content of a file or a mapping.
 
     Args:
         name: The name of the scene.
         origin: The path of the file as the user gave it; empty if there is none.
-        content: The file's tables.
+        content: The tables.
 
     Raises:
         SceneError: The scene is not valid.
@@ -164,7 +164,7 @@ def from_table(name: str, origin: str, content: dict[str, Any]) -> Scenario:
     where = origin or f"scene {name!r}"
     for key in ("name", "origin"):
         if key in content:
-            raise SceneError(f"{where}: {key}: got {shown(content[key])}; a scene's name is its file's, the key is not allowed.")
+            raise SceneError(f"{where}: {key}: got {shown(content[key])}; the key is not allowed; the name of a scene is that of its file.")
     try:
         return Scenario.model_validate({"name": name, "origin": origin, **content})
     except ValidationError as error:

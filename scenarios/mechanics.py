@@ -1,7 +1,7 @@
 """Energy, angular momentum, apex and lowest point of a scene's body along a trajectory; the principal axes of its inertia.
 
-Functions of a scene and a motion call those that end in `_of`. These hold the formulas, on components: of one state, or of arrays of
-states. They are plain arithmetic, so that they can be compiled for many bodies; the result has the same bits.
+Functions of a scene and a motion call the functions whose names end in `_of`. The latter contain the formulas, for the components of one
+state or of arrays of states. They use plain arithmetic only, so that they can be compiled for many bodies with bit-identical results.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Components = tuple[Any, ...]
-"""The components of a vector or quaternion: numbers or arrays. A tensor is a tuple of the components of its rows."""
+"""The components of a vector or quaternion, each a number or an array. A tensor is a tuple of its rows."""
 
 
 def angular_momentum(scene: Scenario, motion: Trajectory) -> Array:
@@ -24,7 +24,7 @@ def angular_momentum(scene: Scenario, motion: Trajectory) -> Array:
 
 
 def angular_momentum_of(inertia: Components, orientation: Components, spin: Components) -> Components:
-    """L = R I Rᵀ ω; I ω, independent of the attitude, where I is a multiple of the unit tensor."""
+    """L = R I Rᵀ ω. If I is a multiple of the unit tensor, this is I ω, computed without the orientation."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia
     if xx == yy == zz and xy == xz == yx == yz == zx == zy == 0.0:
         return xx * spin[0], xx * spin[1], xx * spin[2]
@@ -70,12 +70,12 @@ def energy_of(
 
 
 def energy_origin(scene: Scenario) -> Array:
-    """Where the potential energy is 0 [m], shape (3,): at rest on the floor, or at the start."""
+    """The position of zero potential energy [m], shape (3,): that of rest on the floor, or the initial position."""
     return np.array([0.0, scene.body.resting_height, 0.0]) if scene.floor else np.array(scene.start.position)
 
 
 def apex(scene: Scenario, motion: Trajectory) -> Array:
-    """Height of the apex of a flight [m], v_y²/2g + y, from each of its states, shape (n,); gravity points straight down."""
+    """Height of the apex of a flight [m], v_y²/2g + y, computed from each of its states, shape (n,); gravity points straight down."""
     v = motion.velocity[:, 1]
     return v * v / (-2.0 * scene.acceleration[1]) + motion.position[:, 1] - motion.velocity_lag * v
 
@@ -97,7 +97,7 @@ def offset_of(orientation: Components, vertex: Components) -> Any:
 
 
 def rotated(orientation: Components, vector: Components) -> Components:
-    """A vector in the world frame, of a body-frame one: `rotations.rotate` by components."""
+    """A body-frame vector in the world frame: `rotations.rotate` by components."""
     x, y, z, w = orientation
     a, b, c = vector
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
@@ -122,12 +122,12 @@ def _tensor(scene: Scenario) -> Components:
 
 
 def is_diagonal(tensor: Array) -> bool:
-    """Whether the body axes are principal axes exactly."""
+    """Whether the body axes are exactly principal axes."""
     return np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
 
 
 def principal_axes(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments and axes (columns, right-handed): the body axes of a diagonal tensor, else in ascending order of the moments."""
+    """Principal moments and axes (columns, right-handed): the body axes of a diagonal tensor, else by ascending moment."""
     if is_diagonal(inertia):
         return np.diag(inertia).copy(), np.eye(3)
     moments, axes = np.linalg.eigh(inertia)

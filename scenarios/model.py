@@ -1,4 +1,4 @@
-"""The scene model: the validated content of a TOML file. No engine models a table that is absent."""
+"""The scene model: the validated content of a TOML file. Engines model only what the tables of the file describe."""
 
 import hashlib
 import math
@@ -13,11 +13,11 @@ from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from scenarios.text import Text, verify_printable
 
 TOUCHING = 1e-9
-"""Height above the floor, over the body's size, up to which the body counts as touching it."""
+"""Height above the floor, relative to the size of the body, up to which the body counts as touching the floor."""
 
 
 def unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
-    """The quaternion with length 1; one that has it to rounding is returned unchanged."""
+    """The quaternion normalised to length 1; a quaternion whose length is 1 up to rounding is returned unchanged."""
     length = math.hypot(*quaternion)
     if length == 0.0:
         raise ValueError("must not be the zero quaternion")
@@ -66,11 +66,11 @@ class Damping(Table):
 
 
 class Ensemble(Table):
-    """Random starts around the scene's start.
+    """Random initial states around that of the scene.
 
-    `turn` is the largest angle of rotation from the scene's attitude [rad]; rotations are uniform up to it, by default over all attitudes.
-    `velocity` [m/s] and `angular_velocity` [rad/s] are the half widths of uniform distributions around the scene's values. Every start has
-    the scene's height above the floor.
+    `turn` is the largest angle of rotation from the scene's orientation [rad]; rotations are uniform up to this angle, by default over
+    all orientations. `velocity` [m/s] and `angular_velocity` [rad/s] are the half widths of uniform distributions around the scene's
+    values. The body is always at the scene's height above the floor.
     """
 
     size: Annotated[int, Field(strict=True, ge=2, le=10_000_000)]
@@ -81,9 +81,9 @@ class Ensemble(Table):
 
 
 class Expectation(Table):
-    """One bound on one metric, for all engines and time steps or for those named.
+    """A bound on a metric, for all engines and time steps or for those given.
 
-    `dt` names one time step or several [s]. `below` bounds the absolute value; `above` and `within` bound the value with its sign.
+    `dt` is one time step or several [s]. `below` bounds the absolute value; `above` and `within` bound the value with its sign.
     """
 
     metric: Text
@@ -113,17 +113,17 @@ class Scenario(Table):
 
     Attributes:
         name: The name of its file without the ending, or that of its mapping.
-        origin: The argument that loaded it; empty for a mapping.
-        summary: What it is, in a line.
-        source: Where it comes from.
-        tags: Words to find it by.
-        duration: [s].
+        origin: The argument of `load` that gave the scene; empty for a mapping.
+        summary: A description in one line.
+        source: The source of the problem or of its solution.
+        tags: Keywords.
+        duration: Duration [s].
         body: Shape (`sphere`, `box` or `vertices`), size [m], mass [kg] and inertia [kg m²].
         start: Position [m], orientation, velocity [m/s] and angular velocity [rad/s] at t = 0, in the world frame.
-        gravity: Its acceleration [m/s²], or None.
+        gravity: The acceleration of gravity [m/s²], or None.
         floor: Restitution, friction and rest speed [m/s] of the plane y = 0, or None.
-        damping: Rates of decay [1/s], or None.
-        ensemble: The spread of random starts, or None.
+        damping: Decay rates [1/s], or None.
+        ensemble: The distribution of the initial states of an ensemble, or None.
         expect: Bounds on metrics, each with a reason.
     """
 
@@ -152,16 +152,14 @@ class Scenario(Table):
     def _has_an_inertia(self) -> Self:
         tensor = self.body.inertia_tensor
         if not (np.isfinite(tensor).all() and np.linalg.eigvalsh(tensor)[0] > 0.0):
-            raise ValueError(
-                f"body: its inertia is {tensor.tolist()} kg m², out of the range of floating-point numbers; scale the scene's units"
-            )
+            raise ValueError(f"body: its inertia is {tensor.tolist()} kg m², outside the range of floating-point numbers; scale the units")
         return self
 
     @model_validator(mode="after")
     def _starts_above_the_floor(self) -> Self:
         if self.floor is not None and self.clearance < -TOUCHING * self.body.size:
             start = list(self.start.position)
-            raise ValueError(f"start.position: got {start}; there the body is {-self.clearance:.3g} m below the floor; raise it")
+            raise ValueError(f"start.position: got {start}; there the body is {-self.clearance:.3g} m below the floor; increase its height")
         return self
 
     @property
@@ -188,7 +186,7 @@ class Scenario(Table):
 
     @property
     def digest(self) -> str:
-        """A short hash of everything that affects the motion; texts and expectations do not."""
+        """A short hash of everything that affects the motion, that is, without texts and expectations."""
         physics = self.model_dump_json(exclude={"name", "summary", "source", "tags", "expect"})
         return hashlib.sha256(physics.encode()).hexdigest()[:12]
 
@@ -197,7 +195,7 @@ class Scenario(Table):
         return math.floor(self.duration / dt + 1e-9)
 
     def starting_at(self, state: Array) -> "Scenario":
-        """The same scene from another state, shape (13,)."""
+        """The same scene with another initial state, shape (13,)."""
         values = [float(value) for value in state]
         start = Start(
             position=tuple(values[POSITION]),

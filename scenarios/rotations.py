@@ -7,7 +7,7 @@ Array = NDArray[np.float64]
 
 
 def cross(a: Array, b: Array) -> Array:
-    """A × b over the last axis; numpy.cross takes four times as long on the few vectors of a root search."""
+    """A × b over the last axis; for few vectors, as in a root search, numpy.cross takes four times as long."""
     if a.shape != b.shape:
         a, b = np.broadcast_arrays(a, b)
     product = np.empty(a.shape)
@@ -28,7 +28,7 @@ def length(a: Array) -> Array:
 
 
 def multiply(a: Array, b: Array) -> Array:
-    """The rotation by b, then by a; shapes (..., 4)."""
+    """The rotation by b followed by that by a; shapes (..., 4)."""
     av, aw = a[..., :3], a[..., 3:]
     bv, bw = b[..., :3], b[..., 3:]
     vector = aw * bv + bw * av + cross(av, bv)

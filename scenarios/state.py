@@ -13,6 +13,6 @@ RATES = slice(7, 13)
 """Velocity and angular velocity together."""
 
 UP = np.array([0.0, 1.0, 0.0])
-"""Upwards in the world frame, the floor's normal."""
+"""The upward direction in the world frame, which is the normal of the floor."""
 
 PARTS = {"position": POSITION, "orientation": ORIENTATION, "velocity": VELOCITY, "angular_velocity": SPIN}

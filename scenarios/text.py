@@ -1,4 +1,4 @@
-"""Text that terminals, files and pages show as it is: without control characters, marks of direction, or lone surrogates."""
+"""Printable text: without control characters, bidirectional marks, or lone surrogates."""
 
 from typing import Annotated
 
@@ -13,10 +13,10 @@ def printable(text: str) -> str:
 
 
 def verify_printable(text: str) -> str:
-    """A text as it is given.
+    """Return the text unchanged.
 
     Raises:
-        ValueError: It is not printable.
+        ValueError: The text is not printable.
     """
     if printable(text) != text:
         raise ValueError("must be printable text, without control characters")
@@ -24,4 +24,4 @@ def verify_printable(text: str) -> str:
 
 
 Text = Annotated[str, AfterValidator(verify_printable)]
-"""A field of a model that holds printable text."""
+"""A field of a model whose value is printable text."""

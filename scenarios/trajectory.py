@@ -21,14 +21,14 @@ def _shown(values: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A body's motion, all in the world frame.
+    """The motion of a body, in the world frame.
 
     Attributes:
         t: Times [s], shape (n,).
         position: Centre of mass [m], shape (n, 3).
         orientation: Unit quaternions [x, y, z, w], body to world, shape (n, 4).
-        velocity: Of the centre of mass [m/s], shape (n, 3).
-        angular_velocity: World frame [rad/s], shape (n, 3).
+        velocity: Velocity of the centre of mass [m/s], shape (n, 3).
+        angular_velocity: Angular velocity [rad/s], shape (n, 3).
         velocity_lag: Time by which velocities lag positions [s]: half a step under semi-implicit Euler, which is leapfrog.
     """
 
@@ -41,7 +41,7 @@ class Trajectory:
 
     @classmethod
     def from_states(cls, t: Array, states: Array, velocity_lag: float = 0.0) -> Self:
-        """From rows of position, orientation, velocity, angular velocity, shape (n, 13)."""
+        """A trajectory from rows of position, orientation, velocity, angular velocity, shape (n, 13)."""
         return cls(t, states[:, POSITION], states[:, ORIENTATION], states[:, VELOCITY], states[:, SPIN], velocity_lag)
 
     @property
@@ -67,7 +67,7 @@ class Trajectory:
         return f"<Trajectory: {len(self)} states from t = {self.t[0]:.3g} s to {self.t[-1]:.3g} s>"
 
     def _repr_html_(self) -> str:
-        """For notebooks: the first and the last state."""
+        """The first and the last state as HTML, for notebooks."""
         named = {"position": "m", "orientation": "x, y, z, w", "velocity": "m/s", "angular_velocity": "rad/s"}
         header = "".join(f"<th>{name.replace('_', ' ')} [{unit}]</th>" for name, unit in named.items())
         ends = [

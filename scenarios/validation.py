@@ -1,4 +1,4 @@
-"""From the tables of a file to pydantic models; an error becomes one line that says where, what was given and what is allowed."""
+"""Validation of the tables of a file. An error becomes one line with the place, the given value and the allowed values."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,14 +11,16 @@ from scenarios.errors import DropspinError, did_you_mean
 Kind = TypeVar("Kind", bound=BaseModel)
 Problem = Mapping[str, Any]
 Alternatives = Mapping[tuple[str, str], str]
-"""Words for the other values that a key takes, by key and pydantic's type of error: pydantic reports each alternative alone."""
+"""Texts for the other allowed values of a key, by key and pydantic's type of error, because pydantic reports each alternative
+separately.
+"""
 
 NAMED_KEY = re.compile(r"([a-z_.]+): (.*)")
-"""A problem of several tables together: the key that it names, and the text."""
+"""A problem that concerns several tables: the key to report, and the text."""
 
 
 def validated(kind: type[Kind], where: str, content: Any) -> Kind:
-    """A table of a file as a model.
+    """Validate a table of a file.
 
     Args:
         kind: The model.
@@ -26,7 +28,7 @@ def validated(kind: type[Kind], where: str, content: Any) -> Kind:
         content: The table.
 
     Raises:
-        DropspinError: The table is not valid; the text says where, what was given, what is allowed.
+        DropspinError: The table is not valid; the message gives the place, the given value and the allowed values.
     """
     try:
         return kind.model_validate(content)
@@ -40,8 +42,9 @@ def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: A
     Args:
         kind: The model.
         error: Pydantic's error.
-        alternatives: Words for the other values that keys take.
-        root: For a mapping in Python its name: keys are then given as scene['body']['mass']; by default as body.mass, as in a file.
+        alternatives: Texts for the other allowed values of keys.
+        root: The name of a mapping in Python, for which keys are formatted as scene['body']['mass']; by default they are formatted as in a
+            file, body.mass.
     """
     problems = error.errors(include_url=False)
     # A key that takes a word or something else is reported once for each; for a value that is not a word, the word's problem is irrelevant.
@@ -61,7 +64,7 @@ def shown(value: Any) -> str:
 
 
 def _key(path: Sequence[str | int], root: str) -> str:
-    """A key of a file, such as body.mass; with a root that of a mapping, such as scene['body']['mass']."""
+    """A key of a file, such as body.mass, or, with a root, that of a mapping, such as scene['body']['mass']."""
     if root:
         return root + "".join(f"[{part!r}]" for part in path)
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
@@ -80,7 +83,9 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
         case "missing":
             return f"{prefix}missing; it has no default."
         case "union_tag_not_found" | "union_tag_invalid" as fault:
-            name, tags = problem["ctx"]["discriminator"].strip("'"), ", ".join(map(repr, _tagged(table, path[-1])))
+            name = problem["ctx"]["discriminator"].strip("'")
+            field = next(part for part in reversed(path) if isinstance(part, str))
+            tags = ", ".join(map(repr, _tagged(table, field, name)))
             found = "missing" if fault == "union_tag_not_found" else f"got {shown(problem['input'][name])}"
             return f"{_key([*path, name], root)}: {found}; must be one of {tags}."
         case "value_error" if isinstance(problem["input"], dict):  # of a whole table: the text names keys and values
@@ -92,8 +97,10 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
             bound, count = problem["ctx"]["min_length" if fault == "too_short" else "max_length"], problem["ctx"]["actual_length"]
             return f"{prefix}got {given}; must have at {'least' if fault == 'too_short' else 'most'} {_items(bound)}, has {count}."
         case "model_type" | "model_attributes_type":
-            return f"{prefix}got {given}; must be a {'mapping' if root else f'table, such as [{key}] with its keys below'}."
-    dotted, message = _key(path, ""), problem["msg"].replace("Input should", "must").replace("valid ", "").replace("a tuple", "a list")
+            example = f", such as [{key}] with its keys below" if key and not root else ""
+            return f"{prefix}got {given}; must be a {'mapping' if root else 'table'}{example}."
+    message = re.sub("a (tuple|array)", "a list", problem["msg"].replace("Input should", "must").replace("valid ", ""))
+    dotted = _key(path, "")
     return f"{prefix}got {given}; {message}{alternatives.get((dotted, problem['type']), alternatives.get((dotted, '*'), ''))}."
 
 
@@ -102,13 +109,13 @@ def _items(count: int) -> str:
 
 
 def _is_hidden(field: Any, root: str) -> bool:
-    """Whether a field of a model is not a key of its file, or not of its mapping either."""
+    """Whether a field of a model is not a key of its file, or neither a key of its file nor of its mapping."""
     hidden = (field.json_schema_extra or {}).get("hidden")
     return hidden == "always" or (hidden == "in files" and not root)
 
 
 def _located(kind: type[BaseModel], location: tuple[Any, ...]) -> tuple[list[str | int], type[BaseModel]]:
-    """The keys and indices of a problem as a file has them, and the model of the last table on the way.
+    """The keys and indices of a problem as in a file, and the model of the innermost table.
 
     Pydantic's location also names the member of a union that it tried; a file has no such key.
     """
@@ -121,8 +128,9 @@ def _located(kind: type[BaseModel], location: tuple[Any, ...]) -> tuple[list[str
         elif isinstance(part, int) or not _is_union_member(part):
             path.append(part)
             if isinstance(part, str) and part in table.model_fields:
-                members = _tagged(table, part)
-                inner = list(_models_in(table.model_fields[part].annotation))
+                field = table.model_fields[part]
+                members = _tagged(table, part, field.discriminator) if isinstance(field.discriminator, str) else {}
+                inner = list(_models_in(field.annotation))
                 table = inner[0] if len(inner) == 1 else table
     return path, table
 
@@ -131,13 +139,10 @@ def _is_union_member(part: str) -> bool:
     return "[" in part or part.startswith("constrained-") or part in ("float", "int")
 
 
-def _tagged(table: type[BaseModel], name: Any) -> dict[str, type[BaseModel]]:
-    """The models of a field that is a tagged union, by tag; empty for other fields."""
-    field = table.model_fields.get(name)
-    if field is None or not isinstance(field.discriminator, str):
-        return {}
-    models = _models_in(field.annotation)
-    return {tag: model for model in models for tag in get_args(model.model_fields[field.discriminator].annotation)}
+def _tagged(table: type[BaseModel], key: str, discriminator: str) -> dict[str, type[BaseModel]]:
+    """The models of a tagged union, or of a list of one, by tag."""
+    models = _models_in(table.model_fields[key].annotation)
+    return {tag: model for model in models for tag in get_args(model.model_fields[discriminator].annotation)}
 
 
 def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -19,7 +19,7 @@ HARD_CODED = {
 }
 OTHER_KINDS = {
     "restitution that vanishes as dt → 0": "drop-ball",
-    "attitude drifts by 1e-5 rad/s": "drop-ball",
+    "orientation drifts by 1e-5 rad/s": "drop-ball",
     "0.1 % of energy gained at each bounce": "drop-ball",
     "angular damping of 1e-3 not switched off": "fall-spin",
     "second order, claimed fourth": "fall-spin",

@@ -1,1 +1,1 @@
-"""From values to verdicts: expectations, error budgets, orders of convergence, agreement between engines."""
+"""Verdicts on measured values: expectations, error budgets, orders of convergence, agreement between engines."""

@@ -1,4 +1,4 @@
-"""Agreement: how far two engines are from each other, and whether their agreement is evidence."""
+"""Agreement: the difference between the results of two engines, and whether their agreement is evidence of accuracy."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,7 +12,7 @@ from comparisons.measuring.metrics import METRICS
 from scenarios import Scenario, Trajectory, Truth
 
 NO_EVIDENCE = "no evidence"
-"""How the reason begins where two engines agree because they make the same errors."""
+"""The beginning of the reason if two engines agree because they use the same discretisation."""
 
 
 def judge_agreement(
@@ -23,15 +23,15 @@ def judge_agreement(
     second: Sequence[Comparison],
     discretisations: tuple[str | None, str | None],
 ) -> Iterator[tuple[Metric, Judgement]]:
-    """The differences between two engines, by the metrics that are defined between engines.
+    """The differences between two engines, for each metric that is defined between engines.
 
     Args:
         scene: The scene.
-        truth: Its exact solution, if it is known.
-        truths: The same from each start phase.
-        first: One engine's motion from each start phase, compared with the truth.
-        second: The other engine's.
-        discretisations: What discretisation each engine states.
+        truth: The exact solution of the scene, if it is known.
+        truths: The exact solution from each start phase.
+        first: The motion of one engine from each start phase, compared with the exact solution.
+        second: The same of the other engine.
+        discretisations: The discretisation that each engine declares.
     """
     pairs = [_paired(truth, one, other) for truth, one, other in zip(truths, first, second, strict=True)]
     shared, other = discretisations
@@ -49,7 +49,7 @@ def judge_agreement(
 
 
 def _paired(truth: Truth | None, one: Comparison, other: Comparison) -> Comparison:
-    """Two engines' motions as far as they can be compared: to the truth's horizon, else to the first contact of either."""
+    """The motions of two engines up to the horizon of the exact solution, or, without one, up to the first contact of either engine."""
     if truth is not None:
         return Comparison.between(one, other, int(np.sum(truth.covers(one.motion.t))))
     contacts = [case.first_contact for case in (one, other)]
@@ -58,5 +58,5 @@ def _paired(truth: Truth | None, one: Comparison, other: Comparison) -> Comparis
 
 
 def _as_truth(motion: Trajectory) -> Truth:
-    """An engine's motion in the place of a truth, to ask which metrics have something to compare."""
+    """The motion of an engine in place of an exact solution, to determine which metrics apply."""
     return Truth("engine", "", lambda t: motion.states[: len(t)])

@@ -1,7 +1,8 @@
-"""Convergence over several time steps: of each error the observed order, the asymptotic error as dt → 0, and the cause.
+"""Convergence over several time steps: the observed order, the asymptotic error as dt → 0, and the cause of each error.
 
-Every engine must meet this, whatever a scene expects besides: the interval of its asymptotic error contains 0, and that of its order
-reaches the order that it claims. A fault that is expected of this engine by name is `known` while the asymptotic error is the expected one.
+Two checks apply to every engine, in addition to the expectations of the scene: the interval of the asymptotic error must contain 0, and
+the interval of the observed order must reach the claimed order. If the scene expects a fault of this engine by name, the result is
+`known` as long as the asymptotic error is within the expected bounds.
 """
 
 import math
@@ -22,23 +23,25 @@ from scenarios import Scenario
 Array = NDArray[np.float64]
 
 STUDIES = ("order", "asymptotic_error")
-"""Kinds of measurements that several time steps give together."""
+"""Kinds of measurements that are computed from several time steps."""
 ARTEFACTS = frozenset({"energy_error_raw"})
-"""Metrics that show how a state is sampled rather than how wrong it is."""
+"""Metrics that depend on how a state is sampled and are no measure of its error."""
 JUMPING = frozenset({"desync_rate"})
-"""Metrics that change from flight to flight, not with a power of the step."""
+"""Metrics that change from flight to flight instead of with a power of the time step."""
 ADDED_STEPS = (2.0, 4.0)
-"""Steps that are added where those asked for leave open whether an error vanishes, relative to the coarsest: cheaper than finer ones."""
+"""Time steps, relative to the coarsest, that are added if the requested ones do not decide whether an error vanishes; finer ones would cost
+more.
+"""
 STANDARD_DEVIATIONS = 0.5
-"""Of a resolution, which is half of the range of four means over quarters of the phases: twice the standard deviation of their mean."""
+"""Factor on a resolution: half of the range of four means over quarters of the phases is twice the standard deviation of their mean."""
 SATURATION = 0.9 * math.pi
-"""An angle this near to half a turn saturates, so it says no longer how wrong the attitude is."""
+"""An angle this near to π saturates, so that it does not measure the error of the orientation."""
 DESYNCHRONISED = 0.5
-"""Of the height of the drop: a bouncing body that is so far off is in another flight, and the position error says nothing any more."""
+"""Position error, relative to the drop height, at which a bouncing body is in another flight, so that its position error has no meaning."""
 
 
 class Claim(NamedTuple):
-    """What an engine states for a scene: its order of accuracy or None, the precision of its state, and the limitations it met."""
+    """The properties that an engine declares for a scene: order of accuracy or None, precision of the state, limitations it met."""
 
     label: str
     order: float | None
@@ -47,7 +50,7 @@ class Claim(NamedTuple):
 
 
 class SeriesPoint(NamedTuple):
-    """A metric at one time step: dt [s], number of steps, its average over start phases, that of its components, and its tolerance."""
+    """A metric at one time step: dt [s], number of steps, averages of metric and components over start phases, tolerance."""
 
     dt: float
     steps: int
@@ -58,7 +61,7 @@ class SeriesPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class ConvergenceStudy:
-    """The convergence of one metric: the cause of its errors, and the judgements of order and asymptotic error, where there are any."""
+    """The convergence of one metric: the cause of its errors, and the judgements of its order and asymptotic error, if there are any."""
 
     cause: Cause
     order: Judgement | None
@@ -72,7 +75,7 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
 
     Args:
         scene: The scene.
-        claim: What the engine states.
+        claim: The properties that the engine declares.
         metric: The metric.
         series: The metric at each time step.
     """
@@ -99,19 +102,19 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
 
 
 def _with_components(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
-    """The budget of a length, corrected by that of its components; `finest` is the error at the finest step."""
+    """The error budget of a length, corrected by that of its components; `finest` is the error at the finest time step."""
     if vector.cause == "model" and length.cause in ("discretisation", "unresolved"):
         # The length is largest at another time than that of the components, so it may be larger than they are.
         return replace(vector, upper=max(vector.upper, length.upper), reason=f"{vector.reason}, in a component")
     if length.cause == "model" and length.lower > finest and vector.cause != "model":
         # A length that passes a minimum and grows at finer steps does so in a component; an irregular one only seems to.
-        reason = "its length seems to grow at finer time steps, but none of its components does"
+        reason = "the length seems to grow at finer time steps, but no component grows"
         return ErrorBudget("unresolved", reason, length.asymptotic_error, 0.0, length.upper)
     return length
 
 
 def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:
-    """A study of default settings; a model error that the interval of the calibrated engine excludes becomes a setting error."""
+    """The convergence with default settings; a model error that calibrated settings exclude is a setting error."""
     if study.cause != "model" or study.asymptotic_error is None or calibrated is None or calibrated.asymptotic_error is None:
         return study
     own, other = study.asymptotic_error, calibrated.asymptotic_error
@@ -123,13 +126,15 @@ def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy 
 
 
 def attributed_to_accuracy(study: ConvergenceStudy, refined: ConvergenceStudy | None, options: str, path: str) -> ConvergenceStudy:
-    """A study of time steps alone; an error that only vanishes where the engine's accuracy options are refined too is attributed to these.
+    """The convergence over time steps.
+
+    An error that vanishes only if accuracy options are refined too is attributed to these options.
 
     Args:
-        study: Over time steps alone.
-        refined: Over time steps that were refined together with the options.
+        study: The convergence over time steps alone.
+        refined: The convergence over time steps that were refined together with the options.
         options: Names of the options.
-        path: Their values and the time steps.
+        path: The values of the options and the time steps, as text.
     """
     if study.cause not in ("model", "unresolved") or study.asymptotic_error is None:
         return study
@@ -149,7 +154,7 @@ def attributed_to_accuracy(study: ConvergenceStudy, refined: ConvergenceStudy | 
 
 
 def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> tuple[Array, Array, Array, Array]:
-    """Time steps, errors, their resolution and what rounding may do, of the part that is largest at the finest step."""
+    """Time steps, errors, their resolution and their rounding errors, of the part that is largest at the finest time step."""
     dts, steps = np.array([point.dt for point in series]), np.array([point.steps for point in series], dtype=float)
     averages = [point.average for point in series]
     resolved = [average for average in averages if np.isfinite(average.parts).all()]
@@ -171,7 +176,7 @@ def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[
 def _budget_of_components(
     scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint], usable: NDArray[np.bool_], rounded: Array
 ) -> ErrorBudget | None:
-    """The error budget of the components, of the flight in which they are longest at the finest step; None if there are too few."""
+    """The error budget of the components in the flight in which they are largest; None if there are too few time steps."""
     kept = [
         (point.dt, point.components, most)
         for point, is_usable, most in zip(series, usable, rounded, strict=True)
@@ -188,7 +193,7 @@ def _budget_of_components(
 
 
 def _order_tolerance(found: ErrorBudget, dts: Array, errors: Array, tolerances: Array) -> float:
-    """How far the order moves when each error that it was fitted to moves by its tolerance."""
+    """The change of the order if each error to which it is fitted changes by its tolerance."""
     used = np.isin(dts, found.dts)
     logs = np.log(dts[used]) - np.mean(np.log(dts[used]))
     shares = tolerances[used] / np.abs(errors[used])

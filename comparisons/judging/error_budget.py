@@ -1,16 +1,17 @@
-"""Error budget: from an error at three or more time steps to its asymptotic value as dt → 0, its order, and its cause.
+"""Error budget: the asymptotic error, the order and the cause of an error that was measured at three or more time steps.
 
-An error that vanishes as dt → 0 is a discretisation error; one that does not is a model error. The asymptotic error is stated with an
-95 % interval; docs/coverage.md counts how often it contains it. The cause is stated where its opposite is improbable:
+An error that vanishes as dt → 0 is a discretisation error; one that does not is a model error. The asymptotic error has a 95 %
+interval; docs/coverage.md counts how often the interval contains the true value. A cause is stated if its opposite is improbable:
 
-    model            the asymptotic error has a sign: 0 and the other sign are improbable
-    discretisation   an asymptotic error larger than allowed is improbable, one up to half of that is likely, and one larger than half of
-                     the error at the coarsest of the three finest steps is very improbable. Allowed is the error at the finest step, or a
-                     64th of that at the coarsest, and more than the noise
+    model            it is improbable that the asymptotic error is 0 or has the other sign
+    discretisation   it is improbable that the asymptotic error is larger than allowed, likely that it is at most half of that, and very
+                     improbable that it is larger than half of the error at the coarsest of the three finest time steps. The allowed size
+                     is the error at the finest time step, or 1/64 of that at the coarsest, but more than the noise
     rounding         no error is larger than rounding
-    unresolved       everything else: the time steps do not decide it
+    unresolved       all other cases: the time steps do not determine the cause
 
-The interval excludes 0 under a model error, contains 0 otherwise, and reaches under a discretisation error no farther than said.
+The interval excludes 0 if the cause is `model`, and contains 0 otherwise; if it is `discretisation`, the interval contains no value above
+the allowed error.
 """
 
 from __future__ import annotations  # help() then shows ArrayLike, not all that it stands for
@@ -30,40 +31,42 @@ Array = NDArray[np.float64]
 
 FEWEST_TIME_STEPS = 3
 MOST_TIME_STEPS = 5
-"""Coarser ones say less and less about dt → 0."""
+"""Largest number of time steps used; coarser ones contain little information about dt → 0."""
 SMALLEST_RATIO = 3.99
 """Extrapolation needs three time steps that span a factor of four."""
 SHARE_OF_COARSEST = 1.0 / 64.0
-"""By this an error of third order falls over three steps that halve; of higher orders the interval is wider than the finest error."""
+"""Factor by which an error of third order falls over three halved time steps."""
 LARGEST_SHARE_OF_COARSEST = 0.5
 MODEL_RISK = 0.03
-"""A model error is stated where 0 and the other sign together are less probable than this. Of series that vanish far fewer come near."""
+"""A model error is stated if the probability of 0 and of the other sign is below this. Far fewer of the series that vanish come near it."""
 DISCRETISATION_RISK = 0.05
-"""A discretisation error is stated where an asymptotic error larger than allowed is less probable than this."""
+"""A discretisation error is stated only if the probability of an asymptotic error larger than allowed is below this."""
 LARGE_RISK = 0.01
-"""And where one larger than half of the error at the coarsest of the three finest steps is less probable than this."""
+"""Largest probability, for a discretisation error, of an asymptotic error above half of the error at the coarsest of the three finest
+steps.
+"""
 LARGER_THAN_HALF = 0.25
-"""Largest probability, under a discretisation error, of an asymptotic error larger than half of what is allowed."""
+"""Largest probability of an asymptotic error larger than half of the allowed one, if a discretisation error is stated."""
 ABOVE_NOISE = 3.0
-"""Errors that are larger than this many times their noise have a size that an order can be fitted to."""
+"""An order is fitted to errors larger than this multiple of their noise."""
 SAME_SLOPE = 0.5
-"""Slopes between neighbouring steps that differ by less belong to one power of the step."""
+"""Slopes between neighbouring time steps that differ by less than this count as one power of the time step."""
 
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """How an error depends on the time step.
+    """The dependence of an error on the time step.
 
     Attributes:
-        cause: What the error is attributed to.
-        reason: Why, in words.
+        cause: The cause to which the error is attributed.
+        reason: The reason for the cause.
         asymptotic_error: The error that does not vanish as dt → 0, in the metric's unit; NaN where it is undefined.
-        lower: Lower end of its 95 % interval.
-        upper: Upper end of its 95 % interval.
+        lower: Lower end of the 95 % interval of the asymptotic error.
+        upper: Upper end of the 95 % interval of the asymptotic error.
         order: Observed order of convergence, fitted to the errors without the asymptotic error; NaN where there is none.
         order_lower: Lower end of the order's 95 % interval.
         order_upper: Upper end of the order's 95 % interval.
-        dts: The time steps that the order was fitted to [s], coarsest first.
+        dts: The time steps to which the order was fitted [s], coarsest first.
     """
 
     cause: Cause
@@ -88,7 +91,7 @@ class ErrorBudget:
 
 
 def is_sufficient(dts: Sequence[float]) -> bool:
-    """Whether time steps are enough for extrapolation: three that span a factor of four."""
+    """Whether time steps suffice for extrapolation, which needs three that span a factor of four."""
     return len(dts) >= FEWEST_TIME_STEPS and max(dts) / min(dts) >= SMALLEST_RATIO
 
 
@@ -103,23 +106,25 @@ def error_budget(
     negligible: float = 0.0,
     judged_together: int = 1,
 ) -> ErrorBudget:
-    """The asymptotic value, the order and the cause of one error.
+    """Estimate the asymptotic value, the order and the cause of one error.
 
     Args:
-        dts: Time steps [s], shape (n,), in any order. The five finest that are usable count.
-        errors: The error at each, shape (n,), in any unit, with its sign if it has one; NaN where the step was too coarse to resolve it.
-        claimed_order: The order that the method is known to have; None or inf if it has none.
+        dts: Time steps [s], shape (n,), in any order. The five finest usable ones are used.
+        errors: The error at each time step, shape (n,), in any unit, with its sign if it has one; NaN if the time step was too coarse to
+            resolve it.
+        claimed_order: The order of accuracy claimed for the method; None or inf if there is none.
         resolution: Standard deviation of the sampling noise of each error, shape (n,), or one for all; in the unit of the errors.
-        rounding: The largest error that rounding alone may cause, at each step, shape (n,), or for all; in the unit of the errors.
-        signed: Whether the error can be negative; one that cannot is taken for the norm of one that can.
+        rounding: The largest error that rounding alone may cause at each time step, shape (n,), or at all of them; in the unit of the
+            errors.
+        signed: Whether the error can be negative; an error that cannot is treated as the norm of a signed error.
         negligible: An asymptotic error up to this size is no model error; in the unit of the errors.
-        judged_together: How many errors are judged together, each with this fraction of the risks of one (C. E. Bonferroni, 1936).
+        judged_together: The number n of errors that are judged together; the error probability of each is 1/n (C. E. Bonferroni, 1936).
 
     Returns:
         The cause, the asymptotic error and the order, each with its 95 % interval.
 
     Raises:
-        DropspinError: The time steps or the errors are not what is described above.
+        DropspinError: The time steps or the errors are invalid.
     """
     h, e = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (dts, errors))
     _verify(h, e, signed)
@@ -132,7 +137,7 @@ def error_budget(
         return ErrorBudget("unresolved", steps)
     if (np.abs(e) <= floor).all():
         value, reach = float(e[-1]), float(floor[-1])
-        return ErrorBudget("rounding", "as small as rounding at every step", value, value - reach, value + reach)
+        return ErrorBudget("rounding", "within rounding at every time step", value, value - reach, value + reach)
     small = np.hypot(noise, floor)
     found = extrapolate(h, e, small, claimed_order, signed=signed)
     cause, median, lower, upper = _attributed(e, found, max(negligible, float(floor[-1])), float(noise[-1]), judged_together)
@@ -146,16 +151,16 @@ def error_budget(
 def vector_budget(
     dts: Array, components: Array, claimed_order: float | None, resolution: Array, rounding: Array, negligible: float
 ) -> ErrorBudget:
-    """The budget of the length of an error vector, from its components, which have signs where the length has none.
+    """The budget of the length of an error vector, from its signed components.
 
-    The length is a model error if a component is one, at more than three steps: with three, kinks look like one too often. It vanishes if
-    all components do. Its interval contains the lengths of all vectors whose components are in their intervals, and 0 unless it is a
-    model error. The order is that of the component with the largest asymptotic error.
+    The length has a model error if a component has one at more than three time steps; with three, a kink looks like a model error too
+    often. The length vanishes if all components vanish. The interval of the length contains the lengths of all vectors whose components
+    are in their intervals; without a model error it also contains 0. The order is that of the component with the largest asymptotic error.
 
     Args:
         dts: Time steps [s], shape (n,).
-        components: At each step, shape (n, k); NaN where the step was too coarse.
-        claimed_order: As for `error_budget`, as all that follows.
+        components: The components at each time step, shape (n, k); NaN if the time step was too coarse.
+        claimed_order: This and the following arguments are as for `error_budget`.
         resolution: Shape (n, k).
         rounding: Shape (n,).
         negligible: The same for each component.
@@ -179,13 +184,13 @@ def _verify(h: Array, e: Array, signed: bool) -> None:
     if h.ndim != 1 or h.shape != e.shape:
         raise DropspinError(f"an error budget takes one error for each time step; got {h.shape} time steps and {e.shape} errors.")
     if not ((h > 0.0) & np.isfinite(h)).all() or len(np.unique(h)) < len(h):
-        raise DropspinError(f"time steps are positive and different; got {', '.join(f'{step:g}' for step in h)}.")
+        raise DropspinError(f"time steps must be positive and different; got {', '.join(f'{step:g}' for step in h)}.")
     if not signed and (e < 0.0).any():
-        raise DropspinError(f"an error without a sign is not negative; got {float(np.nanmin(e)):g}. Say signed=True if it has one.")
+        raise DropspinError(f"an error without a sign cannot be negative; got {float(np.nanmin(e)):g}. Pass signed=True if it has a sign.")
 
 
 def _attributed(e: Array, found: Posterior, floor: float, noise: float, judged_together: int) -> tuple[Cause, float, float, float]:
-    """The cause that the posterior of the asymptotic error implies, and its median and interval; errors coarsest first."""
+    """The cause that the posterior of the asymptotic error implies, with the median and the interval; errors coarsest first."""
     coarsest, finest = float(np.min(np.abs(e[[0, -FEWEST_TIME_STEPS]]))), abs(float(e[-1]))
     large = max(LARGEST_SHARE_OF_COARSEST * coarsest, floor)
     allowed = min(max(finest, SHARE_OF_COARSEST * coarsest, floor), large)
@@ -206,9 +211,9 @@ def _attributed(e: Array, found: Posterior, floor: float, noise: float, judged_t
 
 
 def _fitted_order(h: Array, e: Array, limit: float, small: Array) -> tuple[float, tuple[float, ...]]:
-    """The slope of the error, without its limit, over the three finest steps at which it is not noise; and these steps.
+    """The slope of the error without the asymptotic error, over the three finest steps above the noise, and these steps.
 
-    Errors that noise or rounding could have caused are no noise if they follow one power of the step.
+    Errors that noise or rounding could have caused do not count as noise if they follow a power of the time step.
     """
     rest = e - limit
     clear = np.flatnonzero(np.abs(rest) > ABOVE_NOISE * small)[-FEWEST_TIME_STEPS:]
@@ -227,7 +232,7 @@ def _reason(cause: Cause, e: Array, small: Array, order: float) -> str:
     if cause == "discretisation":
         return "vanishes as dt → 0" if math.isnan(order) else f"vanishes as dt^{order:.2f}"
     if (np.abs(e) <= ABOVE_NOISE * small).all():
-        return "within the sampling noise at every step; more start phases would show more"
+        return "within the sampling noise at every time step; more start phases would reduce the noise"
     if (np.diff(np.abs(e)) > small[1:]).all():
-        return "grows as dt shrinks; finer time steps are needed to see where to"
-    return "the time steps leave open whether it vanishes as dt → 0; finer ones would show"
+        return "grows as dt decreases; finer time steps are needed"
+    return "the time steps do not decide whether it vanishes as dt → 0; finer ones are needed"

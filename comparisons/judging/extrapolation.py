@@ -1,4 +1,4 @@
-"""Extrapolation to dt = 0 with an honest interval: a Bayesian average over the forms that an error may have as a function of the step.
+"""Extrapolation to dt = 0 with a credible interval: a Bayesian average over models of the error as a function of the time step.
 
     e(h) = m + s Hᵖ (c₀ + q (c₁ r Hᵈ + c₂ r² H²ᵈ + c₃ r³ H³ᵈ)) + s ρ Hᵖ ξ(h) + noise        H = h / the coarsest h
 
@@ -27,34 +27,35 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ORDERS = np.arange(0.5, 6.01, 0.5)
-"""Orders that an error may start with."""
+"""Possible orders of the leading term."""
 EACH_ORDER_FURTHER = 0.5
-"""Weight of an order relative to the one that is nearer to 1 by 1: what looks like a high order may be lower powers that cancel."""
+"""Weight of an order relative to the order nearer to 1 by 1, because an apparent high order may be due to lower powers that cancel."""
 LATER_TERMS = 1.0 / 3.0
-"""q: the coefficients after the leading one, relative to it: a series that cancels its own leading term is rare."""
+"""q: the size of further coefficients relative to the leading one; a series whose leading term is cancelled by others is rare."""
 TERM_RATIOS = (0.3, 1.0)
-"""r: how much smaller each further coefficient is, at the coarsest step."""
+"""r: the ratio of each further coefficient to the previous one, at the coarsest time step."""
 TERM_DISTANCES = {1.0: 0.6, 2.0: 0.15, 0.5: 0.15}
-"""d, from one power to the next, and its probability: all powers, even powers only, half powers too."""
+"""d: the difference of successive powers, and its probability: all powers, only even powers, or also half powers."""
 LOGARITHM = 0.1
 """Probability that a logarithm of the step multiplies the leading power."""
 DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
-"""ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime moves each error by a fifth."""
+"""ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime changes each error by a fifth."""
 NO_ASYMPTOTIC_ERROR = 0.5
 """Probability that m is 0 before the errors are seen."""
 SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2
-"""Standard deviations of m, where it is not 0: from a thousandth of the change of the errors to ten times the largest error."""
+"""Standard deviations of m if it is not 0: from a thousandth of the change of the errors to ten times the largest error."""
 NEGLIGIBLE_WEIGHT = 1e-3
-"""The least likely forms, with this much weight together, are left out."""
+"""The least likely forms, whose total weight is this, are left out."""
 HALVINGS = 30
 CREDIBLE = 0.99
-"""Probability of the interval within the model, given that m is not 0: more than the 95 % that are stated, for series that no form
-describes."""
+"""Probability of the interval in this model, given that m is not 0. It exceeds the stated 95 %, to allow for series that no form
+describes.
+"""
 
 
 class _Forms(NamedTuple):
     covariances: Array
-    """Of the series divided by Hᵖ, (forms, n, n)."""
+    """Covariances of the series divided by Hᵖ, shape (forms, n, n)."""
     orders: Array
     log_weights: Array
     without_claim: Array
@@ -65,21 +66,21 @@ class _Fit(NamedTuple):
     log_weights: Array
     """(forms, 1 + scales), the first for m = 0."""
     centres: Array
-    """Of m, as the widths."""
+    """Centres of the distributions of m, of the same shape as the widths."""
     widths: Array
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """What a series of errors says about its value m at dt = 0.
+    """The posterior distribution of the value m of an error at dt = 0.
 
     Attributes:
         zero: Probability that m is 0.
-        weights: Of the Student-t distributions that m follows otherwise, shape (k,), sum 1 - zero.
-        centres: Their centres, of m² where `squares`.
-        widths: Their scales.
+        weights: Weights of the Student-t distributions of m if it is not 0, shape (k,); their sum is 1 - zero.
+        centres: Centres of these distributions, of m² where `squares` is true.
+        widths: Scales of these distributions.
         squares: Whether each is a distribution of m².
-        freedom: Their degrees of freedom.
+        freedom: Degrees of freedom of these distributions.
         has_sign: Whether m can be negative.
         order_lower: Lower end of the interval of the order.
         order_upper: Upper end of the interval of the order.
@@ -101,9 +102,10 @@ class Posterior:
         return float(1.0 - self.zero - high), float(low)
 
     def interval(self, judged_together: int = 1) -> tuple[float, float, float]:
-        """Median, lower and upper end of m, given that it is not 0; of |m|, where m has no sign.
+        """Median, lower and upper end of the interval of m, given that m is not 0; of |m| if m has no sign.
 
-        Of several intervals that are judged together each is wider, so that all are right with the same probability as one.
+        If several intervals are judged together, each is wider, so that the probability that all contain their values is that of a single
+        interval.
         """
         credible = 1.0 - (1.0 - CREDIBLE) / judged_together
         roots = np.where(self.squares, np.sqrt(np.abs(self.centres) + 1e4 * self.widths), np.abs(self.centres) + 1e4 * self.widths)
@@ -132,7 +134,7 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
         dts: Time steps [s], shape (n,), n >= 3.
         errors: The error at each.
         noise: Standard deviation of each.
-        claimed: The order that the method claims: half of the weight of all orders is on it.
+        claimed: The claimed order of the method, which gets half of the weight of all orders.
         signed: Whether the error can be negative.
     """
     h = dts / np.max(dts)
@@ -148,7 +150,7 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
 
 @lru_cache(maxsize=64)
 def _forms(h: tuple[float, ...], claimed: float | None) -> _Forms:
-    """All forms of a series at steps relative to the coarsest."""
+    """All forms of a series, at time steps relative to the coarsest."""
     steps = np.array(h)
     weights = EACH_ORDER_FURTHER ** np.abs(ORDERS - 1.0)
     weights /= weights.sum()
@@ -173,7 +175,7 @@ def _forms(h: tuple[float, ...], claimed: float | None) -> _Forms:
 
 
 def _fit(forms: _Forms, h: Array, e: Array, noise: Array) -> _Fit:
-    """Every form at every scale of m: its weight, and the Student-t distribution of m."""
+    """The weight of every form at every scale of m, and its Student-t distribution of m."""
     size = float(np.max(np.abs(e)))
     scale = max(float(np.ptp(e)), 1e-9 * size, float(np.min(noise)))
     leading = h ** forms.orders[:, None]
@@ -204,7 +206,7 @@ def _fit(forms: _Forms, h: Array, e: Array, noise: Array) -> _Fit:
 
 
 def _posterior(parts: list[_Fit], forms: _Forms, freedom: int) -> Posterior:
-    """All forms together; parts are the fits of e and, of a metric without a sign, of e²."""
+    """All forms combined; the parts are the fits of e and, for a metric without a sign, of e²."""
     top = max(float(np.max(part.log_weights)) for part in parts)
     weights = [np.exp(part.log_weights - top) for part in parts]
     zero, total = sum(float(one[:, 0].sum()) for one in weights), sum(float(one.sum()) for one in weights)
@@ -234,7 +236,7 @@ def student_t(freedom: int, x: Array) -> Array:
 
 
 def _quantiles(below: Callable[[Array], Array], wanted: tuple[float, ...], unit: float, reach: float) -> list[float]:
-    """Quantiles of a distribution between ± reach, by bisection in asinh(x / unit), as they may span many powers of ten."""
+    """Quantiles of a distribution between ± reach, by bisection in asinh(x / unit), because they may span many powers of ten."""
     high = np.full(len(wanted), math.asinh(reach / unit))
     low = -high
     for _ in range(HALVINGS):
@@ -245,7 +247,7 @@ def _quantiles(below: Callable[[Array], Array], wanted: tuple[float, ...], unit:
 
 
 def _order_interval(weights: Array, orders: Array) -> tuple[float, float]:
-    """The orders between which all but the least likely lie, each widened by half the distance to the next."""
+    """The interval of the orders without the least likely ones, extended at each end by half the distance to the next order."""
     each = np.array([weights[orders == order].sum() for order in ORDERS])
     cumulated, outside, half = np.cumsum(each) / each.sum(), 0.5 * (1.0 - CREDIBLE), 0.5 * float(ORDERS[1] - ORDERS[0])
     low, high = ORDERS[np.searchsorted(cumulated, outside)], ORDERS[np.searchsorted(cumulated, 1.0 - outside)]

@@ -1,4 +1,4 @@
-"""What is said of a measurement where the exact solution is valid for a part of the scene only."""
+"""The remark on a measurement whose exact solution is valid only for the first part of the scene."""
 
 from dataclasses import replace
 
@@ -9,10 +9,10 @@ from scenarios import Scenario, Truth
 
 
 def with_horizon(judgement: Judgement, scene: Scenario, metric: Metric, truth: Truth | None, unresolved: Unresolved | None) -> Judgement:
-    """A judgement that states how much of the scene the exact solution covers, where it does not cover all.
+    """A judgement that states how much of the scene the exact solution covers if it does not cover the whole scene.
 
-    A value that is missing for this reason has the verdict `no_truth`, unless an expectation of it failed. A metric of the first impact
-    is not limited: the exact solution has that impact.
+    A value that is missing for this reason has the verdict `no_truth`, unless an expectation of it failed. A metric of the first impact is
+    not limited, because the exact solution contains this impact.
     """
     if isinstance(unresolved, BeyondHorizon) and judgement.verdict == "measured":
         return replace(judgement, verdict="no_truth")

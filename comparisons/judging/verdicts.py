@@ -1,4 +1,4 @@
-"""From a value and a scene's expectations to bounds and a verdict."""
+"""The bounds and the verdict on a measured value, from the expectations of the scene."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -19,7 +19,7 @@ Verdict = Literal[
 ]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 WORDS = {"known": "known fault", "timed_out": "timed out", "no_truth": "no exact solution"}
-"""Verdicts in words, where these are not the verdict itself."""
+"""Words for verdicts that differ from the verdict itself."""
 MARKS = {
     "passed": "✓",
     "failed": "✗",
@@ -53,25 +53,26 @@ SEVERITY = (
 assert set(SEVERITY) == set(VERDICTS)
 FAILURES = frozenset({"failed"})
 BREAKDOWNS = frozenset({"broken", "diverged", "crashed", "timed_out"})
-HOLDS_AGAIN = "the known fault does not show; its expectation can be removed"
-"""How the reason begins of a check that passes although a known fault is expected."""
+HOLDS_AGAIN = "the known fault does not occur; its expectation can be removed"
+"""The beginning of the reason of a check that passes although a known fault is expected."""
 Cause = str
-"""What an error is attributed to: discretisation, model, setting, rounding, chaotic, unresolved, or an option of the engine that sets its
-accuracy; empty where nothing was attributed."""
+"""The cause to which an error is attributed: discretisation, model, setting, rounding, chaotic, unresolved, or an option of the engine that
+sets its
+accuracy; empty if the error was not attributed."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A value and what was judged of it.
+    """A value and the verdict on it.
 
     Attributes:
         value: The value; NaN where there is none.
         verdict: The verdict.
-        lower: Least value allowed, or the lower end of the 95 % interval of an order or an asymptotic error; NaN where there is none.
-        upper: Largest value allowed, or the upper end of that interval; NaN where there is none.
-        cause: What the error is attributed to.
-        reason: Why, in words.
-        tolerance: How far the value may move between two runs before it counts as changed; NaN where it is not compared.
+        lower: Smallest allowed value, or the lower end of the 95 % interval of an order or an asymptotic error; NaN if there is none.
+        upper: Largest allowed value, or the upper end of that interval; NaN if there is none.
+        cause: The cause to which the error is attributed.
+        reason: The reason for the verdict.
+        tolerance: The largest difference between two runs that does not count as a change; NaN if the value is not compared.
     """
 
     value: float
@@ -84,11 +85,11 @@ class Judgement:
 
 
 def judge(scene: Scenario, label: str, dt: float, metric: Metric, value: float) -> Judgement:
-    """Compare one value with what the scene expects of this engine at this time step.
+    """Compare a value with the expectations of the scene for this engine at this time step.
 
-    The most narrowly named expectations count: for an engine at a step, else for an engine, else for a step, else for all. One that
-    names an engine and allows it more than all others, or an error other than 0 only, expects a known fault: while it shows, the value
-    is `known`; a value that meets what all others must meet passes.
+    The most specific expectations apply: for an engine at a time step, else for an engine, else for a time step, else for all. An
+    expectation for an engine that allows more than those for all engines, or that excludes an error of 0, expects a known fault. A value
+    that shows this fault is `known`; a value that meets the expectations for all engines passes.
     """
     matching = [one for one in scene.expect if one.metric == metric.name and one.engine in (None, label) and _is_at(one, dt)]
     if not matching:
@@ -104,10 +105,10 @@ def judge(scene: Scenario, label: str, dt: float, metric: Metric, value: float) 
 
 
 def judge_asymptotic_error(scene: Scenario, label: str, dt: float, metric: Metric, limit: Judgement) -> Judgement:
-    """An asymptotic error beside what the scene expects of this engine at its finest time step [s].
+    """Compare an asymptotic error with the expectations of the scene for this engine at its finest time step [s].
 
-    A model error, or one that a setting causes, is `known` if an expectation names the engine and allows values of its interval, and
-    fails otherwise. A vanishing error passes; if a known fault is expected, with a remark.
+    A model error or a setting error is `known` if an expectation for this engine allows values of its interval, and fails otherwise. A
+    vanishing error passes, with a remark if a known fault is expected.
     """
     named = _narrowest([one for one in scene.expect if one.metric == metric.name and one.engine == label and _is_at(one, dt)])
     reason = "; ".join(one.reason for one in named)
@@ -124,13 +125,13 @@ def judge_asymptotic_error(scene: Scenario, label: str, dt: float, metric: Metri
 
 
 def with_limitations(judgement: Judgement, metric: str, limitations: Iterable[KnownLimitation], least: float | None = None) -> Judgement:
-    """A failure as `limited`, where a known limitation that the engine met explains an error of that size; others unchanged.
+    """Change a failure to `limited` if a known limitation that the engine met explains an error of its size.
 
     Args:
-        judgement: Of a value, or of an asymptotic error.
+        judgement: The judgement of a value or of an asymptotic error.
         metric: Name of the metric.
-        limitations: Those that the engine met.
-        least: The least size of the error, where it has an interval; by default the size of the value.
+        limitations: The limitations that the engine met.
+        least: The smallest size of an error that has an interval; by default the size of the value.
     """
     if judgement.verdict != "failed":
         return judgement
@@ -142,7 +143,7 @@ def with_limitations(judgement: Judgement, metric: str, limitations: Iterable[Kn
 
 
 def with_precision(judgement: Judgement, rounded: float) -> Judgement:
-    """A failure as `limited`, where it is beyond its bound by no more than rounding in the precision that the engine declares may cause."""
+    """Change a failure to `limited` if rounding in the precision that the engine declares can cause its distance from the bound."""
     beyond = max(
         judgement.lower - judgement.value, judgement.value - judgement.upper, key=lambda part: -math.inf if math.isnan(part) else part
     )
@@ -153,7 +154,7 @@ def with_precision(judgement: Judgement, rounded: float) -> Judgement:
 
 
 def verify_expectations(scene: Scenario, truth: Truth | None, engines: Iterable[str]) -> None:
-    """Raise `SceneError` if an expectation would never be judged: no such metric, not for this scene, no such engine."""
+    """Raise `SceneError` if an expectation has an unknown metric or engine, or a metric that does not apply to the scene."""
     known_engines = {*BUILT_IN, *(label.split("[")[0] for label in engines)}
     for number, expectation in enumerate(scene.expect):
         metric_key, engine_key = (_key(scene, number, name) for name in ("metric", "engine"))
@@ -170,7 +171,7 @@ def verify_expectations(scene: Scenario, truth: Truth | None, engines: Iterable[
 
 
 def _key(scene: Scenario, number: int, name: str) -> str:
-    """A key of an expectation, in the scene's file or mapping."""
+    """A key of an expectation in the scene's file or mapping."""
     return f"{scene.origin}: expect[{number}].{name}" if scene.origin else f"scene['expect'][{number}][{name!r}]"
 
 
@@ -195,18 +196,18 @@ def _finite_or_nan(bound: float) -> float:
 
 
 def _is_at(expectation: Expectation, dt: float) -> bool:
-    """Whether an expectation is about a time step [s]."""
+    """Whether an expectation applies to a time step [s]."""
     return expectation.dt is None or any(math.isclose(step, dt, rel_tol=1e-9) for step in expectation.dt)
 
 
 def _narrowest(expectations: Sequence[Expectation]) -> list[Expectation]:
-    """Those for an engine at a step, else for an engine, else for a step, else all."""
+    """The most specific expectations: for an engine at a time step, else for an engine, else for a time step, else for all."""
     narrowness = [2 * (one.engine is not None) + (one.dt is not None) for one in expectations]
     return [one for one, narrow in zip(expectations, narrowness, strict=True) if narrow == max(narrowness)]
 
 
 def _compared(binding: Sequence[Expectation], metric: Metric, value: float) -> Judgement:
-    """A value compared with expectations that must all be met."""
+    """Compare a value with expectations that must all be met."""
     bounds = [_bounds(one, metric) for one in binding]
     lower, upper = max(low for low, _ in bounds), min(high for _, high in bounds)
     verdict: Verdict = "passed" if lower <= value <= upper else "failed"
@@ -214,7 +215,7 @@ def _compared(binding: Sequence[Expectation], metric: Metric, value: float) -> J
 
 
 def _expect_fault(scene: Scenario, named: Sequence[Expectation], metric: Metric) -> bool:
-    """Whether expectations of one engine allow what the scene allows no other: more than all must meet, or an error other than 0 only."""
+    """Whether expectations for one engine allow more than those for all engines, or exclude an error of 0."""
     of_all = [_bounds(one, metric) for one in scene.expect if one.metric == metric.name and one.engine is None]
     bounds = [_bounds(one, metric) for one in named]
     if of_all:

@@ -1,1 +1,1 @@
-"""A motion compared with its reference: metrics, errors over time, tolerances, predicted errors."""
+"""The comparison of a motion with its reference: metrics, errors over time, tolerances, predicted errors."""

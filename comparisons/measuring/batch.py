@@ -1,4 +1,4 @@
-"""Quantities at each state of many motions side by side: the formulas of `scenarios.mechanics` in one compiled loop."""
+"""Quantities at each state of many motions at once: the formulas of `scenarios.mechanics` in one compiled loop."""
 
 from collections.abc import Callable
 from functools import cache
@@ -14,7 +14,7 @@ from scenarios import mechanics
 from scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
 
 REACH = 1.0 + 1e-9
-"""In units of the body's size: while its centre of mass is higher than this, the body cannot touch the floor."""
+"""Height of the centre of mass, relative to the size of the body, above which the body cannot touch the floor."""
 
 
 class _States(NamedTuple):
@@ -30,18 +30,18 @@ class _States(NamedTuple):
 def motions_side_by_side(
     setup: Setup, states: Array, dt: Array, velocity_lag: Array, last_row: RowNumbers, unit_tolerance: float
 ) -> tuple[Motions, Mask]:
-    """Motions from their states, ready to be measured.
+    """Motions from their states, to which metrics can be applied.
 
     Args:
-        setup: What moves.
+        setup: The bodies, and the forces on them.
         states: Shape (B, n, 13).
         dt: Time between two rows [s], shape (B,).
-        velocity_lag: How far velocities lag positions [s], shape (B,).
+        velocity_lag: Time by which velocities lag positions [s], shape (B,).
         last_row: The last row of each motion, shape (B,); later ones are ignored.
-        unit_tolerance: How far the length of a quaternion may be from 1.
+        unit_tolerance: Largest allowed difference of the length of a quaternion from 1.
 
     Returns:
-        The motions, and whether the states of each are valid: finite, with unit quaternions.
+        The motions, and for each whether its states are valid, that is, finite with unit quaternions.
     """
     shape = states.shape[:2]
     height, kinetic, energy, lowest = (np.empty(shape) for _ in range(4))

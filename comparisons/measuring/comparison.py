@@ -1,10 +1,11 @@
-"""A motion compared with its reference: the input of every metric.
+"""The comparison of a motion with its reference, which is the input of every metric.
 
-If the exact solution has impacts, velocities are compared in the inner half of each of its flights. Near an impact they differ for a step
-or two because the impact comes slightly early or late, which is an error of time and is measured as one (`position_error`). A body that
-does not bounce at all still fails, because the flights are those of the exact solution. From the third flight on they end where the body
-is desynchronised, as it would be compared with another flight than its own, and before the first one that is much shorter than the longest:
-so few impacts amplify the errors of the others, and every engine and time step that resolves them is compared in the same flights.
+If the exact solution has impacts, velocities are compared in the middle half of each of its flights. Near an impact, velocities differ for
+a step or two because the impact occurs slightly early or late. This is an error in time, which `position_error` measures. A body that
+does not bounce at all still fails, because the flights are those of the exact solution. From the third flight on, the comparison ends
+where the body is desynchronised, because the flights no longer correspond. It also ends before the first flight that is much shorter than
+the longest, so that few impacts amplify earlier errors, and every engine and time step that resolves the flights is compared in the same
+ones.
 """
 
 from dataclasses import dataclass
@@ -25,31 +26,31 @@ Rows = NDArray[np.intp]
 
 SHORTEST_FLIGHT = 16  # steps; a shorter flight is not resolved, and not judged
 SHORT = 0.2
-"""A flight is much shorter than the longest if it lasts less than this share of it: it is 25 times as low."""
+"""A flight is much shorter than the longest if it lasts less than this share of it; its apex is then 25 times lower."""
 
 
 class Unresolved(Exception):
-    """The time step is too coarse for a metric; the text says why."""
+    """The time step is too coarse for a metric; the message gives the reason."""
 
 
 class BeyondHorizon(Unresolved):
-    """The exact solution ends before there is enough to compare."""
+    """The exact solution ends too early for a comparison."""
 
 
 def exactly(truth: Truth, times: Array) -> Trajectory:
-    """The exact solution at those of some times at which it is known."""
+    """The exact solution at those of the given times at which it is known."""
     return truth(times[truth.covers(times)])
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A motion and the reference that it is compared with.
+    """A motion and the reference with which it is compared.
 
     Attributes:
         scene: The scene that was run.
         motion: The engine's motion: at least two rows, equally spaced in time.
-        reference: The exact solution or another engine's motion, at the same times as far as it is known; None if there is neither.
-        impacts: Times of the exact impacts [s]; empty where they are not known.
+        reference: The exact solution or the motion of another engine, at the same times, up to its end; None if there is neither.
+        impacts: Times of the exact impacts [s]; empty if they are not known.
     """
 
     scene: Scenario
@@ -59,24 +60,24 @@ class Comparison:
 
     @classmethod
     def with_truth(cls, scene: Scenario, motion: Trajectory, truth: Truth | None, exact: Trajectory | None = None) -> "Comparison":
-        """Compare a motion with the exact solution, as far as it is known; `exact` is the result of `exactly` if it is available."""
+        """Compare a motion with the exact solution, up to its end; `exact` is the result of `exactly` if it was already computed."""
         if truth is None:
             return cls(scene, motion)
         return cls(scene, motion, exactly(truth, motion.t) if exact is None else exact, tuple(event.time for event in truth.events))
 
     @classmethod
     def between(cls, one: "Comparison", other: "Comparison", until: int) -> "Comparison":
-        """Compare two engines' motions over `until` rows; energies computed for the comparison with the exact solution are reused."""
+        """Compare the motions of two engines over `until` rows; energies that were already computed are reused."""
         case = cls(one.scene, one.motion, other.motion[:until], one.impacts)
         vars(case).update(energy=one.energy, exact_energy=other.energy[:until])
         return case
 
     @cached_property
     def exact(self) -> Trajectory:
-        """The reference; metrics that need one apply only where there is one.
+        """The reference; metrics that need a reference apply only if there is one.
 
         Raises:
-            BeyondHorizon: It ends after too few steps.
+            BeyondHorizon: The reference ends after too few steps.
         """
         assert self.reference is not None
         if len(self.reference) < min(SHORTEST_FLIGHT, len(self.motion) - 1):
@@ -95,32 +96,32 @@ class Comparison:
 
     @cached_property
     def motions(self) -> Motions:
-        """The motion, for what is measured without a reference."""
+        """The motion as the input of metrics that need no reference."""
         return Motions.of(self.scene, self.motion)
 
     @cached_property
     def energy(self) -> Array:
-        """Of the motion, velocity synchronised with position [J], shape (n,)."""
+        """Energy of the motion, velocity synchronised with position [J], shape (n,)."""
         return self.motions.energy
 
     @property
     def lowest_height(self) -> Array:
-        """Of the body's lowest point above the floor [m], shape (n,)."""
+        """Height of the body's lowest point above the floor [m], shape (n,)."""
         return self.motions.lowest_height
 
     @cached_property
     def exact_energy(self) -> Array:
-        """Of the reference [J], shape (m,)."""
+        """Energy of the reference [J], shape (m,)."""
         return energy(self.scene, self.exact)
 
     @cached_property
     def angular_momentum(self) -> Array:
-        """Of the motion at the reference's times [kg m²/s], shape (m, 3)."""
+        """Angular momentum of the motion at the reference's times [kg m²/s], shape (m, 3)."""
         return angular_momentum(self.scene, self.compared)
 
     @cached_property
     def exact_angular_momentum(self) -> Array:
-        """Of the reference [kg m²/s], shape (m, 3)."""
+        """Angular momentum of the reference [kg m²/s], shape (m, 3)."""
         return angular_momentum(self.scene, self.exact)
 
     @cached_property
@@ -130,14 +131,14 @@ class Comparison:
 
     @property
     def has_impact_to_come(self) -> bool:
-        """Whether the first impact comes after the first step, so that its phase within a step matters."""
+        """Whether the first impact occurs after the first step, so that errors depend on its time within a step."""
         return bool(self.impacts) and self.impacts[0] > self.dt
 
     @cached_property
     def flights(self) -> list[Rows]:
-        """Rows in the inner half of each flight; the first one counts from the start, the last one to the end.
+        """Rows in the middle half of each flight; the first flight begins at the start, and the last one ends at the end of the motion.
 
-        Without a reference only the flight up to the first contact is one.
+        Without a reference, only the motion up to the first contact is a flight.
         """
         rows = np.arange(len(self.motion if self.reference is None else self.reference))
         times = self.motion.t[rows]
@@ -161,7 +162,7 @@ class Comparison:
 
     @cached_property
     def desynchronised_from(self) -> float:
-        """When the flight begins in which the body is desynchronised [s]; infinite if that never happens."""
+        """Time at which the flight begins in which the body is desynchronised [s]; infinite if there is no such flight."""
         times = self.motion.t[: len(self.exact)]
         for start, end in pairwise([*self.impacts, times[-1]]):
             within = 0.25 * (end - start)
@@ -187,29 +188,29 @@ class Comparison:
         """The scene's energy [J]: `Motions.energy_scale`; without a floor, the reference's largest kinetic energy.
 
         Raises:
-            Unresolved: There is no energy at all.
+            Unresolved: The scene has no energy.
         """
         if self.scene.floor is None and self.reference is not None:
             scale = float(kinetic_energy(self.scene, self.reference).max())
         else:
             scale = float(self.motions.energy_scale)
         if scale == 0.0:
-            raise Unresolved("nothing moves and nothing pulls: there is no energy to measure by")
+            raise Unresolved("the body does not move and no force acts, so there is no energy scale")
         return scale
 
     @cached_property
     def first_contact(self) -> tuple[int, int] | None:
-        """The rows just before and just after the floor first changes the velocity; None without a contact."""
+        """The last row before and the first row after the floor first changes the velocity; None without a contact."""
         before, after = self.motions.first_contact
         return None if before < 0 else (int(before), int(after))
 
     @property
     def touching(self) -> NDArray[np.bool_]:
-        """The steps in which the floor changes the velocity, shape (n - 1,)."""
+        """For each step, whether the floor changes the velocity in it, shape (n - 1,)."""
         return self.motions.states.touching
 
     def contact_point(self, row: int) -> Array:
-        """From the centre of mass to the lowest point at a row [m], shape (3,); the mean of several equally low points."""
+        """The vector from the centre of mass to the lowest point at a row [m], shape (3,); the mean if several points are equally low."""
         offsets = rotate(self.motion.orientation[row], self.scene.body.vertices)
         lowest = offsets[:, 1] <= offsets[:, 1].min() + 1e-6 * self.scene.body.size
         point: Array = offsets[lowest].mean(axis=0) - np.array([0.0, self.scene.body.rounding, 0.0])

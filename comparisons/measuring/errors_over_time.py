@@ -1,4 +1,4 @@
-"""Errors at each time of a motion; a metric is usually the largest of them."""
+"""Errors at each time of a motion; a metric is usually the largest of these errors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ Array = NDArray[np.float64]
 
 
 def energy_error(case: Comparison, synchronised: bool = True) -> Array:
-    """Energy minus the truth's, over the scene's energy."""
+    """Difference of energy from that of the exact solution, over the scene's energy."""
     found = case.energy[: len(case.exact)] if synchronised else energy(case.scene, case.compared, synchronised=False)
     return (found - case.exact_energy) / case.energy_scale
 
 
 def angular_momentum_error(case: Comparison) -> Array:
-    """Difference of angular momentum from the truth, over the truth's largest."""
+    """Difference of angular momentum from the exact solution, over the largest exact value."""
     return length(angular_momentum_difference(case))
 
 
 def angular_momentum_difference(case: Comparison) -> Array:
-    """The same as a vector in the world frame, shape (n, 3)."""
+    """The difference as a vector in the world frame, over the largest exact value, shape (n, 3)."""
     exact = case.exact_angular_momentum
     scale = np.max(length(exact))
     if scale == 0.0:
@@ -35,27 +35,27 @@ def angular_momentum_difference(case: Comparison) -> Array:
 
 
 def angular_momentum_direction_error(case: Comparison) -> Array:
-    """Angle between the angular momentum and the truth's [rad]."""
+    """Angle between the angular momentum and that of the exact solution [rad]."""
     return angle_between_vectors(case.angular_momentum, case.exact_angular_momentum)
 
 
 def position_error(case: Comparison) -> Array:
-    """Distance of the centre of mass from the truth's [m]."""
+    """Distance of the centre of mass from that of the exact solution [m]."""
     return length(position_difference(case))
 
 
 def position_difference(case: Comparison) -> Array:
-    """From the truth's centre of mass to the engine's [m], shape (n, 3)."""
+    """The vector from the exact centre of mass to that of the engine [m], shape (n, 3)."""
     return case.compared.position - case.exact.position
 
 
 def orientation_error(case: Comparison) -> Array:
-    """Angle of the rotation from the truth's attitude to the engine's [rad]."""
+    """Angle of the rotation from the exact orientation to that of the engine [rad]."""
     return angle_between_orientations(case.compared.orientation, case.exact.orientation)
 
 
 def orientation_difference(case: Comparison) -> Array:
-    """The rotation from the truth's attitude to the engine's as a vector in the world frame [rad], shape (n, 3)."""
+    """The rotation from the exact orientation to that of the engine as a vector in the world frame [rad], shape (n, 3)."""
     return rotation_vector(case.exact.orientation, case.compared.orientation)
 
 
@@ -74,4 +74,4 @@ ERRORS = {
     "position_error": ErrorOverTime(position_error, in_flight=False),
     "orientation_error": ErrorOverTime(orientation_error, in_flight=False),
 }
-"""By the name of the metric that is the largest of each."""
+"""Errors by the name of the metric that is their largest value."""

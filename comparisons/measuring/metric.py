@@ -1,6 +1,6 @@
 """A metric and its average over start phases.
 
-Flights are kept separate, so that errors are averaged over start phases before the largest is taken, not after.
+Errors are stored for each flight. They are averaged over the start phases first; the metric is the largest of the averages.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,19 +24,19 @@ class Metric:
     """One metric.
 
     Attributes:
-        name: Its name in the results.
+        name: The name in the results.
         unit: SI unit; '1' for a ratio.
-        kind: What a motion is compared with: an exact solution (`truth`), or a conservation law (`invariant`).
-        signed: Whether its sign has a meaning.
-        definition: Its definition in a sentence.
-        needs: What a scene must have, in words.
-        applies: Whether a scene, with its exact solution, has that.
-        measure: The function from a comparison to the value, or to those of each flight; it raises `Unresolved` where the time step is too
-            coarse.
-        components: Where the value is the length of a vector, the function from a comparison to that vector at the end of the inner half
-            of each flight, shape (flights, 3); else None.
-        agreement: Whether two engines are compared with each other by it.
-        first_flight: Whether it depends only on the first impact and the flight after it.
+        kind: The reference of the metric: an exact solution (`truth`) or a conservation law (`invariant`).
+        signed: Whether the sign of the value has a meaning.
+        definition: The definition in a sentence.
+        needs: The properties that a scene must have, in words.
+        applies: Whether a scene, with its exact solution, has these properties.
+        measure: The function from a comparison to the value, or to the values of each flight; it raises `Unresolved` if the time step is
+            too coarse.
+        components: If the value is the length of a vector, the function from a comparison to this vector at the end of the middle half of
+            each flight, shape (flights, 3); otherwise None.
+        agreement: Whether the metric is also used to compare two engines with each other.
+        first_flight: Whether the value depends only on the first impact and the flight after it.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Metric:
     first_flight: bool = False
 
     def average(self, cases: Sequence[Comparison]) -> "Average":
-        """The average over start phases.
+        """The average of the metric over start phases.
 
         Raises:
             Unresolved: The time step is too coarse.
@@ -60,7 +60,7 @@ class Metric:
         return self._average(self.measure, cases)
 
     def average_components(self, cases: Sequence[Comparison]) -> "Average | None":
-        """The average of the components over start phases, parts of shape (flights, 3); None for a metric that has none.
+        """The average of the components over start phases, parts of shape (flights, 3); None for a metric without components.
 
         Raises:
             Unresolved: The time step is too coarse.
@@ -82,7 +82,7 @@ class Metric:
         return Average(phases.mean(axis=0), resolutions, np.ptp(phases, axis=0) / len(phases))
 
     def value_or_nan(self, cases: Sequence[Comparison]) -> float:
-        """The average's value; NaN where the time step is too coarse for it."""
+        """The value of the average; NaN if the time step is too coarse."""
         try:
             return self.average(cases).value
         except Unresolved:
@@ -90,9 +90,10 @@ class Metric:
 
 
 class Average(NamedTuple):
-    """A metric's means over start phases, their sampling noise, and how far one phase may move them.
+    """The means of a metric over start phases, their sampling noise, and the effect of a single start phase on them.
 
-    One for each flight, shape (flights,), or the largest and the least of each, (flights, 2), or the components at its end, (flights, 3).
+    There is one mean for each flight, shape (flights,), or one for the largest and one for the smallest value of each flight, shape
+    (flights, 2), or one for each component, shape (flights, 3).
     """
 
     parts: Array
@@ -101,7 +102,7 @@ class Average(NamedTuple):
 
     @property
     def jump(self) -> float:
-        """How far the value may move if one of the starts falls into the neighbouring step; 0 for a single start."""
+        """The change of the value if the impact of one start phase moves to the neighbouring time step; 0 for a single start."""
         return float(np.max(np.abs(self.parts) + self.jumps)) - abs(self.value)
 
     @property

@@ -1,4 +1,4 @@
-"""The metrics: functions from a comparison to a value, or to one or two values for each flight. A docstring is the definition."""
+"""The metrics: functions from a comparison to one value, or to values for each flight. Docstrings are the definitions."""
 
 from collections.abc import Callable
 from typing import Literal, TypeVar
@@ -38,7 +38,7 @@ def _metric(
     agreement: bool = False,
     first_flight: bool = False,
 ) -> Callable[[AnyMeasure], AnyMeasure]:
-    """Register a function as a metric; its name is the metric's, its docstring the definition."""
+    """Register a function as a metric, with the name of the function as name and its docstring as definition."""
 
     def register(measure: AnyMeasure) -> AnyMeasure:
         name, definition = measure.__name__, " ".join((measure.__doc__ or "").split())
@@ -49,23 +49,23 @@ def _metric(
 
 
 def _at_end_of_each_flight(at_each_row: Components) -> Components:
-    """Components at the last row of the inner half of each flight, shape (flights, 3).
+    """Components at the last row of the middle half of each flight, shape (flights, 3).
 
-    That time is the same at every time step but for less than a step, and far from impacts, near which an error is one of time. The time
-    at which an error is largest moves with the step, and then its components do not follow a power of it.
+    This time is the same at every time step, to within one step, and far from impacts, near which errors are errors in time. The time at
+    which an error is largest depends on the time step, so the components at that time do not follow a power of the time step.
     """
     return lambda case: at_each_row(case)[[rows[-1] for rows in case.flights]]
 
 
 @_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True, agreement=True)
 def energy_error(case: Comparison) -> Array:
-    """Largest difference of energy from the exact solution in flight, velocity synchronised with position, over the scene's energy."""
+    """Largest difference of energy from the exact solution in flight, over the scene's energy, with velocity synchronised with position."""
     return _extremes_of_each_flight(errors.energy_error(case), case)
 
 
 @_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True)
 def energy_error_raw(case: Comparison) -> Array:
-    """Like energy_error, but velocity and position are not synchronised: velocities of some engines lag positions by half a step."""
+    """Like energy_error, but with velocities as stored, which in some engines lag positions by half a step."""
     return _extremes_of_each_flight(errors.energy_error(case, synchronised=False), case)
 
 
@@ -77,7 +77,7 @@ def energy_drift(case: Comparison | Motions) -> Array:
 
 @_metric("1", "invariant", "no damping", requirements.keeps_energy)
 def energy_gain(case: Comparison | Motions) -> Array:
-    """Largest rise of energy above any earlier value, over the scene's energy."""
+    """Largest increase of energy above any earlier value, over the scene's energy."""
     return (case.energy - np.minimum.accumulate(case.energy, axis=-1)).max(axis=-1) / case.energy_scale
 
 
@@ -91,7 +91,7 @@ def energy_gain(case: Comparison | Motions) -> Array:
     first_flight=True,
 )
 def bounce_height_error(case: Comparison) -> float:
-    """Apex of the centre of mass after the first impact minus the exact one, over the height of the drop."""
+    """Apex height of the centre of mass after the first impact minus the exact apex height, over the height of the drop."""
     if len(case.flights) < 2:
         raise Unresolved(f"the flight after the impact is too short for steps of {case.dt:g} s")
     rows = case.flights[1]
@@ -101,10 +101,10 @@ def bounce_height_error(case: Comparison) -> float:
 
 @_metric("1", "truth", "an exact solution with an impact", requirements.has_impact, signed=True, first_flight=True)
 def restitution_error(case: Comparison) -> float:
-    """Separation speed over approach speed of the contact point in the first impact, from native rows, minus the restitution."""
+    """Separation speed over approach speed of the contact point in the first impact, minus the coefficient of restitution."""
     assert case.scene.floor is not None
     if not case.impacts or case.impacts[0] > case.motion.t[-1] - 3.0 * case.dt:
-        raise Unresolved("the impact falls into the last three steps")
+        raise Unresolved("the impact occurs in the last three time steps")
     if case.first_contact is None:
         return float("nan")  # there was no impact
     before, after = case.first_contact
@@ -137,18 +137,19 @@ def _moment_in_first_impact(case: Comparison) -> Array:
     "1", "invariant", "an exact solution with an impact", requirements.has_impact, components=_moment_in_first_impact, first_flight=True
 )
 def contact_momentum_error(case: Comparison) -> float:
-    """Change of angular momentum about the contact point in the first impact, over M times that point's distance times the speed before.
+    """Change of angular momentum about the contact point in the first impact, over M r v.
 
-    No impulse at that point has a moment about it; gravity's impulse is subtracted.
+    M is the mass, r the distance of the contact point from the centre of mass, and v the speed before the impact. An impulse at the contact
+    point has no moment about it; the impulse of gravity is subtracted.
     """
     return float(np.linalg.norm(_moment_in_first_impact(case)))
 
 
 @_metric("1", "truth", "an exact solution that comes to rest", requirements.comes_to_rest, signed=True)
 def rest_time_error(case: Comparison) -> float:
-    """Time at which the body comes to rest, minus the exact one, over the exact one.
+    """Time at which the body comes to rest minus the exact time, over the exact time.
 
-    It is in motion while its kinetic energy, that of the spin included, exceeds that of the speed 2 g dt and 1e-6 M g times its size.
+    The body is in motion while its kinetic energy, including rotation, exceeds M (2 g dt)²/2 and 1e-6 M g times its size.
     """
     found, exact = (last_time_in_motion(case.scene, motion) for motion in (case.compared, case.exact))
     if exact == 0.0:
@@ -158,7 +159,7 @@ def rest_time_error(case: Comparison) -> float:
 
 @_metric("m/s", "truth", "an exact solution that comes to rest", requirements.comes_to_rest)
 def rest_jitter(case: Comparison) -> float:
-    """Root mean square of the vertical velocity in the last tenth, in which the body should be at rest."""
+    """Root mean square of the vertical velocity in the last tenth of the scene, in which the body rests in the exact solution."""
     rows = case.motion.t >= 0.9 * case.motion.t[-1]
     return float(np.sqrt(np.mean(case.motion.velocity[rows, 1] ** 2)))
 
@@ -167,7 +168,7 @@ def rest_jitter(case: Comparison) -> float:
     "1", "truth", "an exact solution that turns on the floor before its first impact", requirements.lands, signed=True, first_flight=True
 )
 def landing_error(case: Comparison) -> float:
-    """Angular speed three steps after the first landing over three steps before it, minus the exact ratio."""
+    """Ratio of the angular speed three steps after the first landing to that three steps before it, minus the exact ratio."""
     edges = [0.0, *case.impacts[:2], case.exact.t[-1]]
     if min(edges[1] - edges[0], edges[2] - edges[1]) < SHORTEST_FLIGHT * case.dt:
         raise Unresolved(f"the body falls and rises again within {SHORTEST_FLIGHT} steps of {case.dt:g} s")
@@ -179,7 +180,7 @@ def landing_error(case: Comparison) -> float:
 
 @_metric("1/s", "truth", "an exact solution that bounces or rocks more than once", requirements.repeats_impacts)
 def desync_rate(case: Comparison) -> float:
-    """1 over the first time at which the error of height reaches half the height of a flight (desynchronised); 0 if it never does."""
+    """Reciprocal of the first time at which the height error reaches half the height of a flight (desynchronised); 0 if there is none."""
     return 1.0 / case.desynchronised_from
 
 
@@ -198,13 +199,13 @@ def angular_momentum_error(case: Comparison) -> Array:
 
 @_metric("rad", "truth", "an exact solution with spin, a start in flight", requirements.spins_in_flight)
 def angular_momentum_direction_error(case: Comparison) -> Array:
-    """Largest angle in flight between the angular momentum and the exact one."""
+    """Largest angle in flight between the angular momentum and the exact angular momentum."""
     return _largest_of_each_flight(errors.angular_momentum_direction_error(case), case)
 
 
 @_metric("1", "invariant", "a frictionless floor, gravity straight down, no damping", requirements.keeps_horizontal_momentum)
 def horizontal_momentum_error(case: Comparison) -> float:
-    """Largest change of the horizontal velocity, over the speed that corresponds to the scene's energy."""
+    """Largest change of the horizontal velocity, over the speed at which the kinetic energy equals the scene's energy."""
     sideways = (case.motion.velocity - np.array(case.scene.start.velocity))[:, [0, 2]]
     speed = np.sqrt(2.0 * case.energy_scale / case.scene.body.mass)
     return float(np.max(length(sideways)) / speed)
@@ -212,13 +213,13 @@ def horizontal_momentum_error(case: Comparison) -> float:
 
 @_metric("m", "truth", "an exact solution", requirements.has_truth, components=_at_end_of_each_flight(errors.position_difference))
 def position_error(case: Comparison) -> float:
-    """Largest distance of the centre of mass from the exact one."""
+    """Largest distance of the centre of mass from its exact position."""
     return float(np.max(errors.position_error(case)))
 
 
 @_metric("rad", "truth", "an exact solution", requirements.has_truth, components=_at_end_of_each_flight(errors.orientation_difference))
 def orientation_error(case: Comparison) -> float:
-    """Largest angle of the rotation from the exact attitude to the engine's."""
+    """Largest angle of the rotation from the exact orientation to that of the engine."""
     return float(np.max(errors.orientation_error(case)))
 
 
@@ -229,7 +230,7 @@ def penetration(case: Comparison | Motions) -> Array:
 
 
 def leading_metric(scene: Scenario) -> str:
-    """The metric that a scene with an exact solution is about: bounce height, else attitude if it turns, else position."""
+    """The leading metric of a scene with an exact solution: bounce height, else orientation if the body rotates, else position."""
     truth = truth_for(scene)
     assert truth is not None
     names = {metric.name for metric in metrics_for(scene, truth)}
@@ -251,5 +252,5 @@ def _largest_of_each_flight(values: Array, case: Comparison) -> Array:
 
 
 def _extremes_of_each_flight(values: Array, case: Comparison) -> Array:
-    """The largest and the least value in each flight, shape (flights, 2); each may converge at an order of its own."""
+    """The largest and the smallest value in each flight, shape (flights, 2), which may converge with different orders."""
     return np.array([(values[rows].max(), values[rows].min()) for rows in case.flights])

@@ -1,6 +1,6 @@
-"""What is measured of a motion without a reference solution: first contact, energy scale, rebound, rest.
+"""Quantities of a motion that need no reference solution: first contact, energy scale, rebound height, time to rest.
 
-The same definitions serve one motion and many side by side. A quantity of a motion has shape (...): () for one motion, (B,) for B motions;
+The same definitions apply to one motion and to many at once. A quantity of a motion has shape (...): () for one motion, (B,) for B motions;
 a quantity at each state has shape (..., n).
 """
 
@@ -26,7 +26,7 @@ class StateQuantities(Protocol):
 
     @property
     def height(self) -> Array:
-        """Of the centre of mass [m], shape (..., n)."""
+        """Height of the centre of mass [m], shape (..., n)."""
 
     @property
     def kinetic_energy(self) -> Array:
@@ -38,27 +38,27 @@ class StateQuantities(Protocol):
 
     @property
     def lowest_height(self) -> Array:
-        """Of the body's lowest point above the floor [m], shape (..., n); inf is allowed where no point can be below the floor."""
+        """Height of the body's lowest point above the floor [m], shape (..., n); inf is allowed where no point can be below the floor."""
 
     @property
     def touching(self) -> Mask:
-        """In which steps the floor changes the velocity (`is_touching`), shape (..., n - 1)."""
+        """For each step, whether the floor changes the velocity (`is_touching`), shape (..., n - 1)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What moves, and what acts on it. Among many motions, a first axis of length 1 stands for values that all share.
+    """A body and the forces on it. For many motions, a first axis of length 1 contains values that all motions share.
 
     Attributes:
-        mass: [kg], shape (...).
-        inertia: In the body frame [kg m²], shape (..., 3, 3).
-        vertices: From the centre of mass, body frame [m], shape (..., m, 3).
+        mass: Mass [kg], shape (...).
+        inertia: Inertia tensor in the body frame [kg m²], shape (..., 3, 3).
+        vertices: Vertices relative to the centre of mass, in the body frame [m], shape (..., m, 3).
         rounding: Radius of the vertices [m], shape (...).
         size: Distance of the farthest point of the body from the centre of mass [m], shape (...).
-        origin: Where the potential energy is 0 [m], shape (..., 3).
+        origin: Position of zero potential energy [m], shape (..., 3).
         clearance: Height of the lowest point above the floor at the start [m], shape (...).
-        gravity: [m/s²], shape (..., 3).
-        damping: Decay rate of the velocity [1/s], shape (...); None where damping is not modelled.
+        gravity: Acceleration of gravity [m/s²], shape (..., 3).
+        damping: Decay rate of the velocity [1/s], shape (...); None if damping is not modelled.
         floor: Whether there is a floor.
     """
 
@@ -91,11 +91,11 @@ class Setup:
         )
 
     def __getitem__(self, motions: RowNumbers | Mask) -> "Setup":
-        """The setups of some of many motions."""
+        """The setups of a selection of the motions."""
         return self._with_arrays(lambda values: values if len(values) == 1 else values[motions])
 
     def as_batch(self) -> "Setup":
-        """The setup of one motion as that of a batch of one."""
+        """The setup of one motion as a batch with one motion."""
         return self._with_arrays(lambda values: values[np.newaxis])
 
     def _with_arrays(self, change: Callable[[Array], Array]) -> "Setup":
@@ -115,16 +115,16 @@ class Setup:
         return np.sqrt(scalar_product((x, y, z), (x, y, z)))
 
     def damping_share(self, dt: Array) -> Array:
-        """The share of its velocity that a body loses by damping in a step, shape (...)."""
+        """The share of the velocity that a body loses by damping in a step, shape (...)."""
         return np.zeros_like(dt) if self.damping is None else dt * self.damping
 
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """One motion, or many side by side.
+    """One motion, or many at once.
 
     Attributes:
-        setup: What moves.
+        setup: The bodies and the forces on them.
         states: Quantities at each state.
         dt: Time between two rows [s], shape (...).
         last_row: The last row of each motion, shape (...).
@@ -137,7 +137,7 @@ class Motions:
 
     @classmethod
     def of(cls, scene: Scenario, motion: Trajectory) -> "Motions":
-        """One motion of a scene: at least two rows, equally far apart in time."""
+        """One motion of a scene: at least two rows, equally spaced in time."""
         return cls(Setup.of(scene), _StatesOfOne(scene, motion), np.asarray(motion.t[1] - motion.t[0]), np.asarray(len(motion) - 1))
 
     @property
@@ -147,14 +147,15 @@ class Motions:
 
     @property
     def lowest_height(self) -> Array:
-        """Of the body's lowest point above the floor [m], shape (..., n)."""
+        """Height of the body's lowest point above the floor [m], shape (..., n)."""
         return self.states.lowest_height
 
     @cached_property
     def energy_scale(self) -> Array:
         """The scene's energy [J], shape (...): M g H down to the floor or the start's kinetic energy, whichever is larger.
 
-        H is the body's size for one that starts on the floor, and without a floor. The scale is 0 where nothing moves and nothing pulls.
+        H is the size of the body if it starts on the floor, or if there is no floor. The scale is 0 if the body does not move and no force
+        acts.
         """
         setup = self.setup
         height = np.where(setup.starts_above_floor, setup.clearance, setup.size)
@@ -162,9 +163,9 @@ class Motions:
 
     @cached_property
     def first_contact(self) -> tuple[RowNumbers, RowNumbers]:
-        """The rows just before and just after the floor first changes the velocity, shape (...) each; -1 where it never does.
+        """The last row before and the first row after the floor first changes the velocity, each of shape (...); -1 if there is no contact.
 
-        The row after a contact that lasts to the end is the last one.
+        If the contact lasts to the end, the second is the last row.
         """
         if not self.setup.floor:
             return np.full(self.last_row.shape, -1), np.full(self.last_row.shape, -1)
@@ -177,13 +178,13 @@ class Motions:
 
     @cached_property
     def first_flight_end(self) -> RowNumbers:
-        """The row just before the first contact, or the last row, shape (...)."""
+        """The last row before the first contact, or the last row, shape (...)."""
         before, _ = self.first_contact
         return np.where(before < 0, self.last_row, before)
 
     @cached_property
     def rebound(self) -> Array:
-        """Largest height of the centre of mass after the first contact, over its height at the start, shape (...); 0 without a contact."""
+        """Largest height of the centre of mass after the first contact, over its initial height, shape (...); 0 without a contact."""
         height, (before, after) = self.states.height, self.first_contact
         later = np.where(np.arange(height.shape[-1]) >= after[..., None], height, -np.inf)
         with np.errstate(invalid="ignore", divide="ignore"):  # without a floor a start may have height 0
@@ -202,9 +203,9 @@ class Motions:
 def is_touching(before: Components, after: Components, dt: float, gravity: Components, strength: float, damping_share: float) -> Any:
     """Whether the floor changes the velocity in a step, from the velocities before and after it.
 
-    Without contact, a step changes the velocity by gravity and damping alone. What is left over counts as contact above
-    1e-3 of gravity's share, 1e-6 of the speed (an engine in single precision) and twice the damping's share (each engine
-    damps by a law of its own). Plain arithmetic as in `scenarios.mechanics`: of one step, or of arrays of steps.
+    Without contact, only gravity and damping change the velocity. A remaining change counts as a contact if it exceeds 1e-3 of the change
+    by gravity, 1e-6 of the speed (for engines in single precision) and twice the change by damping (because engines use different laws of
+    damping). The arithmetic is plain, as in `scenarios.mechanics`, for one step or for arrays of steps.
     """
     x = after[0] - before[0] - dt * gravity[0]
     y = after[1] - before[1] - dt * gravity[1]
@@ -247,5 +248,5 @@ class _StatesOfOne:
 
 
 def at_rows(values: Array, rows: RowNumbers | int) -> Array:
-    """The value of each motion at a row of its own: shapes (..., n) and (...) to (...)."""
+    """The value of each motion at a given row of this motion: shapes (..., n) and (...) to (...)."""
     return np.take_along_axis(values, np.asarray(rows)[..., None], axis=-1)[..., 0]

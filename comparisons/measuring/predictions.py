@@ -1,13 +1,13 @@
-"""Predicted errors: what the error of an integration scheme must be, where theory gives it.
+"""Predicted errors: the error of an integration scheme, where it follows from theory.
 
 Free flight: semi-implicit Euler has an exact discrete solution (`scenarios.discrete_flight`); the prediction is its error.
-A body that falls flat from the height H and meets the floor at the speed u has, averaged over start phases, these relative errors:
+A body that falls flat from the height H and strikes the floor with the speed u has these relative errors, averaged over start phases:
 
     impact detected late, v⁺ = -e v⁻ - s g h     bounce height  -(1 - e)/2 u h/H,          restitution  -s g h/u
     gravity before the impact, as in the note    bounce height  (2e - 1)(1 + e)/2 u h/H,   restitution  e g h/u
 
-s is the share of a step's gravity by which an engine's rebound is slower. Source: expansion of one step about the impact, to first order in
-the step h.
+s is the speed that the rebound loses, relative to the velocity that gravity adds in one step. Source: expansion of one step about the
+impact, to first order in the step h.
 """
 
 import math
@@ -22,7 +22,7 @@ from scenarios.mechanics import angular_momentum
 
 
 def flight_error(scene: Scenario, truth: Truth | None, metric: str, dt: float, *, exact_rotation: bool) -> float | None:
-    """The error of semi-implicit Euler in free flight; None if the rotation is not that simple, or the scene is not a free flight."""
+    """The error of semi-implicit Euler in free flight; None for other scenes and for rotations without a simple discrete solution."""
     if truth is None or scene.floor is not None or scene.damping is not None or (exact_rotation and not spins_steadily(scene)):
         return None
     return _measured(metric, _flight(scene, truth, dt, exact_rotation))
@@ -40,11 +40,11 @@ def bounce_error(
 
     Args:
         scene: The scene.
-        truth: Its truth.
+        truth: Its exact solution.
         metric: Name of the metric.
         dt: Time step [s].
         gravity_first: Whether gravity acts before the impact within a step, as in the note.
-        restitution_lost: s, the share of a step's gravity by which the rebound is slower.
+        restitution_lost: s, the speed that the rebound loses, relative to the velocity that gravity adds in one step.
     """
     if truth is None or truth.name != "bounce-ladder" or not truth.events or not scene.starts_above_floor:
         return None
@@ -61,7 +61,7 @@ def bounce_error(
 
 
 def spins_steadily(scene: Scenario) -> bool:
-    """Whether the body turns about a principal axis, or not at all."""
+    """Whether the body rotates about a principal axis, or does not rotate."""
     w = np.array(scene.start.angular_velocity)
     L = angular_momentum(scene, Trajectory.from_states(np.zeros(1), scene.initial_state[None]))[0]
     return float(np.linalg.norm(np.cross(w, L))) <= 1e-12 * float(np.linalg.norm(w) * np.linalg.norm(L))

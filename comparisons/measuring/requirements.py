@@ -1,4 +1,4 @@
-"""What scenes must have for metrics to apply to them."""
+"""Requirements of metrics: the properties that a scene must have for a metric to apply."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ def has_truth(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def spins(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body has spin at some time, by the exact solution."""
+    """Whether the body rotates at some time in the exact solution."""
     if truth is None:
         return False
     sampled = truth(np.linspace(0.0, min(scene.duration, truth.horizon), 9))
@@ -20,7 +20,7 @@ def spins(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def has_impact(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body starts above the floor and strikes it."""
+    """Whether the body starts above the floor and strikes the floor."""
     return truth is not None and len(truth.events) > 0 and scene.starts_above_floor
 
 
@@ -42,7 +42,7 @@ def comes_to_rest(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def repeats_impacts(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether impacts follow each other without magnifying errors, unlike those of a tumble."""
+    """Whether there are several impacts that do not amplify errors as those of a tumbling body do."""
     return truth is not None and truth.name in ("bounce-ladder", "rocking") and len(truth.events) > 1
 
 
@@ -57,12 +57,12 @@ def has_floor(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def keeps_energy(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether there is no damping, so that energy is lost at the floor only."""
+    """Whether there is no damping, so that energy is lost only at the floor."""
     return scene.damping is None
 
 
 def keeps_energy_in_flight(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether energy is conserved in a first flight."""
+    """Whether energy is conserved in the first flight."""
     return scene.damping is None and starts_in_flight(scene)
 
 

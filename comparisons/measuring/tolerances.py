@@ -1,10 +1,11 @@
-"""Tolerances: how far a result may move between two runs before it counts as changed, derived from how it was measured.
+"""Tolerances: the largest difference of a result between two runs that is no change, derived from how the result was measured.
 
-    metrics              rounding over the steps, and sampling noise: one of the start phases may fall into the neighbouring step.
-                         With one start, or a body that starts on the floor: the effect of perturbing the starts by some ulp instead
-    orders               the change when the errors that they were fitted to move by their tolerances
-    asymptotic errors    the width of their interval; those that the time steps leave open are not compared
-    ensemble means       the confidence interval of the difference between two draws
+    metrics              rounding over the time steps, and sampling noise: the impact of one start phase may move to the neighbouring step.
+                         If there is only one start, or if the body starts on the floor, sampling noise is replaced by the effect of
+                         perturbing the initial states by some ulp
+    orders               the change of the order if the errors to which it is fitted change by their tolerances
+    asymptotic errors    the width of their interval; unresolved ones are not compared
+    ensemble means       the confidence interval of the difference between the means of two random ensembles
 
 No tolerance is a share of the value: an engine that is exact to 1e-12 is compared to 1e-12.
 """
@@ -25,41 +26,42 @@ MATTERS = 1e-5
 """Errors below this, relative to the metric's scale, do not matter to any use of an engine: contact solvers stop at such residuals."""
 ULPS_PER_STEP = 16.0
 PERTURBATION = 16.0
-"""By how many ulp of the engine's precision each number of a start is perturbed, to see the effect of rounding."""
+"""Perturbation of each number of an initial state, in ulp of the engine's precision, by which the effect of rounding is measured."""
 _FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
 SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
 """The signs of the perturbations: two random sets and their opposites."""
 FEW_DRAWS = 10.0
-"""Factor on the largest effect of a few perturbations: others may have ten times the effect."""
+"""Factor on the largest effect of a few perturbations, because others may have ten times the effect."""
 TRUTH_ACCURACY = 1e-12
-"""How far exact solutions may differ that are computed with other versions of libraries."""
+"""Largest difference between exact solutions that are computed with different versions of libraries."""
 OF_TWO_DRAWS = math.sqrt(2.0)
-"""The interval of a difference between two means, relative to the interval of one mean."""
+"""Width of the interval of a difference between two means, relative to that of one mean."""
 
 
 def rounding(scene: Scenario, unit: str, precision: type, steps: Array) -> Array:
-    """The largest error that rounding, solvers' residuals included, may cause in a number of steps, in a metric's unit."""
+    """The largest error that rounding and the residuals of solvers may cause in a number of steps, in the unit of the metric."""
     rounded: Array = scale(scene, unit) * (NEGLIGIBLE + ULPS_PER_STEP * float(np.finfo(precision).eps) * steps)
     return rounded
 
 
 def negligible(scene: Scenario, unit: str) -> float:
-    """The largest error that does not matter, in a metric's unit: the same share of the metric's scale for every engine."""
+    """The largest negligible error in the unit of a metric, which is the same share of the metric's scale for every engine."""
     return MATTERS * scale(scene, unit)
 
 
 def tolerance(scene: Scenario, unit: str, precision: type, steps: int, sampling_noise: float) -> float:
-    """How far a metric may move: by sampling noise, and by rounding of random sign; without a floor no solver leaves a residual."""
+    """The tolerance of a metric: sampling noise and rounding of random sign; residuals of solvers occur only with a floor."""
     residual = 0.0 if scene.floor is None else NEGLIGIBLE
     rounded = ULPS_PER_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
     return sampling_noise + scale(scene, unit) * (residual + TRUTH_ACCURACY + rounded)
 
 
 def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
-    """A scene's starts perturbed by a few ulp, set by set; empty where there are many starts and none touches the floor.
+    """The initial states of a scene perturbed by a few ulp, in sets; empty if there are many initial states and none touches the floor.
 
-    A body that touches the floor is perturbed by ulps of double precision, as those of single precision would lift or sink it. Its
-    sign then decides whether all of the starts touch or none; so each set of perturbations is followed by its opposite.
+    A body that touches the floor is perturbed by ulps of double precision, because those of single precision would lift it or sink it. The
+    sign of the perturbation then decides whether all of the initial states touch the floor or none, so each set of perturbations is
+    followed by its opposite.
     """
     if len(starts) == 1:
         return [[_moved(scene, signs, precision)] for signs in SIGNS]

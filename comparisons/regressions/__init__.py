@@ -1,1 +1,1 @@
-"""Regressions: baselines of accepted results, comparisons of two runs, histories of many."""
+"""Regressions: baselines of accepted results, comparisons of two runs, and histories of several runs."""

@@ -1,4 +1,4 @@
-"""What differs between the circumstances of two runs, and which of it a change of results is attributed to."""
+"""The differences between two runs, and the one to which a change of results is attributed."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
 
 @dataclass(frozen=True)
 class Attribution:
-    """What the changes of an engine's results are attributed to.
+    """The cause to which the changes of an engine's results are attributed.
 
     Attributes:
         origin: `absent` if one of the runs has no measurements; `engine` for its version, else `adapter` for the adapter's code, else
-            `settings`; `surroundings` for dropspin, its code, the libraries and the machine; `either` if the engine, its adapter or
-            its settings differ and the surroundings too: the cause cannot be isolated; `nothing` if the whole provenance is the same.
-        message: The same in a sentence, without the engine's name.
+            `settings`; `surroundings` for dropspin, its code, the libraries and the machine; `either` if both the engine, its adapter or
+            its settings and the surroundings differ, so that the cause cannot be isolated; `nothing` if the whole provenance is the same.
+        message: The cause in a sentence, without the engine's name.
     """
 
     origin: Origin
@@ -29,7 +29,7 @@ class Attribution:
 
 
 def surroundings(old: Stamp, new: Stamp) -> list[str]:
-    """What differs that all engines share, as text."""
+    """The differences that affect all engines, as text."""
     found = [
         f"{package} {old['versions'][package]} → {new['versions'][package]}"
         for package in MEASURING
@@ -41,7 +41,7 @@ def surroundings(old: Stamp, new: Stamp) -> list[str]:
 
 
 def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
-    """What differs of an engine itself, the most likely cause first."""
+    """The differences of the engine itself, the most likely cause first."""
     found: dict[Origin, str] = {}
     before, after = (stamp["settings"].get(engine, {}) for stamp in (old, new))
     versions = [
@@ -63,9 +63,9 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str]) -> 
 
     Args:
         old: Provenance of the earlier run.
-        new: Of the later one.
+        new: Provenance of the later run.
         engine: Label of the engine whose results changed.
-        unmoved: Other engines of both runs whose results are all the same, which rules the surroundings out.
+        unmoved: Other engines of both runs whose results are all the same, which excludes the surroundings as the cause.
     """
     absent = [word for word, stamp in (("earlier", old), ("later", new)) if not stamp["settings"].get(engine)]
     if absent:
@@ -86,12 +86,12 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str]) -> 
             first, f"{message}; {', '.join(around)} differ too, but the results of {', '.join(sorted(unmoved))} are the same"
         )
     return Attribution(
-        "either", f"{', '.join(chain(own.values(), around))}; the cause cannot be isolated, as no engine's results stayed the same"
+        "either", f"{', '.join(chain(own.values(), around))}; the cause cannot be isolated, because the results of every engine changed"
     )
 
 
 def _changed_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Names of the settings that differ in a scene and time step that both ran, without versions."""
+    """Names of the settings, without versions, that differ at a scene and time step of both runs."""
     pairs = [(before[case], after[case]) for case in before if case in after]
     names = dict.fromkeys(name for pair in pairs for settings in pair for name in settings)
     differ = [name for name in names if any(one.get(name) != other.get(name) for one, other in pairs)]

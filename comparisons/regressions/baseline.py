@@ -1,7 +1,7 @@
-"""Baselines: accepted results in a text file, one line each, with the date, the reason and the versions of the acceptance.
+"""Baselines: accepted results in a text file with one line for each result, and the date, the reason and the versions of each acceptance.
 
-A result that has not moved beyond its tolerance stays as it was accepted, so that the difference between two versions of the file shows
-only what was moved on purpose. Each line is complete in itself, so that a merge of two branches needs no other line.
+A result that changed by no more than its tolerance keeps its accepted value, so that the diff of two versions of the file shows only
+intended changes. Each line can be read alone, so that two branches can be merged line by line.
 """
 
 import datetime
@@ -30,21 +30,21 @@ from scenarios.text import Text
 from scenarios.validation import validated
 
 FORMAT = 3
-"""Format 1 grouped results under headings, which a merge could separate from them; in format 2 the list of results had another name."""
+"""Format 1 grouped results under headings, from which a merge could separate them; in format 2 the list of results had another name."""
 LARGEST_FILE = 50_000_000  # bytes
 EXTRA_DIGITS = 3
-"""A value is written with this many digits more than its tolerance needs: the error of writing it is at most 1/200 of the tolerance."""
+"""Number of additional digits with which a value is written, so that its rounding error is at most 1/200 of the tolerance."""
 LARGEST_RATIO = 1e17
-"""Of a value to its tolerance: more digits than those of a floating-point number say nothing."""
+"""Largest ratio of a value to its tolerance that adds digits: a double has no more."""
 KEY_LENGTH = 7
-"""Digits of the hash that names an acceptance."""
+"""Number of digits of the hash that identifies an acceptance."""
 HEADER = (
     "Results of rigid-body engines, measured by dropspin and accepted; one line each: scene, engine, time step [s], metric.",
     "value ± tolerance, in the unit of the metric; by: the acceptance it belongs to.",
     "`dropspin check RUN --baseline FILE` compares a run with them, `dropspin accept RUN` replaces them.",
 )
 SUFFIXES = {"_order": "order", "_asymptotic_error": "asymptotic_error"}
-"""Endings of the names of results that are fitted to several time steps, and the kinds of such results."""
+"""Suffixes of the names of results that are fitted to several time steps, and the kinds of such results."""
 
 
 class Acceptance(Table):
@@ -56,7 +56,7 @@ class Acceptance(Table):
 
     @property
     def key(self) -> str:
-        """Its name in the file: a hash of its content, so that two branches do not use one name for different acceptances."""
+        """The key in the file, a hash of the content, so that two branches do not use the same key for different acceptances."""
         return digest(self.model_dump())[:KEY_LENGTH]
 
 
@@ -70,7 +70,7 @@ class _Line(Table):
 
 
 class _File(Table):
-    """The whole file, except for the lines of results."""
+    """The content of the file, except for the lines of results."""
 
     format: Literal[3]
     accepted: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -91,11 +91,11 @@ class Baseline:
     """Accepted results.
 
     Attributes:
-        acceptances: By key.
-        engines: The name to run an engine by, where that is not its label: `my_module:MyEngine`.
-        scenes: The digest of what each scene simulates.
-        results: As `comparable_results` gives them, with `by`, the key of the acceptance, and `known_failure`: if true, a
-            check that the result fails does not fail the run, as long as the result is no worse than accepted.
+        acceptances: Acceptances by key.
+        engines: The name by which an engine is run, if it differs from the label, such as `my_module:MyEngine`.
+        scenes: The hash of what each scene simulates.
+        results: The table that `comparable_results` returns, with two more columns: `by` is the key of the acceptance; if `known_failure`
+            is true, a failed check of this result does not fail the run unless the result is worse than accepted.
     """
 
     acceptances: Mapping[str, Acceptance] = field(default_factory=dict)
@@ -111,10 +111,10 @@ def load_baseline(path: str | Path) -> Baseline:
         path: The file that `dropspin accept` or `write_baseline` wrote.
 
     Returns:
-        The accepted results, each with its tolerance, and when and why it was accepted.
+        The accepted results, each with its tolerance and the date and reason of its acceptance.
 
     Raises:
-        DropspinError: It is not a baseline; the text says where, what was given, what is allowed.
+        DropspinError: The file is not a valid baseline. The message has the place, the value given and the values allowed.
     """
     where = str(path)
     content = read_toml(Path(path), where, "baseline", LARGEST_FILE)
@@ -130,7 +130,7 @@ def load_baseline(path: str | Path) -> Baseline:
 
 
 def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, str], Any]]:
-    """The results of a file: scene, engine, time steps and name, and the content of the line."""
+    """The results of a file, each with scene, engine, time steps, name and the content of the line."""
     for scene, engines in written.results.items():
         if scene not in written.scenes:
             raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
@@ -142,7 +142,7 @@ def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, s
 
 
 def _read_line(where: str, key: tuple[str, str, str, str], content: Any, acceptances: Mapping[str, Acceptance]) -> dict[str, Any]:
-    """A result of a file as a row."""
+    """A result of a file as a row of a table."""
     scene, engine, steps, name = key
     here = f"{where}: results of {scene}, {engine}, {steps}: {name}"
     metric, kind = _metric_and_kind(here, name)
@@ -155,7 +155,7 @@ def _read_line(where: str, key: tuple[str, str, str, str], content: Any, accepta
 
 
 def _writer(content: Mapping[str, Any]) -> str:
-    """The versions of dropspin that results of another format were accepted from, as far as the file says."""
+    """The versions of dropspin from which results of another format were accepted, if the file contains them."""
     try:
         versions = {f"dropspin {one['versions']['dropspin']}" for one in content["accepted"].values()}
     except (AttributeError, KeyError, TypeError):
@@ -166,21 +166,21 @@ def _writer(content: Mapping[str, Any]) -> str:
 def accept(
     results: Results, earlier: Baseline, reason: str, date: datetime.date, *, known_failures: bool = False
 ) -> tuple[Baseline, pd.DataFrame]:
-    """Accept a run's results into a baseline.
+    """Accept the results of a run into a baseline.
 
-    Results that the run does not cover stay; so do results that have not moved beyond their tolerance, and those of engines that broke down
-    in a scene or are missing. All results of a scene that has changed are replaced.
+    Accepted results stay if the run does not cover them, if they changed by no more than their tolerance, or if the engine broke down in
+    the scene or is missing. All results of a scene that has changed are replaced.
 
     Args:
         results: The run.
-        earlier: The baseline before; `Baseline()` if there is none.
-        reason: Why these results are accepted, in words; it is stored with them.
+        earlier: The earlier baseline; `Baseline()` if there is none.
+        reason: The reason why these results are accepted, which is stored with them.
         date: Date of the acceptance.
         known_failures: Whether to accept failing checks as known failures.
 
     Returns:
-        The new baseline, and a table of what differs from the earlier one: a row for each result, with `value` and `before` in `unit`, and
-        the `change`: new, worse, moved, better, same or gone.
+        The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
+        `before` in `unit`, and the `change`: new, worse, moved, better, same or gone.
     """
     mine = comparable_results(results)
     mine["known_failure"] = (mine["verdict"] == "failed") & known_failures
@@ -206,7 +206,7 @@ def accept(
 
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:
-    """Write a baseline, whole or not at all.
+    """Write a baseline, completely or not at all.
 
     Args:
         baseline: The baseline, from `accept`.
@@ -220,7 +220,7 @@ def write_baseline(baseline: Baseline, path: str | Path) -> None:
 
 
 def _text(baseline: Baseline) -> str:
-    """The file's content, in an order that does not depend on how it was made."""
+    """The content of the file, in an order that depends only on the content."""
     held = baseline.results.sort_values(KEY)
     engines, scenes = set(held["engine"]), set(held["scene"])
     lines = [*(f"# {line}" for line in HEADER), "", f"format = {FORMAT}", ""]

@@ -1,4 +1,4 @@
-"""A run compared with a baseline: each accepted result gets a row of kind `baseline`, with a verdict."""
+"""The comparison of a run with a baseline, in which each accepted result gets a row of kind `baseline` with a verdict."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,11 +20,11 @@ ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic 
 
 SCENE_CHANGED = "the scene has changed since its results were accepted"
 KNOWN_FAILURE = "accepted as a known failure"
-"""How the reasons begin for an engine whose scene changed, and for known failures."""
+"""The beginnings of the reasons for an engine whose scene changed, and for known failures."""
 
 
 class NothingAccepted(DropspinError):
-    """A baseline has no result of what was run."""
+    """A baseline has no result that the run covers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +33,9 @@ class Checked:
 
     Attributes:
         results: The run, with a row of kind `baseline` for each accepted result, the largest changes first.
-        changes: Its results compared with the accepted ones, as `values.changes` gives them, largest first; empty without a baseline.
-        not_run: Accepted results that the run does not cover, as it has other scenes, engines or time steps.
+        changes: The results of the run compared with the accepted ones: the table that `values.changes` returns, largest change first;
+            empty without a baseline.
+        not_run: Accepted results that the run does not cover, because it has other scenes, engines or time steps.
     """
 
     results: Results
@@ -43,21 +44,21 @@ class Checked:
 
 
 def check(results: Results, baseline: Baseline | None = None) -> Checked:
-    """Compare a run with accepted results; its own expectations are judged already and stay unchanged.
+    """Compare a run with accepted results. The verdicts on the expectations of its scenes stay unchanged.
 
-    A result that is worse than accepted by more than its tolerance, or gone, fails. One that is better passes. A check of the run that
-    fails and was accepted as a known failure is `known` as long as its result is not worse.
+    A result fails if it is gone, or worse than the accepted result by more than the tolerance; a better result passes. A failed check that
+    was accepted as a known failure is `known` as long as its result is not worse.
 
     Args:
         results: The run.
-        baseline: The accepted results, from `load_baseline`; None: the expectations of the scenes alone.
+        baseline: The accepted results, from `load_baseline`; with None, only the expectations of the scenes are checked.
 
     Returns:
-        `results`, the run with a row of kind `baseline` for each accepted result, so that its `exit_code()` is that of the check;
+        `results`, the run with a row of kind `baseline` for each accepted result, whose `exit_code()` is that of the check;
         `changes`, its results compared with the accepted ones; and `not_run`, the accepted results that the run does not cover.
 
     Raises:
-        NothingAccepted: No accepted result is covered by the run, so that the check would be empty. If engines broke down, that is
+        NothingAccepted: The run covers no accepted result, so that the check would be empty. Not raised if engines broke down, which is
             reported instead.
     """
     if baseline is None:
@@ -67,7 +68,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     if accepted.empty and not results.breakdowns.any():
         raise NothingAccepted(
             f"none of the {len(baseline.results):,} accepted results is covered by this run's scenes, engines and time steps; "
-            "run what was accepted, or accept what was run."
+            "run the accepted scenes, engines and time steps, or accept this run."
         )
     digests = {name: scene.digest for name, scene in results.scenes.items()}
     another = accepted["scene"].map(lambda name: baseline.scenes[name] != digests[name]).astype(bool)
@@ -83,7 +84,7 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
 
 
 def _with_current_names(baseline: Baseline, results: Results) -> pd.DataFrame:
-    """The accepted results; a renamed engine, or one that cannot be imported, is identified by the name it was asked for by."""
+    """The accepted results, in which an engine with another label, or one that cannot be imported, is identified by its requested name."""
     held = set(baseline.results["engine"])
     called = {name: label for label, name in results.provenance["names"].items() if label not in held}
     renamed = {old: called[name] for old, name in baseline.engines.items() if old not in results.engines and name in called}
@@ -91,7 +92,7 @@ def _with_current_names(baseline: Baseline, results: Results) -> pd.DataFrame:
 
 
 def _judged(found: dict[Any, Any], baseline: Baseline) -> Measurement:
-    """The row of an accepted result that the run measured too."""
+    """The row of an accepted result that the run also measured."""
     by = baseline.acceptances[found["by"]]
     away = "" if found["change"] == "same" else f"; {found['change']} by {found['in_tolerances']:,.3g} times its tolerance"
     reason = f"accepted {found['before']:.6g} ± {found['tolerance']:.2g} on {by.date}, {by.reason}{away}"
@@ -108,9 +109,10 @@ def _row(found: dict[Any, Any]) -> Measurement:
 
 
 def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
-    """Rows of accepted results that the run lacks: one row for all results of an engine that did not run a scene, else one for each result.
+    """Rows for accepted results that the run lacks: one for each engine that did not run a scene, otherwise one for each result.
 
-    An order or an asymptotic error that is undefined now follows from the errors, which are results of their own.
+    An order or an asymptotic error that is now undefined does not fail, because the errors from which it is computed are checked
+    themselves.
     """
     remarks = results.table[results.table["metric"] == ""].assign(steps=step_names(results))
     remarks = remarks[~remarks["verdict"].isin(["limited", "no_truth"])]
@@ -137,7 +139,7 @@ def _scene_changed(scene: str, engine: str) -> Measurement:
 
 
 def _with_known_failures(results: Results, found: pd.DataFrame) -> pd.DataFrame:
-    """The run's table; failures that were accepted as known and are not worse are `known`."""
+    """The run's table, in which failures that were accepted as known and are not worse have the verdict `known`."""
     known = found[found["known_failure"].fillna(value=False).astype(bool) & (found["change"].map(VERDICTS) == "passed")]
     keys = pd.MultiIndex.from_frame(results.table.assign(steps=step_names(results))[KEY])
     rows = keys.isin(pd.MultiIndex.from_frame(known[KEY])) & results.table["verdict"].isin(FAILURES).to_numpy()

@@ -1,4 +1,4 @@
-"""Two runs compared: what changed, and what it is attributed to."""
+"""The comparison of two runs: the changes, and the causes to which they are attributed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from scenarios import DropspinError
 
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """What differs between two runs.
+    """The differences between two runs.
 
     Attributes:
-        results: The comparable results as `values.changes` gives them, largest change first.
-        attributions: By engine, what its changes are attributed to.
-        surroundings: What differs that all engines share, as text.
+        results: The table of comparable results that `values.changes` returns, largest change first.
+        attributions: The cause to which the changes of an engine are attributed, by engine.
+        surroundings: The differences that affect all engines, as text.
         other_scenes: Scenes that are different in the later run, so that their results are not compared.
-        in_one_only: Scenes, engines and time steps that were asked for in one of the runs only, as text.
-        speed: How each engine's speed changed relative to the others'.
+        in_one_only: Scenes, engines and time steps that were requested in only one of the runs, as text.
+        speed: The change of each engine's speed relative to the others.
     """
 
     results: pd.DataFrame
@@ -33,7 +33,7 @@ class Changes:
     speed: list[SpeedChange]
 
     def of(self, *kinds: str) -> pd.DataFrame:
-        """The results with some kinds of change."""
+        """The results with the given kinds of change."""
         return self.results[self.results["change"].isin(kinds)]
 
     @property
@@ -45,7 +45,7 @@ class Changes:
 def compare(old: Results, new: Results) -> Changes:
     """Compare a run with an earlier one.
 
-    Results of scenes, engines and time steps that were asked for in one of the runs only are left out: they are neither new nor gone.
+    Results of scenes, engines and time steps that were requested in only one of the runs are left out; they are neither new nor gone.
 
     Args:
         old: The earlier run.
@@ -53,10 +53,10 @@ def compare(old: Results, new: Results) -> Changes:
 
     Returns:
         The changes: `results`, a table with `value` and `before` in `unit`, and the `change` (same, better, worse, moved, new or gone);
-        `attributions`, by engine what its changes are attributed to; and `speed`, how the time per step changed.
+        `attributions`, the cause to which the changes of each engine are attributed; and `speed`, the change of the time per step.
 
     Raises:
-        DropspinError: They have none in common.
+        DropspinError: The runs have no scene, engine and time step in common.
     """
     other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
     before, after = comparable_results(old), comparable_results(new)
@@ -64,7 +64,7 @@ def compare(old: Results, new: Results) -> Changes:
     if found.empty and other:
         raise DropspinError(f"the runs have no result in common: {', '.join(other)} changed between them.")
     if found.empty:
-        raise DropspinError("the runs have no result in common: no scene, engine and time step that both were asked for.")
+        raise DropspinError("the runs have no result in common: no scene, engine and time step was requested in both.")
     found = most_changed_first(found)
     changed = found.groupby("engine")["change"].agg(lambda change: bool((change != "same").any()))
     unmoved = [str(engine) for engine, moved in changed.items() if not moved]

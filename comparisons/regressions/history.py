@@ -1,4 +1,4 @@
-"""Results over runs: when each moved, and what that is attributed to."""
+"""Histories of runs: the runs in which each result changed, and the causes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from scenarios import DropspinError
 
 @dataclass(frozen=True)
 class Move:
-    """A run in which results of an engine moved.
+    """A run in which results of an engine changed.
 
     Attributes:
         engine: Label of the engine.
-        before: Number of the earlier run, the last one that has the engine.
+        before: Number of the last earlier run that has this engine.
         run: Number of the run.
-        results: The changes (worse, better or moved) as `values.changes` gives them, largest first.
-        attribution: What they are attributed to.
+        results: The changes (worse, better or moved) that `values.changes` returns, largest first.
+        attribution: The cause to which the changes are attributed.
     """
 
     engine: str
@@ -39,7 +39,7 @@ class History:
         names: Names of the runs.
         stamps: Time, commit and versions of each.
         results: The comparable results of all runs; `run` is the number.
-        moves: In the order of the runs.
+        moves: The changes, in the order of the runs.
     """
 
     names: list[str]
@@ -52,17 +52,17 @@ def history(runs: Mapping[str, Results]) -> History:
     """Follow results over runs.
 
     Args:
-        runs: Two runs or more, by name; they are sorted by the time they were started.
+        runs: Two or more runs, by name; they are sorted by start time.
 
     Returns:
-        `names` of the runs in order; `stamps`, their times, commits and versions; `results`, the values of all runs; and `moves`, the runs
-        in which results moved, and what that is attributed to.
+        `names` of the runs in order; `stamps`, their times, commits and versions; `results`, the values of all runs; and `moves`, the
+        runs in which results changed, and the cause to which each change is attributed.
 
     Raises:
-        DropspinError: There are fewer than two.
+        DropspinError: There are fewer than two runs.
     """
     if len(runs) < 2:
-        raise DropspinError(f"a history needs two runs or more, got {len(runs)}; give more, or a folder of runs.")
+        raise DropspinError(f"a history needs two or more runs, got {len(runs)}; give more, or a folder of runs.")
     ordered = sorted(runs.items(), key=lambda item: str(item[1].provenance["started"]))
     names, results = [name for name, _ in ordered], [one for _, one in ordered]
     stamps = [
@@ -75,9 +75,9 @@ def history(runs: Mapping[str, Results]) -> History:
 
 
 def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> list[Move]:
-    """The runs in which results moved.
+    """The runs in which results changed.
 
-    Each result is compared with the one it last moved to, so that a slow drift is found, and a run without it hides nothing.
+    Each result is compared with its value after its last change, so that slow drifts are found, and runs without the result have no effect.
     """
     engines = list(dict.fromkeys(engine for one in results for engine in one.engines))
     held = dict.fromkeys(engines, results_of[0].iloc[:0])

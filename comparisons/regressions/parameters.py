@@ -1,6 +1,6 @@
-"""Which single wrong parameter of an engine its asymptotic errors are consistent with.
+"""The search for a single wrong parameter with which the asymptotic errors of an engine are consistent.
 
-The errors that a wrong parameter causes are found from two exact solutions: that of the scene with the parameter changed, and its own.
+The errors that a wrong parameter causes are the differences between the exact solutions of the scene with and without the change.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -23,18 +23,18 @@ Change = Callable[[Scenario, float], Scenario | None]
 FIRST_SHARE = 1e-3
 LARGEST_SHARE = 0.3
 MOST_STEPS = 20_000
-"""Of the sampled exact solutions."""
+"""Largest number of time steps of the sampled exact solutions."""
 ITERATIONS = 3
-"""For the share; each reduces its relative error by a factor of about the share."""
+"""Number of iterations for the share; each reduces the relative error of the share by a factor of about the share."""
 
 
 class WrongParameter(NamedTuple):
-    """A parameter that would have to be wrong.
+    """A parameter whose wrong value explains the errors.
 
     Attributes:
         name: Its name.
-        share: By which share of its value.
-        signed: Whether the errors decide if it is too high or too low.
+        share: The error of the parameter, relative to its value.
+        signed: Whether the errors determine if it is too high or too low.
     """
 
     name: str
@@ -43,7 +43,7 @@ class WrongParameter(NamedTuple):
 
 
 def wrong_parameters(results: Results, engine: str) -> list[WrongParameter]:
-    """The parameters that, each alone, explain all asymptotic errors of an engine in the scenes in which some of these fail.
+    """The parameters each of which alone explains all asymptotic errors of an engine in the scenes in which asymptotic errors fail.
 
     Each error must lie within its 95 % interval, widened by the error of sampling the exact solutions at the run's finest time step.
     """
@@ -66,7 +66,7 @@ def wrong_parameters(results: Results, engine: str) -> list[WrongParameter]:
 
 
 def _shares(scene: Scenario, change: Change, lead: Mapping[Any, Any], dt: float) -> Iterator[float]:
-    """The shares by which a parameter must be wrong to cause one error: of an error without a sign one of each sign."""
+    """The relative errors of a parameter that cause an error; for an error without a sign, one of each sign."""
     signs = (1.0,) if METRICS[lead["metric"]].signed else (1.0, -1.0)
     for sign in signs:
         share = sign * FIRST_SHARE
@@ -132,7 +132,7 @@ def _times(scene: Scenario, dt: float) -> Array:
 
 
 def _parameters() -> dict[str, Change]:
-    """By name, how a parameter of a scene is changed by a share of its value; None where the scene does not have it."""
+    """Functions by name that change a parameter of a scene by a share of its value, or return None if the scene does not have it."""
     return {
         "restitution": _restitution,
         "Coulomb coefficient": _friction,

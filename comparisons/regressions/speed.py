@@ -1,6 +1,7 @@
-"""Speed compared with an earlier run: as ratios between engines of one run, because absolute times depend on the machine.
+"""The comparison of speed with an earlier run. Speeds are ratios between engines of one run, because absolute times depend on the machine.
 
-An engine has become slower if it has against every other engine, so that one engine that became faster does not make another one slower.
+An engine counts as slower only if it became slower relative to every other engine. Otherwise all others would count as slower if one engine
+became faster.
 """
 
 from itertools import permutations
@@ -15,14 +16,14 @@ CONFIDENCE = 0.95
 
 
 class SpeedChange(NamedTuple):
-    """How the time of an engine's step changed relative to another engine's.
+    """The change of an engine's time per step relative to that of another engine.
 
     Attributes:
-        engine: Its label.
-        other: The other engine's label.
-        ratio: Its time over the other's, over the same ratio before: the median over scenes and time steps.
+        engine: Label of the engine.
+        other: Label of the other engine.
+        ratio: The ratio of the two times per step, divided by the earlier ratio; the median over scenes and time steps.
         least: Lower end of the median's confidence interval.
-        most: Upper end.
+        most: Upper end of this interval.
         cases: Number of scenes and time steps.
     """
 
@@ -35,7 +36,7 @@ class SpeedChange(NamedTuple):
 
 
 def speed_changes(old: Results, new: Results) -> list[SpeedChange]:
-    """For each engine, its change relative to the engine against which it lost least, of those that both runs have."""
+    """For each engine of both runs, the smallest slowdown relative to any other engine, with that engine."""
     before, after = (_times(results) for results in (old, new))
     pairs = [
         _change(engine, other, before, after)

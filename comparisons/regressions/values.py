@@ -1,4 +1,4 @@
-"""The comparable results of a run: those that can be compared with an earlier run, each with a tolerance of its own."""
+"""The results of a run that can be compared with an earlier run, each with its own tolerance."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -11,7 +11,7 @@ from comparisons.judging.verdicts import BREAKDOWNS
 from comparisons.results.results import Results
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
-"""The columns that identify a result; `steps` is the time step as text, for orders and asymptotic errors all the steps used."""
+"""The columns that identify a result; `steps` is the time step as text, or, for orders and asymptotic errors, all time steps used."""
 
 BETTER: Mapping[str, Literal["smaller", "larger", "neither"]] = {
     "truth": "smaller",
@@ -20,15 +20,15 @@ BETTER: Mapping[str, Literal["smaller", "larger", "neither"]] = {
     "order": "larger",
     "ensemble": "neither",
 }
-"""Kinds of comparable rows, and which way is better: errors towards 0, orders upwards; a mean can only be the same or another."""
+"""Kinds of comparable rows, with the direction of an improvement: errors towards 0, orders upwards; a mean has none."""
 
 
 def comparable_results(results: Results) -> pd.DataFrame:
     """The comparable results of a run.
 
     Returns:
-        The columns of `KEY`, then `value` and `tolerance` in `unit`, and the `verdict`. Results that are not finite are
-        left out, and those that only show how a state is sampled.
+        The columns of `KEY`, then `value` and `tolerance` in `unit`, and the `verdict`. Results that are not finite are left out, and so
+        are metrics that depend on how a state is sampled, such as `energy_error_raw`.
     """
     table = results.table.assign(steps=step_names(results))
     compared = table["kind"].isin(list(BETTER)) & ~table["metric"].isin(list(ARTEFACTS))
@@ -37,25 +37,25 @@ def comparable_results(results: Results) -> pd.DataFrame:
 
 
 def step_names(results: Results) -> pd.Series:
-    """For each row of a run its time step [s] as text, or all of them, coarsest first."""
+    """For each row of a run, its time step [s] as text, or all its time steps, coarsest first."""
     return results.table["dt"].map(lambda dt: _all_steps(results) if np.isnan(dt) else repr(dt))
 
 
 def asked_for(held: pd.DataFrame, results: Results) -> pd.DataFrame:
-    """The results that belong to scenes, engines and time steps that a run was asked for."""
+    """The results of scenes, engines and time steps that were requested in a run."""
     steps = {_all_steps(results), *map(repr, _dts(results))}
     return held[held["scene"].isin(list(results.scenes)) & held["engine"].isin(results.engines) & held["steps"].isin(steps)]
 
 
 def broke_down(rows: pd.DataFrame, results: Results) -> "pd.Series[bool]":
-    """Which rows belong to engines that broke down in the scene, or are missing."""
+    """Whether each row belongs to an engine that broke down in the scene, or is missing."""
     pairs = ["scene", "engine"]
     broken = results.table.loc[results.table["verdict"].isin(BREAKDOWNS | {"missing"}), pairs]
     return pd.Series(pd.MultiIndex.from_frame(rows[pairs]).isin(pd.MultiIndex.from_frame(broken)), rows.index)
 
 
 def _all_steps(results: Results) -> str:
-    """All time steps of a run, in the text that identifies what they give together."""
+    """All time steps of a run, as the text that identifies results fitted to them."""
     return ", ".join(map(repr, _dts(results)))
 
 
@@ -68,13 +68,13 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     """Results compared with earlier ones.
 
     Args:
-        before: The earlier results, as `comparable_results` gives them.
-        after: The later ones.
+        before: The earlier results, from `comparable_results`.
+        after: The later results, from `comparable_results`.
 
     Returns:
-        The columns of `KEY`, then `unit`, `value`, `before`, the `tolerance` that separates them, the bounds `lower` and `upper` on the
-        value within which it is not worse, `change` (same, better, worse, moved, new, gone) and by how much
-        it has changed, `in_tolerances`.
+        The columns of `KEY`, then `unit`, `value`, `before` (the earlier value), `tolerance`, the bounds `lower` and `upper` within which
+        the value is not worse, `change` (same, better, worse, moved, new, gone) and `in_tolerances`, the size of the change in
+        tolerances.
     """
     held = [*KEY, "value", "tolerance", "unit"]
     both = before[held].merge(after[held], how="outer", on=KEY, suffixes=("_before", "_after"), sort=False)
@@ -102,14 +102,14 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
 def regressed(found: pd.DataFrame) -> pd.DataFrame:
     """The changes that fail a check: worse, moved, or gone.
 
-    An order or an asymptotic error that is undefined now follows from the errors, which are results of their own.
+    An order or an asymptotic error that is now undefined is not among them, because the errors from which it is computed are compared too.
     """
     lost = (found["change"] == "gone") & ~found["kind"].isin(STUDIES)
     return found[found["change"].isin(["worse", "moved"]) | lost]
 
 
 def most_changed_first(found: pd.DataFrame) -> pd.DataFrame:
-    """Changes, largest first in units of their tolerance; counts, which jump, after all others."""
+    """Changes, the largest relative to its tolerance first; metrics that change in jumps come last."""
     ordered = found.assign(jumps=found["metric"].isin(list(JUMPING)))
     ordered = ordered.sort_values(["jumps", "in_tolerances"], ascending=[True, False], na_position="last", kind="stable")
     return ordered.drop(columns="jumps").reset_index(drop=True)

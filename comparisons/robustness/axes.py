@@ -1,4 +1,4 @@
-"""The axes along which a scene is taken to its extremes: each changes one quantity of the scene, or the time step."""
+"""The axes of a robustness study. Each axis varies one quantity of the scene, or the time step, up to extreme values."""
 
 import math
 from collections.abc import Callable
@@ -30,15 +30,15 @@ class Axis:
     """A quantity that is varied.
 
     Attributes:
-        name: As on the command line.
-        unit: SI; '1' for a ratio.
+        name: The name on the command line.
+        unit: The SI unit; '1' for a ratio.
         applies: Whether a scene has the quantity.
-        values: The values that a scan begins with, for a scene at a time step, in order.
-        base: The nominal value: that of a scene at a time step.
-        at: The scene and the time step with another value.
-        between: See `Between`.
-        coordinate: A value as a length along the axis, by which distances of values are measured.
-        invariant: Whether physics predicts the same motion, in its own units, for every value.
+        values: Function of a scene and a time step that returns the initial values of a scan, in order.
+        base: Function of a scene and a time step that returns the nominal value.
+        at: Function of a scene, a time step and a value that returns the scene and the time step with this value.
+        between: The midpoint of two values, see `Between`.
+        coordinate: Function that maps a value to a position along the axis, by which distances of values are measured.
+        invariant: Whether the exact motion, in scaled units, is the same for every value.
     """
 
     name: str

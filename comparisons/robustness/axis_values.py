@@ -1,4 +1,4 @@
-"""Values along the axes: those that a scan begins with, and the value halfway between two, by which it bisects."""
+"""Values along the axes: the initial values of a scan, and the midpoint of two values, for bisection."""
 
 import math
 from collections.abc import Callable
@@ -8,11 +8,11 @@ import numpy as np
 from comparisons.robustness.operating_point import OperatingPoint, natural_time
 
 Between = Callable[[float, float, float], float | None]
-"""From two values and a ratio to the value halfway between them; None if their ratio is smaller than that."""
+"""A function of two values and a ratio that returns the value halfway between them, or None if their ratio is smaller than that ratio."""
 
 
 def steps(nominal: OperatingPoint) -> list[float]:
-    """Time steps [s]: from .01 to 10 rad a step in free flight; with a floor, from a thousandth of the fall to all of it."""
+    """Time steps [s]: 0.01 to 10 rad per step in free flight; with a floor, from a thousandth of the time of the fall to all of it."""
     time = natural_time(nominal.scene)
     if nominal.scene.floor is None:
         return logarithmic(0.01 * time, 10.0 * time, 7)
@@ -25,7 +25,7 @@ def masses(nominal: OperatingPoint) -> list[float]:
 
 
 def durations(nominal: OperatingPoint) -> list[float]:
-    """The scene's own duration and the powers of ten above it up to 10⁴ s."""
+    """The duration of the scene and the powers of ten above it up to 10⁴ [s]."""
     longer = [10.0**power for power in range(5) if 10.0**power > 1.1 * nominal.scene.duration]
     return [nominal.scene.duration, *longer]
 
@@ -42,7 +42,7 @@ def logarithmic(low: float, high: float, count: int) -> list[float]:
 
 
 def _powers(low: float, high: float, base: float, each: int) -> list[float]:
-    """Whole powers of a power of two, 1 among them: multiplication by them loses no digits."""
+    """Integer powers of a power of two, including 1; multiplication by them causes no rounding."""
     least, most = math.floor(math.log(low, base)), math.ceil(math.log(high, base))
     return [base**exponent for exponent in range(least, most + 1) if exponent % each == 0]
 
@@ -53,12 +53,12 @@ def geometric_mean(low: float, high: float, ratio: float) -> float | None:
 
 
 def restitution_between(low: float, high: float, ratio: float) -> float | None:
-    """`Between` of restitutions, by the ratio of 1 - e."""
+    """`Between` of coefficients of restitution, by the ratio of 1 - e."""
     return None if 1.0 - low <= (1.0 - high) * ratio else 1.0 - math.sqrt((1.0 - low) * (1.0 - high))
 
 
 def whole_power_between(base: float) -> Between:
-    """`Between` of whole powers of a base; it has no value between neighbouring powers."""
+    """`Between` of integer powers of a base; there is no value between adjacent powers."""
 
     def between(low: float, high: float, ratio: float) -> float | None:
         powers = round(math.log(high / low, base))

@@ -1,6 +1,6 @@
-"""Failure modes of an engine's motion, and the criteria by which it is diagnosed: the worst that it meets counts.
+"""Failure modes of an engine's motion, and their criteria. A motion has the most severe mode whose criterion it meets.
 
-Accuracy is measured over the scene's own duration, every other criterion over the whole of a motion that may be longer.
+Accuracy is measured over the scene's duration; all other criteria use the whole motion, which may be longer.
 """
 
 import math
@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 
 FailureMode = Literal["declined", "sound", "inaccurate", "gains_energy", "sinks", "tunnels", "clamped", "diverged", "crashed", "timed_out"]
 FAILURE_MODES: tuple[FailureMode, ...] = get_args(FailureMode)
-"""From the mildest to the worst; `declined` is not a failure, but an engine's refusal."""
+"""The failure modes, from mild to severe; `declined` means that the engine cannot run the scene, and is not a failure."""
 
 ERRORS_OF_FEW_ROWS = ("orientation_error", "angular_momentum_error", "energy_error")
 ERRORS = (*ERRORS_OF_FEW_ROWS, "bounce_height_error", "landing_error")
-"""The metrics that must be within the tolerance: ratios, and angles in radians. Those of impacts need every step recorded."""
+"""The metrics that must be within the tolerance: ratios, and angles in radians. Metrics of impacts need a record of every step."""
 GAIN, GAIN_BY_LAW = 0.01, 10.0  # of the scene's energy; the latter where Newton's restitution may itself add some
 POSITION_OFF = 0.5  # of the distance that the exact solution covers, or of the body's size if it does not move
 BLOWN_UP = 1e6  # times the scene's energy
@@ -38,7 +38,7 @@ SUDDEN = 1e-6  # relative; the least change of a speed from row to row just befo
 
 
 class Diagnosis(NamedTuple):
-    """A failure mode, the criterion that shows it, the criterion's value, and a message."""
+    """A failure mode, the criterion that is met, the value that meets it, and a message."""
 
     mode: FailureMode
     criterion: str
@@ -50,7 +50,7 @@ SOUND = Diagnosis("sound", "", 0.0, "")
 
 
 class ExtendedMotion(NamedTuple):
-    """An engine's motion of a scene, and beyond its end.
+    """The motion of an engine for the duration of a scene and beyond.
 
     Attributes:
         scene: The scene.
@@ -68,12 +68,12 @@ class ExtendedMotion(NamedTuple):
 
 
 def worst(diagnoses: list[Diagnosis]) -> Diagnosis:
-    """The worst of several, of equal modes the one with the largest size; `SOUND` if there are none."""
+    """The most severe of several diagnoses, and of equal modes the one with the largest size; `SOUND` if there are none."""
     return max(diagnoses, key=lambda one: (FAILURE_MODES.index(one.mode), one.size), default=SOUND)
 
 
 def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
-    """The worst diagnosis of a motion; `within` is the largest error that counts as accurate."""
+    """The most severe diagnosis of a motion; `within` is the largest error that counts as accurate."""
     bad = motion.whole.first_bad_row
     if bad is not None:
         return Diagnosis("diverged", "not finite", math.inf, f"the state is not finite at t = {motion.whole.t[bad]:g} s")
@@ -87,16 +87,17 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
 
 
 def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
-    """Energy above the start's; more is allowed on a floor that grips, where Newton's restitution may add some."""
+    """Energy above the initial energy; more is allowed on a floor of infinite friction, where Newton's restitution can add energy."""
     try:
         scale = whole.energy_scale
     except Unresolved:
         return
     gain = float(np.max(whole.energy) - whole.energy[0]) / scale
     if not gain <= BLOWN_UP:
-        yield Diagnosis("diverged", "blows up", gain, f"the energy rises by {gain:.1e} of the scene's")
+        yield Diagnosis("diverged", "blows up", gain, f"the energy rises by {gain:.1e} times the scene's energy")
     elif gain > (limit := GAIN_BY_LAW if _may_gain(whole.scene) else GAIN):
-        yield Diagnosis("gains_energy", "gains energy", gain, f"the energy rises by {gain:.4g} of the scene's (limit {limit:g})")
+        message = f"the energy rises by {gain:.4g} times the scene's energy (limit {limit:g})"
+        yield Diagnosis("gains_energy", "gains energy", gain, message)
 
 
 def _may_gain(scene: Scenario) -> bool:
@@ -116,15 +117,15 @@ def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:
 
 
 def _sinks(motion: ExtendedMotion) -> Iterator[Diagnosis]:
-    """Below the floor for the tenth of the motion after its middle, and deeper throughout the last tenth."""
+    """Below the floor during the tenth of the motion after its middle, and deeper throughout the last tenth."""
     if motion.scene.floor is None:
         return
     heights, share = lowest_height(motion.scene, motion.whole), motion.whole.t / motion.whole.t[-1]
     middle, end = (float(-heights[(share >= since) & (share <= since + 0.1)].max(initial=-math.inf)) for since in (0.5, 0.9))
     deeper = DEEPER * motion.scene.body.size
     if middle > 0.0 and end > middle + deeper:
-        depths = f"{end:.3g} m below the floor after {motion.whole.t[-1]:.3g} s, {middle:.3g} m after half of that"
-        message = f"the body is {depths} (limit {deeper:.2g} m more)"
+        depths = f"{end:.3g} m below the floor after {motion.whole.t[-1]:.3g} s, and {middle:.3g} m after half of that time"
+        message = f"the body is {depths} (allowed increase {deeper:.2g} m)"
         yield Diagnosis("sinks", "sinks", end, message)
 
 
@@ -162,7 +163,7 @@ def _position_off(own: Comparison) -> Iterator[Diagnosis]:
 
 
 def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosis]:
-    """Moving in the last tenth of the motion, in which the exact solution rests."""
+    """Moving in the last tenth of the motion, during which the body rests in the exact solution."""
     exact, late = whole.reference, motion.whole.t >= 0.9 * motion.whole.t[-1]
     if exact is None or motion.scene.floor is None or len(exact) < len(motion.whole) or exact.velocity[late].any():
         return
@@ -170,15 +171,15 @@ def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosi
     allowed = motion.dt * float(np.linalg.norm(motion.scene.acceleration))
     if fastest > NEVER_RESTS * allowed:
         speed = f"{fastest:.2g} m/s, {fastest / allowed:.3g} times g dt (limit {NEVER_RESTS:g})"
-        message = f"the body moves at {speed} in the last tenth of {motion.whole.t[-1]:.3g} s, where the exact solution rests"
+        message = f"the body moves at {speed} in the last tenth of {motion.whole.t[-1]:.3g} s, during which it rests in the exact solution"
         yield Diagnosis("inaccurate", "never rests", fastest / allowed, message)
 
 
 def held_speeds(motion: Trajectory) -> dict[str, float]:
-    """The largest speeds [m/s, rad/s], components or norms, that look clamped.
+    """The largest speeds [m/s, rad/s], components or norms, that are possibly clamped.
 
-    Such a speed is below the start's after one step already, or suddenly constant to the last digit. Either may have other causes, unless
-    another start gives the same value.
+    Such a speed is reduced after the first step, or is suddenly constant to the last digit. Both may have other causes, unless another
+    initial state gives the same value.
     """
     found: dict[str, float] = {}
     for name in ("velocity", "angular_velocity"):
@@ -191,7 +192,7 @@ def held_speeds(motion: Trajectory) -> dict[str, float]:
 
 
 def _is_held(sizes: Array, largest: float) -> bool:
-    """Whether a component or norm that varied, or was larger at the start, stays at its largest value for some rows."""
+    """Whether a component or norm that varied, or was larger initially, stays at its largest value for some rows."""
     held = np.abs(sizes - largest) <= ULPS * largest
     if sizes[0] > largest * (1.0 + SUDDEN) and held[1]:
         return True
@@ -201,7 +202,7 @@ def _is_held(sizes: Array, largest: float) -> bool:
 
 
 def clamped(motion: Trajectory, other: Trajectory) -> list[Diagnosis]:
-    """Speeds that look clamped and are equal, to the last digit, from two different starts."""
+    """Speeds that are possibly clamped and are equal, to the last digit, from two different initial states."""
     units = {"velocity": "m/s", "angular_velocity": "rad/s"}
     first, second = held_speeds(motion), held_speeds(other)
     return [

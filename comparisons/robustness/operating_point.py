@@ -1,4 +1,4 @@
-"""A point at which an engine is tested, a scene and a time step, and the times and speeds by which it is fast or coarse."""
+"""An operating point: a scene and a time step at which an engine is tested, with the characteristic times and speeds of the scene."""
 
 import math
 from typing import NamedTuple
@@ -16,7 +16,7 @@ class OperatingPoint(NamedTuple):
 
 
 def natural_time(scene: Scenario) -> float:
-    """The time that makes a step coarse or fine [s]: of a turn by 1 rad, of the fall, or in which gravity moves a body by its size."""
+    """The characteristic time of the scene [s]: that of a rotation by 1 rad, of the fall, or of a fall by the size of the body."""
     speed = spin(scene)
     if scene.floor is None and speed > 0.0:
         return 1.0 / speed
@@ -33,7 +33,7 @@ def fall_time(scene: Scenario) -> float:
 
 
 def spin(scene: Scenario) -> float:
-    """The angular velocity at the start [rad/s]."""
+    """The initial angular velocity [rad/s]."""
     return float(np.linalg.norm(scene.start.angular_velocity))
 
 

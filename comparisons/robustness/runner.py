@@ -1,4 +1,4 @@
-"""An engine at one operating point: its motions, diagnosed, from several starts so that one lucky start does not count."""
+"""Runs of an engine at operating points, with the failure mode of each. Scenes with impacts are run from several start phases."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,22 +22,22 @@ from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
 Array = NDArray[np.float64]
 
 FEWEST_STEPS_WITHOUT_GRAVITY = 1000
-"""Steps of a run without gravity, which show whether it is stable; with gravity a longer run would be another motion."""
+"""Smallest number of steps of a run without gravity, to test its stability; with gravity, a longer run would be another motion."""
 BROKEN = frozenset({"declined", "diverged", "crashed", "timed_out"})
 """Failure modes without a motion to compare."""
 MOST_ROWS = 20_000
 STARTS = 4
-"""Starts of a scene with an impact, evenly spread within a step: one start may be right by chance."""
+"""Number of start phases of a scene with an impact, evenly spaced within a step, because a single one may be accurate by chance."""
 OTHER_START = 1.25
-"""Factor on speed and height of another start, which shows whether speeds are clamped."""
+"""Factor on speed and height of a second initial state, by which clamped speeds are detected."""
 SAME_MOTION = 1e-6
-"""Relative to sizes and speeds of the scene: how much motions may differ whose scenes differ by a scale only."""
+"""Largest difference of the scaled motions of scenes that differ only by a scale, relative to sizes and speeds of the scene."""
 
 Diagnose = Callable[[float], Diagnosis]
 
 
 class Runner:
-    """An engine in its process, compared within a tolerance."""
+    """An engine in its process, and the tolerance with which it is judged."""
 
     def __init__(self, entry: EngineEntry, within: float, processes: EngineProcesses) -> None:
         self.label = entry.label
@@ -62,7 +62,7 @@ class Runner:
         return diagnose_at
 
     def diagnosis(self, point: OperatingPoint, extend: bool = True) -> Diagnosis:
-        """The worst diagnosis of a scene at a time step, from several starts if it has an impact, and after its end if `extend`."""
+        """The most severe diagnosis of a scene at a time step, over its start phases, and beyond its end if `extend`."""
         scene, dt = point
         phases = start_phases(scene, truth_for(scene), dt)
         starts = STARTS if scene.steps(dt) <= MOST_ROWS else 1
@@ -74,14 +74,14 @@ class Runner:
         return worst([diagnose(one, self._within) for one in motions] + self._clamps(point, motions[0]))
 
     def record(self, scenes: Sequence[Scenario], dt: float, extend: bool = True) -> "list[Recording] | Diagnosis":
-        """The engine's recordings of scenes, or why there are none."""
+        """The engine's motions of scenes, or the reason why there are none."""
         try:
             return self._processes.call(self._entry, _record, scenes, dt, extend)
         except Failed as failure:
             return _without_value("timed_out" if failure.verdict == "timed_out" else "crashed", failure.reason)
 
     def beginning(self, point: OperatingPoint, recording: Recording) -> Diagnosis:
-        """The diagnosis of a scene that is the beginning of a longer one."""
+        """The diagnosis of the beginning of a longer motion."""
         interval = float(recording.motion.t[1] - recording.motion.t[0])
         rows = 1 + math.floor(point.scene.duration / interval + 1e-9)
         cut = replace(recording, motion=recording.motion[:rows], continuation=recording.continuation[:0])
@@ -89,7 +89,7 @@ class Runner:
         return worst([diagnose(motion, self._within), *self._clamps(point, motion)])
 
     def _clamps(self, point: OperatingPoint, motion: ExtendedMotion) -> list[Diagnosis]:
-        """Speeds that are clamped: they look cut off, and come out the same from another start."""
+        """Speeds that are clamped: they are cut off, and have the same value from another initial state."""
         scene = motion.scene
         stays = scene.floor is not None and not scene.starts_above_floor and not any(scene.start.velocity)
         if motion.whole.first_bad_row is not None or (stays and not any(scene.start.angular_velocity)) or not held_speeds(motion.whole):
@@ -103,7 +103,7 @@ class Runner:
 
 
 class _Unscaled:
-    """The scene at its nominal scale, whose motion every other scale should reproduce in its own units."""
+    """The scene at its nominal scale, whose motion every other scale should reproduce in scaled units."""
 
     def __init__(self, runner: Runner, nominal: OperatingPoint, axis: Axis) -> None:
         self.diagnosis = runner.diagnosis(nominal)
@@ -111,7 +111,7 @@ class _Unscaled:
         self._recordings = runner.record([nominal.scene], nominal.dt)
 
     def compare(self, moved: OperatingPoint, value: float) -> Diagnosis:
-        """Whether the motion at another scale is the nominal one, as far as the exact solution is known."""
+        """Whether the scaled motion equals the nominal one, up to the end of the exact solution."""
         recordings = self._runner.record([moved.scene], moved.dt)
         if isinstance(recordings, Diagnosis) or isinstance(self._recordings, Diagnosis):
             return self.diagnosis
@@ -130,7 +130,7 @@ class _Unscaled:
 
 
 class _AlongDuration:
-    """Durations: the first values are run, those between are beginnings of a longer run."""
+    """Diagnoses of durations: the initial values are run, and those between them are beginnings of a longer run."""
 
     def __init__(self, runner: Runner, nominal: OperatingPoint, axis: Axis) -> None:
         self._runner, self._nominal, self._axis = runner, nominal, axis
@@ -148,7 +148,7 @@ class _AlongDuration:
 
 
 def _extended(scene: Scenario, dt: float, recording: Recording) -> ExtendedMotion:
-    """A recording as the motion of the scene's own duration, and the whole motion."""
+    """A recorded motion as a `Motion`: for the duration of the scene, and as a whole."""
     own, more = recording.motion, recording.continuation
     times, states = np.concatenate([own.t, more.t]), np.concatenate([own.states, more.states])
     return ExtendedMotion(scene, dt, own, Trajectory.from_states(times, states, own.velocity_lag), truth_for(scene))
@@ -171,7 +171,7 @@ def _without_value(mode: FailureMode, reason: str) -> Diagnosis:
 
 
 def _record(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend: bool) -> list[Recording] | Diagnosis:
-    """In the engine's process: its recordings of scenes, or why there are none."""
+    """The engine's motions of scenes, or the reason why there are none; runs in the engine's process."""
     found = []
     for scene in scenes:
         steps = scene.steps(dt)

@@ -1,4 +1,4 @@
-"""The scan of an axis: a few values, and bisection between neighbours with different failure modes; and smaller steps than the nominal."""
+"""The scan of an axis: initial values, then bisection between different failure modes. Also the halving of the time step."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ from comparisons.running.inputs import MOST_STEPS
 from scenarios import Scenario
 
 NEAR = 1.03
-"""The ratio of the two values of a transition, at most."""
+"""Largest ratio of the two values of a transition."""
 MOST_TRANSITIONS = 3
-"""Between two of the first values; more of them would be chance."""
+"""Largest number of transitions between two initial values; more of them would be due to chance."""
 UNSTEADY = "timed_out"
-"""The failure mode whose transitions depend on the machine, and are not bisected."""
+"""The failure mode whose transitions are not bisected, because they depend on the machine."""
 
 MOST_HALVINGS = 6
 FINAL = frozenset({"sound", "declined", "crashed", "timed_out"})
-"""Failure modes at which no smaller step is tried."""
+"""Failure modes after which no smaller time step is tried."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class ScanPoint:
 
     @property
     def mode(self) -> FailureMode:
-        """Its failure mode."""
+        """The failure mode."""
         return self.diagnosis.mode
 
 
 @dataclass(frozen=True)
 class Transition:
-    """Two neighbouring points with different failure modes."""
+    """Two neighbouring values with different failure modes."""
 
     before: ScanPoint
     after: ScanPoint
@@ -46,7 +46,7 @@ class Transition:
 
 @dataclass(frozen=True)
 class AxisScan:
-    """An engine along an axis: its points in the order of their values; `base` is the nominal value."""
+    """The scan of an engine along an axis: its diagnoses in the order of their values; `base` is the nominal value."""
 
     scene: Scenario
     axis: Axis
@@ -55,7 +55,7 @@ class AxisScan:
     points: tuple[ScanPoint, ...]
 
     def at(self, value: float) -> ScanPoint:
-        """The point that is nearest to a value."""
+        """The diagnosis at the tested value nearest to a value."""
         coordinate = self.axis.coordinate
         return min(self.points, key=lambda point: abs(coordinate(point.value) - coordinate(value)))
 
@@ -66,7 +66,7 @@ class AxisScan:
 
     @property
     def sound_range(self) -> tuple[int, int] | None:
-        """The numbers of the first and the last point of the sound range around the nominal value; None if that is not sound."""
+        """The indices of the first and the last value of the sound range around the nominal value; None if that value is not sound."""
         sound = [point.mode == "sound" for point in self.points]
         first = last = next(number for number, point in enumerate(self.points) if point.value == self.base)
         if not sound[first]:
@@ -79,9 +79,9 @@ class AxisScan:
 
 
 def refine(runner: Runner, nominal: OperatingPoint, on_progress: Callable[[float], None] = lambda dt: None) -> tuple[ScanPoint, ...]:
-    """An engine at the nominal time step, and at halves of it until it is sound, `MOST_HALVINGS` at most.
+    """The diagnoses of an engine at the nominal time step and at repeated halves of it, until it is sound; at most `MOST_HALVINGS`.
 
-    With a floor every step is recorded, because impacts are judged from that only.
+    With a floor every step is recorded, because impacts can only be judged from all steps.
     """
     diagnose = runner.along(nominal, AXES["step"])
     most = MOST_STEPS if nominal.scene.floor is None else MOST_ROWS
@@ -102,7 +102,7 @@ def scan_axis(
     on_progress: Callable[[float], None] = lambda value: None,
     known: Sequence[ScanPoint] = (),
 ) -> AxisScan:
-    """Scan an axis with an engine; `on_progress` is called with each value that is done, `known` points are part of the scan."""
+    """Scan an axis with an engine. `on_progress` is called after each value; `known` diagnoses are included in the scan."""
     base = axis.base(nominal)
     diagnose = runner.along(nominal, axis)
     points = {one.value: one for one in known}
@@ -120,7 +120,7 @@ def scan_axis(
 
 
 def _find_transitions(point: Callable[[float], ScanPoint], axis: Axis, near: float, low: ScanPoint, high: ScanPoint) -> None:
-    """Bisect to where the lower point's failure mode ends, and continue from there."""
+    """Bisect to the value at which the failure mode of the lower point ends, and continue from there."""
     for _ in range(MOST_TRANSITIONS):
         if low.mode == high.mode or UNSTEADY in (low.mode, high.mode):
             return

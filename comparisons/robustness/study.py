@@ -1,4 +1,4 @@
-"""The study behind `dropspin limits`: engines along every axis of a scene."""
+"""The study of the command `dropspin limits`: engines along every axis of a scene."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -35,7 +35,7 @@ ON_A_FLOOR = (
     "pybullet[coordinates=multibody,velocity_clamp=kept]",
 )
 SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")
-"""A spin that every method reproduces, one that few do, a ball and a box that bounce, and a block that comes to rest."""
+"""A rotation that every method reproduces, one that few reproduce, a ball and a box that bounce, and a block that comes to rest."""
 DT = 5e-3  # s
 WITHIN = 0.1
 RESOURCES = ResourceLimits(processor_time=60.0)
@@ -44,15 +44,15 @@ ACCURATE, STABLE = ("sound",), ("sound", "inaccurate")
 
 @dataclass(frozen=True)
 class RobustnessStudy:
-    """The failure modes of engines at a scene's extremes.
+    """The failure modes of engines at extreme values of a scene.
 
     Attributes:
         scene: The scene.
-        dt: The time step where it is not varied [s].
+        dt: The time step, if it is not varied [s].
         within: The largest error that counts as accurate: a ratio, or an angle in radians.
-        scans: Each engine along each axis.
-        left_out: Engines that do not run the scene, and why.
-        refinements: Of each other engine, the nominal time step, and the smaller ones tried where it is not sound there.
+        scans: The scans of each engine along each axis.
+        left_out: Engines that do not run the scene, with the reason.
+        refinements: For each other engine, the diagnosis at the nominal time step, and, if it is not sound there, at smaller time steps.
     """
 
     scene: Scenario
@@ -63,18 +63,18 @@ class RobustnessStudy:
     refinements: dict[str, tuple[ScanPoint, ...]]
 
     def steps(self, engine: str) -> tuple[ScanPoint, ...]:
-        """An engine at each time step tried, in the order of the steps."""
+        """The diagnoses of an engine at each time step tried, in the order of the time steps."""
         scanned = (one.points for one in self.scans if one.axis.name == "step" and one.engine == engine)
         return next(scanned, tuple(reversed(self.refinements.get(engine, ()))))
 
     def largest_steps(self, engine: str) -> tuple[float | None, float | None]:
-        """The largest time steps tried at which, and at all smaller ones tried, an engine is accurate, and stable [s]; None without one."""
+        """The largest tested time steps up to which an engine is accurate, and stable [s]; None if there is none."""
         points = self.steps(engine)
         return _last_in_a_row(points, ACCURATE), _last_in_a_row(points, STABLE)
 
 
 def _last_in_a_row(points: Sequence[ScanPoint], allowed: Sequence[str]) -> float | None:
-    """The last value of the first points in a row whose modes are allowed."""
+    """The last value of the initial sequence of points whose modes are allowed."""
     values = [point.value for point in takewhile(lambda point: point.mode in allowed, points)]
     return values[-1] if values else None
 
@@ -93,18 +93,18 @@ def find_limits(
 
     Args:
         scene: A scene, its catalogue name, the path of its file, or a mapping with the same keys.
-        engines: One engine or several: engines, or names with options; by default the methods that differ on such a scene.
+        engines: One engine or several: engines, or names with options; by default methods that give different results for such scenes.
         axes: Names of axes, such as `step`, `spin` or `mass`; by default all that the scene has.
-        dt: Time step where it is not varied [s].
+        dt: Time step, if it is not varied [s].
         within: The largest error that counts as accurate: a ratio, or an angle in radians.
-        on_progress: Called with what is done in words, and the share of all of it, from 0 to 1.
-        resources: The processor time [s] and memory [bytes] that an engine may use for one point.
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one tested value.
 
     Returns:
-        Of each engine along each axis, where it is accurate, where it is stable, and how it fails.
+        For each engine and axis, the ranges in which the engine is accurate and stable, and its failure modes outside them.
 
     Raises:
-        DropspinError: There is no such engine or axis, or the scene does not have the axis.
+        DropspinError: An engine or an axis does not exist, or the scene does not have the axis.
     """
     scene = as_scene(scene)
     verify_time_step(scene, dt)
@@ -132,7 +132,7 @@ def _report(on_progress: Callable[[str, float], None], what: str, share: float, 
 
 
 def _axes(scene: Scenario, names: Sequence[str]) -> list[Axis]:
-    """The axes of these names, or all that a scene has."""
+    """The axes with these names, or all axes that a scene has."""
     for name in names:
         if name not in AXES:
             raise UnknownName("axis", name, AXES)

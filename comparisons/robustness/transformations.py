@@ -15,7 +15,7 @@ from scenarios.state import POSITION, SPIN, VELOCITY
 Array = NDArray[np.float64]
 
 LEAST_STEPS = 8
-"""Steps of a run, however coarse the step."""
+"""Smallest number of steps of a run."""
 
 
 def _changed(scene: Scenario, duration: float | None = None, **tables: Mapping[str, Any]) -> Scenario:
@@ -27,12 +27,12 @@ def _changed(scene: Scenario, duration: float | None = None, **tables: Mapping[s
 
 
 def with_step(nominal: OperatingPoint, dt: float) -> OperatingPoint:
-    """Another time step [s]; the scene lasts `LEAST_STEPS` steps or more."""
+    """Another time step [s]; the scene lasts at least `LEAST_STEPS` steps."""
     return OperatingPoint(_changed(nominal.scene, max(nominal.scene.duration, LEAST_STEPS * dt)), dt)
 
 
 def with_spin(nominal: OperatingPoint, speed: float) -> OperatingPoint:
-    """Another angular velocity at the start [rad/s]; in free flight for as many turns as the scene, with a floor for as long."""
+    """Another initial angular velocity [rad/s], for the same number of turns in free flight, and for the same duration with a floor."""
     scene, factor = nominal.scene, speed / spin(nominal.scene)
     duration = scene.duration if scene.floor is not None else max(scene.duration / factor, LEAST_STEPS * nominal.dt)
     faster = tuple(factor * rate for rate in scene.start.angular_velocity)
@@ -40,7 +40,7 @@ def with_spin(nominal: OperatingPoint, speed: float) -> OperatingPoint:
 
 
 def with_height(nominal: OperatingPoint, height: float) -> OperatingPoint:
-    """Another height above the floor [m]; the scene lasts for the same multiple of the fall."""
+    """Another height above the floor [m]; the duration is the same multiple of the time of the fall."""
     scene = nominal.scene
     x, y, z = scene.start.position
     higher = _changed(scene, start={"position": (x, y + height - scene.clearance, z)})
@@ -51,7 +51,8 @@ def with_height(nominal: OperatingPoint, height: float) -> OperatingPoint:
 def with_inertia_ratio(nominal: OperatingPoint, ratio: float) -> OperatingPoint:
     """Another ratio of the largest to the least moment of inertia.
 
-    The shape stays, the largest moment and its axis, and where the middle moment lies between the least and the largest value it can have.
+    The shape, the largest moment and its axis are kept, and the relative position of the middle moment between its smallest and largest
+    possible value.
     """
     scene = nominal.scene
     least, middle, largest = np.sort(np.diag(scene.body.inertia_tensor))
@@ -92,7 +93,7 @@ def with_size(nominal: OperatingPoint, size: float) -> OperatingPoint:
 
 
 def with_scale(nominal: OperatingPoint, factor: float) -> OperatingPoint:
-    """All lengths times a factor, and all times, the step included, times its square root; gravity stays."""
+    """All lengths times a factor, and all times, including the time step, times its square root; gravity is kept."""
     scene, time = nominal.scene, math.sqrt(factor)
     start = {
         "position": tuple(factor * x for x in scene.start.position),
@@ -108,7 +109,7 @@ def with_scale(nominal: OperatingPoint, factor: float) -> OperatingPoint:
 
 
 def _body_times(scene: Scenario, length: float, mass: float) -> dict[str, Any]:
-    """Keys of the body table, its lengths and masses multiplied."""
+    """Keys of the body table, with lengths and masses multiplied by factors."""
     given = scene.body.model_dump(exclude_none=True)
     keys: dict[str, Any] = {"mass": mass * given["mass"]}
     for name in {"radius", "half_extents", "points"} & given.keys():

@@ -1,1 +1,1 @@
-"""What accuracy costs: the error of each engine and method at each time step, against the time it takes per simulated second."""
+"""The cost of accuracy: the error of each engine and method at each time step, and its wall time per simulated second."""

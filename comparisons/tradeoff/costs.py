@@ -1,4 +1,4 @@
-"""The cost of native stepping, in an engine's process: wall time per simulated second, of one world and of a batch of worlds."""
+"""The cost of the time steps of an engine, measured in its process: wall time per simulated second, for one world and for a batch."""
 
 import math
 import time
@@ -12,20 +12,21 @@ from comparisons.running.recording import time_steps
 from scenarios import Scenario
 
 LONG_ENOUGH = 2e-3
-"""The least wall time of a timing [s]."""
+"""The smallest wall time of a timing [s]."""
 MOST_RUNS = 200
 BATCH = 256
-"""Worlds in a batch."""
+"""Number of worlds in a batch."""
 BATCH_ROUNDS = 3
 MOST_BATCH_STEPS = 100_000
-"""Steps of all worlds together in one timing."""
+"""Number of time steps, summed over all worlds, in one timing."""
 
 
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
-    """Wall time per simulated second of native stepping [s/s]; NaN if the state after it is not finite.
+    """Wall time per simulated second of the engine's time steps [s/s]; NaN if the state after them is not finite.
 
-    In free flight every step takes the same time. One call is timed, of so many steps that the call itself does not count, past the
-    scene's end if the engine does not break down there. With a floor the time depends on the motion, so whole runs are timed.
+    In free flight every step takes the same time. One call is timed, with enough steps to make the cost of the call itself negligible,
+    beyond the end of the scene if the engine does not break down there. With a floor the time depends on the motion, so whole runs are
+    timed.
     """
     if scene.floor is None:
         steps = 16
@@ -40,7 +41,7 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
 
 
 def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
-    """Wall time of some native steps [s]; NaN if the state after them is not finite."""
+    """Wall time of some time steps [s]; NaN if the state after them is not finite."""
     try:
         taken, state = time_steps(entry.adapter, scene, dt, steps)
     except Diverged:
@@ -49,7 +50,7 @@ def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
 
 
 def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float]) -> list[float]:
-    """Wall time per simulated second and world [s/s] of a batch at each time step; NaN if the engine cannot step batches.
+    """Wall time per simulated second and world [s/s] of a batch at each time step; NaN if the engine cannot simulate batches.
 
     In free flight a step takes the same time at any dt; with a floor whole runs are timed, unless they are too long.
     """
@@ -61,7 +62,7 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float]) -
 
 
 def _timed_batch(engine: Engine, scene: Scenario, dt: float, steps: int) -> float:
-    """The least wall time per world of some native steps of a batch [s]; NaN if there is none or its states are not finite."""
+    """The smallest wall time per world of some time steps of a batch [s]; NaN without a batch or if its states are not finite."""
     members, timings = [scene] * BATCH, []
     if steps * BATCH > MOST_BATCH_STEPS:
         return math.nan

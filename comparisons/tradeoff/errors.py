@@ -1,6 +1,6 @@
-"""The errors of an engine over a ladder of time steps, from the coarsest to those at which its error stops falling.
+"""The errors of an engine over a ladder of time steps, from the coarsest to those at which the error stops falling.
 
-Errors are of states at a fixed output interval, the same for every time step, so that all steps are compared at the same times.
+States are compared at a fixed output interval, so that errors at all time steps are measured at the same times.
 """
 
 import math
@@ -23,24 +23,24 @@ from comparisons.tradeoff.ladder import Ending, Ladder
 from scenarios import Scenario, truth_for
 
 DIVISIONS = (1, *(k * 2**j for j in range(22) for k in (2, 3)))
-"""1, 2, 3, 4, 6, 8, 12, …: steps per output, each about 1.4 times as many as before."""
+"""Numbers of steps per output interval, 1, 2, 3, 4, 6, 8, 12, …, each about 1.4 times the previous one."""
 FEWEST_OUTPUTS = 8
 LARGEST_TURN = 1.0
-"""Rotation in the coarsest step [rad]."""
+"""Rotation in the coarsest time step [rad]."""
 BUDGET = 10.0
-"""Processor time of all steps of a configuration together, unless asked otherwise [s]; errors with a floor are means over 32 runs."""
+"""Default processor time for all time steps of a configuration [s]; errors with a floor are means over 32 runs."""
 MOST_RECORDED = 200_000  # steps of one run with a floor, all of which are recorded
 NO_BETTER = 0.8
-"""A step whose error is above this share of the step's before does not improve on it."""
+"""A time step is no improvement if its error is above this share of the error at the previous time step."""
 FEWEST_POINTS = 6
-"""The least number of time steps that show a smallest error, or convergence to another motion."""
+"""The smallest number of time steps that shows a minimum of the error, or convergence to another motion."""
 CONVERGED = 0.3
-"""The share of the largest error of the motion that the smallest must be below."""
+"""The share of the largest error of the motion below which the smallest must be."""
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
 
 
 def output_interval(scene: Scenario) -> float:
-    """The interval between compared states [s], and the coarsest step: a turn of 1 rad, an eighth of the scene, a quarter of its fall."""
+    """The interval between compared states [s], and coarsest time step: a turn of 1 rad, an eighth of the scene, a quarter of its fall."""
     fastest = float(np.linalg.norm(scene.start.angular_velocity))
     intervals = [scene.duration / FEWEST_OUTPUTS]
     if fastest > 0.0:
@@ -52,16 +52,16 @@ def output_interval(scene: Scenario) -> float:
 
 
 def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str], budget: float, processes: EngineProcesses) -> Ladder:
-    """The errors by the first metric, from the coarsest time step to where they stop falling, or as far as the budget allows.
+    """The errors by the first metric, from the coarsest time step to those at which they stop falling, or to the end of the budget.
 
-    By the second metric, that of the motion, the errors must fall too. Else the engine is left out, because it may simulate another motion,
-    of which a small error by the first metric is worthless: Wang's method keeps the energy of a spin that it gets wrong.
+    The errors by the second metric, that of the motion, must fall too. Otherwise the engine is left out, because it may simulate another
+    motion, for which a small error by the first metric has no meaning: Wang's method conserves the energy of a rotation that is wrong.
 
     Args:
         entry: The engine.
         scene: The scene.
         metrics: The metric of the error, and that of the motion.
-        budget: Processor time of all steps together [s]; the step at which it is exceeded is the last.
+        budget: Processor time for all time steps [s]; the time step at which it is exceeded is the last one.
         processes: The engine's process.
     """
     try:
@@ -75,7 +75,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
     tried: list[tuple[float, list[float]]] = []
     spent = 0.0
     ended: Ending = "longest_run"
-    reason = f"a run of the next smaller step would have more than {most:,} steps"
+    reason = f"a run at the next smaller time step would have more than {most:,} steps"
     try:
         processes.call(entry, _error, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
         for division in takewhile(lambda division: scene.duration * division / interval <= most, DIVISIONS):
@@ -97,19 +97,19 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
 
 
 def _refusal(entry: EngineEntry, scene: Scenario) -> str | None:
-    """In the engine's process: why it declines a scene."""
+    """The reason why the engine declines a scene; runs in the engine's process."""
     return verified_refusal(entry.adapter.declines(scene))
 
 
 def _stalled(errors: Sequence[float]) -> int:
-    """Over how many of the last steps the errors have stopped falling; 0 if they still fall, or if there are too few to say."""
+    """The number of last time steps over which the errors have stopped falling; 0 if they still fall, or if there are too few."""
     patience = PATIENCE if errors and errors[-1] < SMALL else PATIENCE_WHILE_LARGE
     stays = len(errors) > FEWEST_POINTS and all(later >= NO_BETTER * earlier for earlier, later in pairwise(errors[-patience - 1 :]))
     return patience if stays else 0
 
 
 def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: str) -> str:
-    """Why an engine has no errors that count: none is finite, or those of the motion do not fall; empty if it has."""
+    """The reason why an engine is left out: no error is finite, or the errors of the motion do not fall; empty if it takes part."""
     if not tried:
         return reason
     range_tried = f"{len(tried)} time steps tried, {1e3 * tried[0][0]:.4g} ms to {1e3 * tried[-1][0]:.4g} ms"
@@ -118,12 +118,12 @@ def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: s
         return f"no error is finite at the {range_tried}: {reason}"
     if len(errors) > FEWEST_POINTS and max(errors) > SMALL and min(errors) > CONVERGED * max(errors):
         unit = "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
-        return f"no convergence is seen: {metric.replace('_', ' ')} is {min(errors):.3g} to {max(errors):.3g}{unit} at the {range_tried}"
+        return f"no convergence observed: {metric.replace('_', ' ')} is {min(errors):.3g} to {max(errors):.3g}{unit} at the {range_tried}"
     return ""
 
 
 def _error(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
-    """Absolute values of metrics at a time step, NaN where one is undefined, and the processor time that it took [s]."""
+    """Absolute values of metrics at a time step, NaN where undefined, and the processor time of their measurement [s]."""
     start = processor_time()
     truth = truth_for(scene)
     in_flight = scene.floor is None

@@ -1,4 +1,4 @@
-"""The ladder of time steps at which an engine was tried, and why no smaller step was."""
+"""The ladder of time steps at which an engine was tried, and the reason why no smaller one was tried."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,10 +12,10 @@ class Ladder:
 
     Attributes:
         engine: Label of the engine.
-        steps: Each time step tried [s], from the coarsest, and the absolute value of the metric there; NaN where it has none.
-        ended: Why no smaller step was tried.
-        reason: The same in words: a clause.
-        left_out: Why the engine takes no part in the comparison; empty if it does.
+        steps: Each time step tried [s], from the coarsest, and the absolute value of the metric at it; NaN if it is undefined.
+        ended: The kind of reason why no smaller time step was tried.
+        reason: The reason why no smaller time step was tried, as a clause.
+        left_out: The reason why the engine is left out of the comparison; empty if it is not.
     """
 
     engine: str

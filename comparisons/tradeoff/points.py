@@ -1,4 +1,4 @@
-"""The results of a trade-off study: error and cost of engines at time steps, the Pareto front, and the cheapest within a tolerance."""
+"""The results of a trade-off study: the error and cost of each configuration, the Pareto front, and the recommendation."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -13,19 +13,19 @@ from scenarios import Scenario
 Array = NDArray[np.float64]
 
 LEVEL = 1.25
-"""Two costs with a smaller ratio than this, or whose order differs between rounds, are level."""
+"""Two costs count as equal if their ratio is below this, or if their order differs between rounds."""
 
 
 @dataclass(frozen=True, eq=False)
 class CostPoint:
-    """An engine at a time step.
+    """A configuration: an engine at a time step, with its error and its cost.
 
     Attributes:
         engine: Label of the engine.
         dt: Time step [s].
         error: Absolute value of the metric.
         cost: Wall time per simulated second in each round [s/s], shape (rounds,).
-        cost_per_world: The least wall time per simulated second and world in a batch [s/s]; NaN if the engine cannot step batches.
+        cost_per_world: The smallest wall time per simulated second and world in a batch [s/s]; NaN if the engine cannot simulate batches.
     """
 
     engine: str
@@ -36,19 +36,19 @@ class CostPoint:
 
     @property
     def typical_cost(self) -> float:
-        """The median cost of the rounds [s/s]."""
+        """The median of the costs of all rounds [s/s]."""
         return float(np.median(self.cost))
 
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The cheapest point within a tolerance, and the next best of another engine or method.
+    """The cheapest configuration within a tolerance, and the next best one of another engine or method.
 
     Attributes:
         within: The tolerance.
-        best: The cheapest point.
-        next_best: The next best; None if no other engine reaches the tolerance at a step tried.
-        ratio: The cost of the next best over the best's, median of the rounds.
+        best: The cheapest configuration.
+        next_best: The next best configuration; None if no other engine reaches the tolerance at a tested time step.
+        ratio: The ratio of the cost of the next best configuration to that of the best; the median over the rounds.
         level: Whether the difference between the two is too small to rely on.
     """
 
@@ -66,8 +66,8 @@ class TradeOff:
     Attributes:
         scene: The scene.
         metric: The metric of the error.
-        points: Engines at time steps.
-        ladders: Of every engine that was asked for, the time steps tried and why no smaller one was.
+        points: The configurations with a measured error and cost.
+        ladders: The time steps tried for every requested engine, and the reason why no smaller one was tried.
     """
 
     scene: Scenario
@@ -77,22 +77,22 @@ class TradeOff:
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Engines without points, and why."""
+        """Engines without configurations, with the reason."""
         return {ladder.engine: ladder.left_out for ladder in self.ladders if ladder.left_out}
 
     @property
     def pareto_front(self) -> list[CostPoint]:
-        """The points than which no other is both more accurate and cheaper; cheapest first."""
+        """The configurations for which no other one is both more accurate and cheaper; cheapest first."""
         return _pareto_front(self.points, lambda point: point.typical_cost)
 
     @property
     def batch_pareto_front(self) -> list[CostPoint]:
-        """The Pareto front by cost per world, of the engines that can step batches."""
+        """The Pareto front by cost per world, for engines that can simulate batches."""
         return _pareto_front([point for point in self.points if np.isfinite(point.cost_per_world)], lambda point: point.cost_per_world)
 
     @property
     def dominated(self) -> dict[CostPoint, CostPoint]:
-        """Of each engine without a point on the Pareto front, its most accurate point, and the cheapest that is as accurate."""
+        """For each engine that is not on the Pareto front, its most accurate configuration and the cheapest one that is as accurate."""
         front = self.pareto_front
         best: dict[str, CostPoint] = {}
         for point in sorted(self.points, key=lambda one: one.error, reverse=True):
@@ -102,12 +102,12 @@ class TradeOff:
         return {point: next(one for one in front if one.error <= point.error) for point in inside}
 
     def recommendation(self, within: float) -> Recommendation | None:
-        """The cheapest point within a tolerance; None if no point is.
+        """The cheapest configuration within a tolerance; None if there is none.
 
         Args:
             within: The tolerance, in the metric's unit.
 
-        Of each engine, the coarsest time step counts that is within the tolerance together with all finer ones: at a coarser one the error
+        For each engine, the coarsest time step is used for which it and all finer ones are within the tolerance; at a coarser one the error
         may be small by chance, where it crosses 0.
         """
         coarsest = self._coarsest(within)
@@ -122,7 +122,7 @@ class TradeOff:
         return Recommendation(within, best, others[0], ratio, level)
 
     def best_in_batch(self, within: float) -> CostPoint | None:
-        """The point with the least cost per world within a tolerance; None if no engine that can step batches reaches it.
+        """The configuration with the smallest cost per world within a tolerance; None if no engine that can simulate batches reaches it.
 
         Args:
             within: The tolerance, in the metric's unit.
@@ -131,7 +131,7 @@ class TradeOff:
         return min(batched, key=lambda point: point.cost_per_world, default=None)
 
     def _coarsest(self, within: float) -> list[CostPoint]:
-        """Of each engine, the coarsest time step that is within a tolerance together with all finer ones."""
+        """For each engine, the coarsest time step for which it and all finer ones are within a tolerance."""
         coarsest: dict[str, CostPoint] = {}
         exceeded: set[str] = set()
         for point in sorted(self.points, key=lambda one: one.dt):

@@ -1,7 +1,7 @@
-"""The study behind `dropspin tradeoff`: errors and costs of engines over a ladder of time steps.
+"""The study of the command `dropspin tradeoff`: errors and costs of engines over a ladder of time steps.
 
-Timed is native stepping alone, of all entries in turn, round after round: a disturbance of the machine affects a whole round, and ratios
-of costs are taken round by round.
+Only the engine's own time stepping is timed. In each round all engines are timed in turn, and ratios of costs are computed within a round,
+so that other load on the machine affects all engines of a round equally.
 """
 
 import math
@@ -44,10 +44,10 @@ ON_A_FLOOR = (
     "pybullet[coordinates=multibody]",
 )
 ROUNDS = 9
-NO_COST = "its cost could not be measured: native stepping fails, or does not give a finite state"
+NO_COST = "its cost could not be measured: its time steps fail, or do not give a finite state"
 
 OnProgress = Callable[[str, float], None]
-"""Called with what is done, and the share of the whole study."""
+"""Called with a description of the current work, and the fraction of the study that is done."""
 
 
 def tradeoff(
@@ -63,24 +63,26 @@ def tradeoff(
 
     Args:
         scene: A scene with an exact solution, its catalogue name, the path of its file, or a mapping with the same keys.
-        engines: One engine or several: engines, or names with options; by default the methods that differ on such a scene.
+        engines: One engine or several: engines, or names with options; by default methods that give different results for such scenes.
         metric: The metric of the error; by default the scene's leading metric.
-        budget: Processor time for the errors of each engine, at all time steps together [s]; where it is spent, its ladder of steps ends.
-        on_progress: Called with what is done in words, and the share of the whole study, from 0 to 1.
+        budget: Processor time for measuring the errors of each engine at all time steps [s]; once it is used up, no smaller time step is
+            tried.
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
         resources: The processor time [s] and memory [bytes] that each piece of work may use.
 
     Returns:
         The error of each engine at each time step and its cost, in seconds per simulated second, with the Pareto front.
 
     Raises:
-        DropspinError: The scene has no exact solution, or not this metric; the budget is not above 0; or no engine runs the scene.
+        DropspinError: The scene has no exact solution, or the metric does not apply to it; the budget is not above 0; or no engine runs the
+            scene.
     """
     if not 0.0 < budget < math.inf:
         raise DropspinError(f"budget: got {budget!r}; give a number of seconds above 0.")
     scene = as_scene(scene)
     truth = truth_for(scene)
     if truth is None:
-        raise DropspinError(f"{scene.name} has no exact solution to compare with; choose a scene that has one, see dropspin list.")
+        raise DropspinError(f"{scene.name} has no exact solution to compare with; choose a scene that has one (see dropspin list).")
     of_the_motion = leading_metric(scene)
     chosen = metric or of_the_motion
     known = [one.name for one in metrics_for(scene, truth)]
@@ -104,7 +106,7 @@ def tradeoff(
 
 
 def _with_accuracy_levels(entry: EngineEntry) -> list[EngineEntry]:
-    """An engine, and the same with each value of the options that set its accuracy."""
+    """An engine, and the engine with each value of the options that set its accuracy."""
     levels = [] if entry.engine is None else entry.engine.accuracy_levels()
     return [entry, *map(engine_entry, levels)]
 
@@ -112,7 +114,7 @@ def _with_accuracy_levels(entry: EngineEntry) -> list[EngineEntry]:
 def _with_costs(
     ladders: Sequence[tuple[EngineEntry, Ladder]], scene: Scenario, processes: EngineProcesses, on_progress: OnProgress
 ) -> tuple[CostPoint, ...]:
-    """The steps of ladders with a finite error, with their cost in every round and in a batch; without those whose cost is not finite."""
+    """The configurations of the ladders that have a finite error and a finite cost, with the cost in every round and in a batch."""
     steps = [(entry, dt, error) for entry, ladder in ladders for dt, error in ladder.steps if np.isfinite(error)]
     costs: list[list[float]] = [[] for _ in steps]
     for number in range(ROUNDS):

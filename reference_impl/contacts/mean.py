@@ -1,9 +1,9 @@
 """`contact=mean`: Algorithm 2. One impulse at the mean of the colliding vertices (section 3.2).
 
 Order: none claimed (see the package's docstring).
-Valid for: a single vertex, and a flat fall; it is exact there. Where several vertices touch at once it leaves some of them approaching; as
-dt → 0 a rocking block then converges to another motion than Housner's (1963).
-Cost: one detection and one impulse a step.
+Valid for: a single vertex, and a flat fall; it is exact there. If several vertices touch at once, some of them still approach the floor
+after the impulse; as dt → 0, the motion of a rocking block then does not converge to that of Housner (1963).
+Cost: one detection and one impulse per step.
 Source: H. Wang, Rigid Body Dynamics, Algorithm 2, eq 10, 12 and section 3.2.
 """
 

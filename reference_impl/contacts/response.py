@@ -1,4 +1,4 @@
-"""Eq 15: how the velocity of a point of the body responds to an impulse at that point."""
+"""Eq 15: the change of the velocity of a point of the body by an impulse at that point."""
 
 from reference_impl.vectors import Mat3, Vec3, compiled, cross, transpose
 

@@ -6,7 +6,7 @@ floor, so that the strict inequality of eq 10 still detects the contact.
 Order: none claimed; the lift is as large as the penetration that contact detection left.
 Keeps: a penetration of at most 1e-7 m at rest. Lifting adds potential energy, M g times the depth.
 Cost: one pass over the vertices of a body that is near the floor.
-Source: the simplest of the stabilisations in J. Baumgarte, CMAME 1 (1972), and E. Catto, Iterative Dynamics (GDC 2005).
+Source: the simplest stabilisation of J. Baumgarte, CMAME 1 (1972), and E. Catto, Iterative Dynamics (GDC 2005).
 """
 
 from reference_impl.floor_plane import N, along_normal, vertex

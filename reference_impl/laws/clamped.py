@@ -6,7 +6,7 @@ Without friction it is the normal law, because eq 15 can add energy even at µ =
 Order: infinite; no time step enters (see the package's docstring).
 Keeps: never adds energy.
 Valid for: friction 0 or infinity.
-Cost: three solutions of a 3 x 3 system an impact.
+Cost: three solutions of a 3 x 3 system per impact.
 Source: follows from eq 12 and 15; A. Chatterjee & A. Ruina, J. Applied Mechanics 65 (1998), for the bound.
 """
 

@@ -3,14 +3,14 @@
     stick   K j = -u - µ u_n N
     slip    j = j_n (N - f t),  t = u_t / |u_t|,  j_n = -(1 + µ) u_n / (N·K (N - f t))
 
-f is the coefficient of friction. For a contact that does not slide at first, t is the direction in which its normal impulse drives it,
-along (K N)_t. Where the slip would reverse within the impact, or jam (N·K (N - f t) not above 0), friction stops it on the way: the contact
-sticks, with a larger tangential impulse than the cone allows.
+f is the coefficient of friction. If the contact does not slide initially, t is the direction in which the normal impulse moves it, along (K
+N)_t. If the direction of slip would reverse within the impact, or the contact would jam (N·K (N - f t) not above 0), friction stops the
+slip during the impact: the contact sticks, with a larger tangential impulse than the cone allows.
 
 Order: infinite; no time step enters (see the package's docstring).
-Keeps: the friction cone where it slips. Slipping never adds energy; sticking does where eq 17 does.
+Keeps: the friction cone where it slips. Slipping never adds energy; sticking adds energy where eq 17 does.
 Valid for: any friction. One direction of slip per impact.
-Cost: one solution of a 3 x 3 system and three products with K an impact.
+Cost: one solution of a 3 x 3 system and three products with K per impact.
 Source: C. A. de Coulomb (1785); E. J. Routh, Elementary Rigid Dynamics (1905), section 187.
 """
 

@@ -2,8 +2,8 @@
 
 Order: infinite; no time step enters (see the package's docstring).
 Keeps: horizontal momentum. Never adds energy.
-Valid for: frictionless floors. On others it still applies no friction.
-Cost: one product with K an impact.
+Valid for: frictionless floors. On other floors it applies no friction either.
+Cost: one product with K per impact.
 Source: E. T. Whittaker, Analytical Dynamics, section 95.
 """
 

@@ -1,11 +1,12 @@
-"""`law=note`: eq 15 without friction, eq 17 where the floor sticks.
+"""`law=note`: eq 15 without friction, eq 17 with infinite friction.
 
-Eq 15 keeps the tangential velocity of the contact, so its impulse is not normal: it pushes sideways, and it can add energy, by up to a
-factor of 7 at restitution 1. Eq 17 can add energy at restitution above .66 (a solid box), and can pull.
+Eq 15 keeps the tangential velocity of the contact, so its impulse is not normal: it has a tangential component, and it can increase the
+energy by up to a factor of 7 at restitution 1. Eq 17 can add energy at restitution above 0.66 (a solid box), and its normal impulse can be
+negative.
 
 Order: infinite; no time step enters (see the package's docstring).
 Valid for: friction 0 or infinity.
-Cost: one solution of a 3 x 3 system an impact.
+Cost: one solution of a 3 x 3 system per impact.
 Source: H. Wang, Rigid Body Dynamics, eq 11 to 17.
 """
 

@@ -1,12 +1,12 @@
 """`law=poisson`: sticking with Poisson's restitution, in which expansion returns µ times the impulse of compression.
 
-The contact leaves straight up at s = µ max(-N·K⁻¹u, 0) / (N·K⁻¹N). Without friction Poisson's and Newton's restitution agree, so it is the
-normal law there.
+The contact leaves straight up at s = µ max(-N·K⁻¹u, 0) / (N·K⁻¹N). Without friction Poisson's and Newton's restitution are equal, so this
+law equals `normal`.
 
 Order: infinite; no time step enters (see the package's docstring).
 Keeps: never adds energy.
 Valid for: friction 0 or infinity.
-Cost: three solutions of a 3 x 3 system an impact.
+Cost: three solutions of a 3 x 3 system per impact.
 Source: S. D. Poisson, Traité de mécanique (1833); W. J. Stronge, Impact Mechanics (2000), section 3.4.
 """
 

@@ -6,9 +6,9 @@
 Order: infinite; each step is exact to the rounding of its restart.
 Keeps: energy and L.
 Valid for: any |ω| dt.
-Lanes: none. The branches and iterations of the elliptic functions differ from body to body, so the bodies of an ensemble run one after the
+Lanes: none. The branches and iterations of the elliptic functions differ between bodies, so the bodies of an ensemble run one after the
 other.
-Cost: one set of elliptic functions, two integrals R_F and two to four R_J a step, by far the most of all rotations.
+Cost: one set of elliptic functions, two integrals R_F and two to four R_J per step, by far the most of all rotations.
 Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; E. T. Whittaker, Analytical Dynamics, section 69; Carlson's integrals.
 """
 
@@ -23,7 +23,7 @@ RUNS_IN_LANES = False
 DISCRETISATION = "exact"
 
 PARALLEL = 1e-15
-"""Sine of the angle between L and ω below which the body spins about a principal axis."""
+"""Sine of the angle between L and ω below which the body counts as rotating about a principal axis."""
 
 
 @compiled
@@ -48,7 +48,7 @@ def turn(q, w, dt, body):
 
 @compiled
 def _square(x):
-    """x², by the product: powers round differently in Python and in compiled code."""
+    """x², computed as a product, because powers round differently in Python and in compiled code."""
     return x * x
 
 
@@ -76,13 +76,13 @@ def _axes(I, spin):
 
 @compiled
 def _parity(a, b):
-    """+1 where b follows a in the cyclic order of the axes, else -1: then the third axis changes its sense."""
+    """+1 if b follows a in the cyclic order of the axes, else -1, in which case the third axis is reversed."""
     return 1.0 if (b - a) % 3 == 1 else -1.0
 
 
 @compiled
 def _component(vector, a, b, axis, sign):
-    """A component along a principal axis of a vector that is given along a, b and (signed) c."""
+    """The component along a principal axis of a vector that is given by components along a, b and (signed) c."""
     if axis == a:
         return vector.x
     return vector.y if axis == b else sign * vector.z
@@ -90,7 +90,7 @@ def _component(vector, a, b, axis, sign):
 
 @compiled
 def _asymmetric_top(moments, spin, dt):
-    """The rotation within dt, as a quaternion, and the spin after it, along a, b, c."""
+    """The rotation within dt, as a quaternion, and the angular velocity after it, along a, b, c."""
     Ia, Ib, Ic = moments.x, moments.y, moments.z
     to_c = Ia * (Ic - Ia) * _square(spin.x) + Ib * (Ic - Ib) * _square(spin.y)  # 2 T Ic - L²
     to_a = Ib * (Ib - Ia) * _square(spin.y) + Ic * (Ic - Ia) * _square(spin.z)  # L² - 2 T Ia
@@ -143,7 +143,7 @@ def _integral(u, sn, cn, dn, n, m1, K):
 
 @compiled
 def _triad(L, about_c):
-    """Rows: two directions square to L, the first one square to axis p too, and L's own."""
+    """Three rows: two directions perpendicular to L, of which the first is also perpendicular to the axis p, and the direction of L."""
     along = L / math.sqrt(dot(L, L))
     first = cross(along, Vec3(0.0, 0.0, 1.0) if about_c else Vec3(1.0, 0.0, 0.0))
     first = first / math.sqrt(dot(first, first))

@@ -4,7 +4,7 @@
 
 Order: 1, as explicit Euler.
 Keeps: nothing. Gains energy at every step and diverges.
-Valid for: short times and |ω| dt below .02.
+Valid for: short times and |ω| dt below 0.02.
 Cost: `note` and one product with I and I⁻¹ each.
 Source: L. Euler (1758); the explicit term as in many engines, for instance MuJoCo's Euler and Bullet's multibody.
 """

@@ -1,4 +1,4 @@
-"""`rotation=midpoint`: the implicit midpoint rule for the angular momentum m in the body, and Cayley's map for the attitude.
+"""`rotation=midpoint`: the implicit midpoint rule for the angular momentum m in the body, and Cayley's map for the orientation.
 
     m' = m + dt m̄ × ω̄,   m̄ = (m + m')/2,   ω̄ = I⁻¹ m̄,   q' = q (dt ω̄/2, 1) / |…|
 

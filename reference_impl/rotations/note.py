@@ -3,10 +3,10 @@
     q ← (q + dt/2 [ω, 0] q) / |…|,   ω ← ω
 
 Order: none claimed. Without the gyroscopic term the method is inconsistent (order 0) for unequal moments. About a principal axis it is of
-order 2: it turns by 2 atan(|ω| dt/2) a step instead of |ω| dt.
+order 2: it rotates by 2 atan(|ω| dt/2) in a step instead of |ω| dt.
 Keeps: kinetic energy and |L|, but not the direction of L.
 Valid for: any |ω| dt; it never diverges.
-Cost: one quaternion product and one normalisation a step, the least of all rotations.
+Cost: one quaternion product and one normalisation per step, the least of all rotations.
 Source: H. Wang, Rigid Body Dynamics, eq 6.
 """
 

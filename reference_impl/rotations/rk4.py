@@ -1,11 +1,11 @@
-"""`rotation=rk4`: the classical Runge-Kutta method on the quaternion and the spin in the body.
+"""`rotation=rk4`: the classical Runge-Kutta method for the quaternion and the angular velocity in the body frame.
 
     q' = q [ω, 0] / 2,   ω' = I⁻¹ (-ω × I ω)
 
 Order: 4.
 Keeps: nothing exactly; energy and L drift at fifth order.
 Valid for: |ω| dt up to about 2.5; beyond it the method diverges.
-Cost: four evaluations of the rates and one normalisation a step.
+Cost: four evaluations of the rates and one normalisation per step.
 Source: W. Kutta, Z. Math. Phys. 46 (1901).
 """
 

@@ -1,4 +1,4 @@
-"""`rotation=symmetric-top`: the body as a symmetric top and a turn about one axis, each exact, composed to fourth order.
+"""`rotation=symmetric-top`: a composition of fourth order of two exact motions, that of a symmetric top and a rotation about one axis.
 
     T = (m₁² + m₂²)/2I₁ + m₃²/2I₃   +   m₂²/2 (1/I₂ - 1/I₁)
 
@@ -6,7 +6,7 @@ Order: 4, by Strang's splitting five times with Suzuki's steps. Exact for a symm
 are the closest.
 Keeps: L in space, to rounding; energy oscillates and does not drift.
 Valid for: |ω| dt up to about 1.6.
-Cost: twenty turns about an axis a step, each with sines and cosines.
+Cost: twenty rotations about an axis per step, each with sines and cosines.
 Source: S. Reich, Physica D 76 (1994), and A. Dullweber, B. Leimkuhler & R. McLachlan, J. Chem. Phys. 107 (1997), for splitting the free
 body; M. Suzuki, Phys. Lett. A 146 (1990), for the composition.
 """
@@ -43,7 +43,7 @@ def turn(q, w, dt, body):
 
 @compiled
 def _about_second(q, m, h, I):
-    """The flow of m₂²/2 (1/I₂ - 1/I₁): a turn about the second axis."""
+    """The flow of m₂²/2 (1/I₂ - 1/I₁): a rotation about the second axis."""
     angle = h * m.y * (1.0 / I.y - 1.0 / I.x)
     c, s = math.cos(angle), math.sin(angle)
     half = 0.5 * angle
@@ -52,7 +52,7 @@ def _about_second(q, m, h, I):
 
 @compiled
 def _symmetric_top(q, m, h, I):
-    """The flow of the symmetric top: a turn about L by h |L|/I₁, then one about its own axis."""
+    """The flow of the symmetric top: a rotation about L by h |L|/I₁, followed by one about its symmetry axis."""
     length = math.sqrt(dot(m, m))
     half = 0.5 * h * length / I.x
     # sin(half)/length, which is h/(2 I₁) where the body is at rest

@@ -1,1 +1,1 @@
-"""The commands, one a file; `main` finds them by name."""
+"""The commands, one in each file; `main` imports them by name."""

@@ -9,18 +9,20 @@ BASELINE = "dropspin-baseline.toml"
 
 @click.command("accept")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True)
-@click.option("--reason", required=True, metavar="TEXT", help="Why these results are accepted; it is written to the file.")
-@click.option("--baseline", default=BASELINE, show_default=True, metavar="FILE", help="The baseline; a new file is made if there is none.")
+@click.option("--reason", required=True, metavar="TEXT", help="The reason why these results are accepted; it is written to the file.")
+@click.option(
+    "--baseline", default=BASELINE, show_default=True, metavar="FILE", help="The baseline; the file is created if it does not exist."
+)
 @click.option(
     "--known-failures",
     is_flag=True,
-    help="Accept failing checks as known failures: they do not fail as long as their results get no worse.",
+    help="Accept failing checks as known failures, which fail only if their results get worse.",
 )
 @as_json
 def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_failures: bool, json_output: bool) -> None:
     """Accept a run's results as the new baseline.
 
-    Results that have not moved beyond their tolerance stay unchanged in the file, as do those that RUN does not cover.
+    Results that changed by no more than their tolerance stay as they are in the file. Results that RUN does not cover stay too.
     """
     import datetime
     import os
@@ -35,7 +37,7 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
     from scenarios import DropspinError
 
     if not reason.strip():
-        raise click.UsageError("--reason is empty; say why these results are accepted.")
+        raise click.UsageError("--reason is empty; give the reason why these results are accepted.")
     if not reason.isprintable():
         raise click.UsageError("--reason: contains control characters or more than one line; give one line of text.")
     new = load_baseline(baseline) if os.path.exists(baseline) else Baseline()
@@ -46,7 +48,7 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
         changes.append(found)
         sentences += accepted_sentences(results, found, known_failures)
     if new.results.empty:
-        raise DropspinError(f"{', '.join(runs)}: there is nothing to accept, as no engine was measured; {baseline} is not written.")
+        raise DropspinError(f"{', '.join(runs)}: there is nothing to accept, because no engine was measured; {baseline} is not written.")
     write_baseline(new, baseline)
     if json_output:
         click.echo(json_rows(pd.concat(changes)))

@@ -26,7 +26,7 @@ def calibrate_command(
     language: str | None,
     json_output: bool,
 ) -> None:
-    """Print the settings that give a restitution at a time step, ready to paste, and what was measured with them.
+    """Print the settings that give a coefficient of restitution at a time step, ready to paste, with measured results.
 
     MuJoCo's contact is a damper over one time step or, with -e mujoco[spring_steps=20], a spring over 20.
     """
@@ -37,7 +37,7 @@ def calibrate_command(
     from scenarios import UnknownName
 
     if language is not None and json_output:
-        raise click.UsageError("--as prints one text and --json all of them; give one of the two.")
+        raise click.UsageError("--as prints one text and --json prints all of them; give only one of these options.")
     with status(f"measuring {engine_name}"):
         found = calibrate(engine_name, restitution, dt, view.friction(friction), shape)
     stop_if_interrupted()

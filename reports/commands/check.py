@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 @click.command("check")
 @click.argument("run", metavar="RUN")
 @baseline_option
-@click.option("--junit", metavar="FILE", help="Write every judged row as JUnit XML, which CI servers read.")
+@click.option("--junit", metavar="FILE", help="Write a test case for every check as JUnit XML, the format that CI servers read.")
 @summary_option
 @as_json
 def check_command(run: str, baseline: str | None, junit: str | None, summary: str | None, json_output: bool) -> int:
-    """Judge a run: by what its scenes expect, and by the accepted results of a baseline.
+    """Check a run: compare it with the expectations of its scenes, and with the accepted results of a baseline.
 
     RUN is the folder that dropspin run -o wrote.
 
@@ -51,7 +51,7 @@ def check_command(run: str, baseline: str | None, junit: str | None, summary: st
 
 
 def print_checked(checked: "Checked", file: "BaselineFile | None", found: "list[Failure]") -> None:
-    """Print what failed, then the outcome of the check; in GitHub's runners annotations too."""
+    """Print the failures, then the outcome of the check; on GitHub's runners, also print annotations."""
     from reports.terminal.rows import print_sentences
     from reports.terminal.summary import print_failures
     from reports.views import check as view

@@ -14,7 +14,7 @@ from reports.commands.options import as_json, summary_option, write_text
 @summary_option
 @as_json
 def compare_command(old: str, new: str, summary: str | None, json_output: bool) -> int:
-    """Show what changed between two runs, and what it is attributed to: the engine, its settings, dropspin, or the machine.
+    """Show which results changed between two runs, and the cause: the engine, its settings, dropspin, or the machine.
 
     OLD and NEW are folders that dropspin run -o wrote. Accuracy is judged; speed is reported, not gated.
 

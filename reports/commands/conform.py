@@ -14,14 +14,16 @@ if TYPE_CHECKING:
 
 @click.command("conform")
 @click.argument("engine_name", metavar="ENGINE")
-@click.option("--check", "checks", multiple=True, metavar="CHECK", help="Make this check only, by its name in the table; repeat for more.")
+@click.option(
+    "--check", "checks", multiple=True, metavar="CHECK", help="Run only this check, given by its name in the table; repeat for more."
+)
 @click.option("--traceback", is_flag=True, help="Print the whole traceback of each exception of the adapter.")
-@time_limit_option(60.0, "each check may take")
+@time_limit_option(60.0, "each check may use")
 @as_json
 def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, time_limit: float, json_output: bool) -> int:
     """Check an engine adapter against the protocol and against reference motions.
 
-    ENGINE is a name, as in `dropspin list engines`, or your own as my_module:MyEngine.
+    ENGINE is a name from `dropspin list engines`, or a class of your own, such as my_module:MyEngine.
 
     Exit code: 0 every check passed, 1 a check failed, 2 bad input, 3 the engine crashed, hung or is not installed.
     """

@@ -8,7 +8,7 @@ from reports.commands.options import as_json
 @click.command("doctor")
 @as_json
 def doctor_command(json_output: bool) -> None:
-    """Check this installation: versions, engines, processor, and whether each engine steps."""
+    """Check this installation: versions, engines, processor, and whether each engine can take a time step."""
     from comparisons.engines.registry import engine_names
     from reports.terminal.rows import print_rows
     from reports.views import doctor

@@ -16,9 +16,9 @@ from reports.commands.options import as_json
 @click.option("-o", "--output", default="out/history", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
 @as_json
 def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> None:
-    """Follow each result over runs, commits and versions of engines, and find the runs in which results moved.
+    """Follow each result over runs, commits and versions of engines, and find the runs in which results changed.
 
-    RUN is a folder that dropspin run -o wrote, or a folder of such folders; runs are sorted by the time they were started.
+    RUN is a folder that dropspin run -o wrote, or a folder of such folders. Runs are sorted by start time.
     """
     from comparisons.regressions.history import history
     from reports.output import folder_made
@@ -40,10 +40,10 @@ def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> No
 
 
 def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
-    """The folders of runs at some places, each a run or a folder of runs.
+    """The folders of all runs in the given folders, each of which is a run or a folder of runs.
 
     Raises:
-        DropspinError: A place is neither.
+        DropspinError: A given folder is neither a run nor a folder of runs.
     """
     from scenarios import DropspinError
 
@@ -60,7 +60,7 @@ def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
 
 
 def _load_runs(found: dict[str, Path]) -> dict[str, Any]:
-    """The results of runs, by the shortest names that are unique."""
+    """The results of runs, by the name of the folder if it is unique, else by its path."""
     from comparisons.results.store import load_results
     from scenarios.text import printable
 

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, recorded so that an interrupt that a callback swallows still stops the command."""
+"""Handlers of Ctrl-C and SIGTERM. Interrupts are recorded, so that they stop the command even if a callback suppresses the exception."""
 
 import signal
 import sys
@@ -14,7 +14,7 @@ def handle_interrupts() -> None:
 
 
 def stop_if_interrupted() -> None:
-    """Raise a recorded interrupt again: callbacks of engines and of the compiler swallow exceptions."""
+    """Raise a recorded interrupt again, because callbacks of engines and of the compiler suppress exceptions."""
     if _interrupts:
         raise KeyboardInterrupt
 

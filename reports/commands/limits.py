@@ -13,9 +13,13 @@ from reports.commands.options import as_json, time_limit_option
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
 @click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
 @click.option(
-    "--axis", "axes", multiple=True, metavar="AXIS", help="What to vary, such as spin; repeat for more. [default: every axis of a scene]"
+    "--axis",
+    "axes",
+    multiple=True,
+    metavar="AXIS",
+    help="The quantity to vary, such as spin; repeat for more. [default: every axis that the scene has]",
 )
-@click.option("--dt", default=5e-3, show_default=True, type=float, metavar="SECONDS", help="The time step, for every axis but step.")
+@click.option("--dt", default=5e-3, show_default=True, type=float, metavar="SECONDS", help="The time step, for every axis except step.")
 @click.option(
     "--within",
     default=0.1,
@@ -24,7 +28,7 @@ from reports.commands.options import as_json, time_limit_option
     metavar="TOLERANCE",
     help="The largest error that counts as sound: a ratio, or an angle in radians.",
 )
-@time_limit_option(60.0, "an engine may take at one point")
+@time_limit_option(60.0, "an engine may use for one tested value")
 @click.option("-o", "--output", default="out/limits", show_default=True, metavar="DIR", help="Folder for the tables and the figures.")
 @as_json
 def limits_command(
@@ -37,9 +41,10 @@ def limits_command(
     output: str,
     json_output: bool,
 ) -> None:
-    """Find where engines break, along axes: time step, spin, height, inertia ratio, mass, restitution, duration and scale.
+    """Find where engines break down as time step, spin, height, inertia ratio, mass, restitution, duration, size or scale varies.
 
-    Without arguments: five scenes (two spins, a ball, a box, a block) and the methods that differ on them; some minutes.
+    The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them; this
+    takes some minutes.
     """
     from comparisons.robustness.axes import AXES
     from comparisons.robustness.study import SCENES, find_limits
@@ -53,7 +58,7 @@ def limits_command(
 
     loaded = [load(name) for name in scenes or SCENES]
     if len({scene.name for scene in loaded}) < len(loaded):
-        raise click.UsageError("two scenes have the same name; a scene's name is its file's name, rename one.")
+        raise click.UsageError("two scenes have the same name, which is that of the file; rename one of the files.")
     having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in {*axes} & AXES.keys())]
     found = []
     with folder_made(output) as folder:

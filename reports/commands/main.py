@@ -13,32 +13,32 @@ from reports.commands.interrupts import handle_interrupts
 
 COMMANDS = {
     "accept": "Accept a run's results as the new baseline.",
-    "calibrate": "Print the settings that give a restitution at a time step.",
-    "check": "Judge a run: by what its scenes expect, and by a baseline.",
-    "compare": "Show what changed between two runs, and what it is attributed to.",
+    "calibrate": "Print the settings that give a coefficient of restitution at a time step.",
+    "check": "Check a run against the expectations of its scenes and a baseline.",
+    "compare": "Show which results changed between two runs, and the cause.",
     "conform": "Check an engine adapter against the protocol and reference motions.",
     "doctor": "Check this installation.",
     "history": "Follow each result over runs, commits and versions.",
-    "limits": "Find where engines break.",
+    "limits": "Find where engines break down.",
     "list": "List the scenes, the engines or the metrics.",
-    "replay": "Show the motion in 3D.",
+    "replay": "Show the motions of a run in 3D.",
     "report": "Write the report of a run again.",
-    "run": "Run scenes with engines, side by side, and write the report.",
-    "show": "Show a scene, or an engine's settings for it.",
+    "run": "Run scenes with several engines, and write the report.",
+    "show": "Show a scene, or the settings of an engine for the scene.",
     "sweep": "Run every job of a grid or random sample.",
     "tradeoff": "Measure what accuracy costs.",
 }
-"""The commands, each in `reports/commands/NAME.py`, and their line in the help."""
+"""The commands, each in `reports/commands/NAME.py`, with the line shown for each in the help."""
 CITATION = """To cite: The dropspin authors, dropspin, version {version};
 for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
-"""What to cite; a test compares it with CITATION.cff."""
+"""The text to cite; a test compares it with CITATION.cff."""
 LONGEST_ARGUMENT = 4096
 INTERRUPTED = 130  # 128 + SIGINT, as in shells
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor a usage error
 
 
 def main() -> None:
-    """Run the command line; every expected error ends in one line and exit code 2."""
+    """Run the command line; every expected error ends with one line and exit code 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a character gets a question mark, not a traceback
@@ -56,7 +56,7 @@ def main() -> None:
         _say(str(error))
         sys.exit(2)
     except Exception:
-        click.echo("dropspin: internal error; please report what follows.", err=True)
+        click.echo("dropspin: internal error; please report the following output.", err=True)
         traceback.print_exc()
         sys.exit(INTERNAL_ERROR)
 
@@ -86,14 +86,14 @@ def _run() -> int:
 
 
 def _say(message: str) -> None:
-    """Print an error in printable characters."""
+    """Print an error message, with unprintable characters escaped."""
     from scenarios.text import printable
 
     click.echo(f"dropspin: {printable(message)}", err=True)
 
 
 class _LazyGroup(click.Group):
-    """A group that imports a command only when it is called, so that the help needs none of them."""
+    """A group that imports a command only when it is called, so that the help imports no command."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)

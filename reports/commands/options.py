@@ -9,7 +9,7 @@ import click
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
-baseline_option = click.option("--baseline", metavar="FILE", help="Baseline to compare the run with, as dropspin accept wrote it.")
+baseline_option = click.option("--baseline", metavar="FILE", help="Baseline to compare the run with: the file that dropspin accept wrote.")
 summary_option = click.option("--summary", metavar="FILE", help="Append a Markdown summary to this file, such as $GITHUB_STEP_SUMMARY.")
 
 
@@ -45,7 +45,7 @@ def _finite(context: click.Context, parameter: click.Parameter, value: float) ->
 
 
 def seconds_option(name: str, default: float, of: str) -> Callable[[Command], Command]:
-    """An option that is a processor time."""
+    """An option whose value is a processor time."""
     return click.option(
         name,
         type=click.FloatRange(min=0.0, min_open=True),

@@ -23,9 +23,10 @@ from reports.commands.interrupts import stop_if_interrupted
 def replay_command(
     run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, speed: float, opens: bool
 ) -> None:
-    """Show the motion in 3D: a run's scenes, engines overlaid or side by side, the exact solution dashed.
+    """Show the motions of a run in 3D: engines overlaid or side by side, with the exact solution dashed.
 
-    The page plays, scrubs, slows down and turns the view, and shows contacts and impulses. It is one file and needs no network.
+    On the page you can play the motions at any speed, go to any time, rotate the view, and see contacts and impulses. The page is one
+    file and needs no network.
     """
     from comparisons.results.output import written_whole
     from comparisons.results.store import load_results
@@ -37,9 +38,9 @@ def replay_command(
     from scenarios import DropspinError
 
     if gif is not None and Path(gif).suffix.lower() != ".gif":
-        raise click.UsageError(f"--gif {gif}: give the file the ending .gif.")
+        raise click.UsageError(f"--gif {gif}: the file name must end in .gif.")
     if gif is not None and output is not None:
-        raise click.UsageError(f"-o {output} is for the page, which is not written beside a GIF; leave it out.")
+        raise click.UsageError(f"-o {output} names the page, but with --gif no page is written; leave -o out.")
     file = Path(run) / "replay.html" if output is None else Path(output)
     if output is None and file.is_symlink():  # the run may be somebody else's, and the link lead to any file
         raise DropspinError(f"{file}: is a link; delete it, or choose a file with -o.")
@@ -47,7 +48,7 @@ def replay_command(
     found = [replay_of(results, name, dt) for name in scenes or results.scenes]
     shown = [one for one in found if one is not None]
     if not shown:
-        raise DropspinError(f"{run}: no engine has a motion in these scenes; see report.html for the reasons.")
+        raise DropspinError(f"{run}: no engine completed a time step in these scenes; report.html has the reasons.")
     if gif is not None:
         if len(shown) > 1:
             raise click.UsageError(f"a GIF shows one scene; name it: {', '.join(one.scene.name for one in shown)}.")

@@ -13,13 +13,15 @@ import click
     "studies",
     multiple=True,
     metavar="FOLDER",
-    help="Add the study that dropspin tradeoff or limits wrote to this folder; repeat for more.",
+    help="Add a study: the folder that dropspin tradeoff or dropspin limits wrote; repeat for more.",
 )
-@click.option("--plots", multiple=True, type=click.Choice(["svg", "png"]), help="Write the plots as files too; repeat for both.")
+@click.option(
+    "--plots", multiple=True, type=click.Choice(["svg", "png"]), help="Also write the plots as files of this format; repeat for both."
+)
 def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -> None:
-    """Write the report of a run again: with other studies, with plots as files, or after an update of dropspin.
+    """Write the report of a run again: to add studies, to write plots as files, or after an update of dropspin.
 
-    The new report has only the studies and plots of this call. A replay in the folder stays.
+    The new report has only the studies and plots given in this call. A replay in the folder is kept.
     """
     from comparisons.results.store import load_results
     from reports.run_folder import fill, run_folder

@@ -37,12 +37,12 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
     metavar="DIR",
     help="Folder for the report and the data; an earlier run there is replaced.",
 )
-@click.option("--draw", "count", type=int, metavar="N", help="Draw N scenes at random, up to 1000, besides those named.")
-@click.option("--seed", type=int, metavar="SEED", help="Draw the scenes of this seed. [default: a fresh seed, which is printed]")
-@time_limit_option(300.0, "an engine may take for one scene at one step")
+@click.option("--draw", "count", type=int, metavar="N", help="Add N random scenes, up to 1000, to the named ones.")
+@click.option("--seed", type=int, metavar="SEED", help="Seed of the random scenes. [default: a fresh seed, which is printed]")
+@time_limit_option(300.0, "an engine may use for one scene at one time step")
 @baseline_option
-@click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that were measured are not run again.")
-@click.option("-v", "--verbose", is_flag=True, help="Print every metric of every scene too, in a table for each scene.")
+@click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that are already measured are not run again.")
+@click.option("-v", "--verbose", is_flag=True, help="Also print a table of every metric for each scene.")
 @as_json
 def run_command(
     scenes: tuple[str, ...],
@@ -57,13 +57,13 @@ def run_command(
     verbose: bool,
     json_output: bool,
 ) -> int:
-    """Run scenes with engines, side by side, and write the report.
+    """Run scenes with several engines, compare them with exact solutions, and write the report.
 
     SCENE is a name of the catalogue, the path of a TOML file, or core for the core catalogue. The default is the core catalogue
-    with three engines at three time steps. With --draw the scenes are drawn at random, each with its exact solution; a name such as
-    draw-7-012 is scene 12 of the seed 7.
+    with three engines at three time steps. With --draw, random scenes are generated, each with an exact solution; the name
+    draw-7-012 is scene 12 of seed 7.
 
-    Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down or one named is missing.
+    Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down, or a named engine is missing.
     """
     from comparisons.regressions.baseline import load_baseline
     from reports.commands.check import print_checked
@@ -76,7 +76,7 @@ def run_command(
     from scenarios.draw import draw
 
     if seed is not None and count is None:
-        raise click.UsageError("--seed is for drawn scenes; add --draw N.")
+        raise click.UsageError("--seed has an effect only with random scenes; add --draw N.")
     named = scenes or (() if count is not None else ("core",))
     loaded = [scene for name in named for scene in (_core() if name == "core" else [load(name)])]
     drawn: dict[str, int] = {}
@@ -107,7 +107,7 @@ def _run(
     resume: bool,
     show: "Callable[[Results], None] | None",
 ) -> "Results":
-    """Run, show and write; an interrupted run keeps the scenes that were measured."""
+    """Run the scenes, print the results and write the run; an interrupted run keeps the scenes that were measured."""
     from comparisons.running.processes import ResourceLimits
     from comparisons.running.run import DEFAULT_DTS, run, what_changed
     from reports.run_folder import MeasuredScenes, fill, run_folder
@@ -146,7 +146,7 @@ def _run(
 
 
 def _checked(results: "Results", file: "BaselineFile | None", json_output: bool) -> "Checked":
-    """A written run, compared with the baseline; if no accepted result is covered, its rows are printed before the error."""
+    """Compare a written run with the baseline. If the run covers no accepted result, its rows are printed before the error message."""
     from comparisons.regressions.checking import NothingAccepted, check
     from reports.terminal.rows import json_rows
     from scenarios import DropspinError

@@ -7,11 +7,13 @@ from reports.commands.options import as_json
 
 @click.command("show")
 @click.argument("scene")
-@click.option("-e", "--engine", "engine_name", metavar="ENGINE", help="Show what this engine builds and with which settings.")
-@click.option("--dt", default=1e-3, show_default=True, type=float, metavar="SECONDS", help="The time step the settings are for.")
+@click.option("-e", "--engine", "engine_name", metavar="ENGINE", help="Show the model that this engine builds, and its settings.")
+@click.option(
+    "--dt", default=1e-3, show_default=True, type=float, metavar="SECONDS", help="The time step for which the settings are computed."
+)
 @as_json
 def show_command(scene: str, engine_name: str | None, dt: float, json_output: bool) -> None:
-    """Show a scene: what is modelled, its exact solution, what it expects; or an engine's settings for it."""
+    """Show a scene: what it models, its exact solution and its expectations; or the settings of an engine for the scene."""
     from reports.terminal.rows import print_rows
     from reports.views import show
     from scenarios import load

@@ -13,14 +13,14 @@ from reports.commands.options import as_json, time_limit_option
 @click.option(
     "-o", "--output", default="out/sweep", show_default=True, metavar="DIR", help="Folder for the table, or a URL of an object store."
 )
-@click.option("--resume", is_flag=True, help="Resume an interrupted sweep: jobs that were written are not run again.")
+@click.option("--resume", is_flag=True, help="Resume an interrupted sweep: jobs whose rows are already written are not run again.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://host:8786.")
-@time_limit_option(60.0, "an engine may take for one job")
+@time_limit_option(60.0, "an engine may use for one job")
 @as_json
 def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, time_limit: float, json_output: bool) -> int:
-    """Run every job of a grid or random sample over scenes, engines, options, time steps and starts.
+    """Run every job of a grid or random sample over scenes, engines, options, time steps and initial states.
 
-    Each job is one row of a table in Parquet parts. An interrupted sweep keeps the parts that were written.
+    The result of each job is one row of a table in Parquet files. An interrupted sweep keeps the files that were written.
 
     Exit code: 0 all jobs were run, 2 bad input, 3 an engine broke down in a job or is missing.
     """

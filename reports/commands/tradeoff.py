@@ -23,7 +23,7 @@ from reports.commands.options import as_json, seconds_option
     help="The largest error allowed; repeat for more.",
 )
 @seconds_option(
-    "--budget", 10.0, "for the errors of one engine, at all its time steps together; no smaller step is tried once it is spent."
+    "--budget", 10.0, "for measuring the errors of one engine at all its time steps; once it is used up, no smaller time step is tried."
 )
 @click.option("-o", "--output", default="out/tradeoff", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
 @as_json
@@ -36,9 +36,9 @@ def tradeoff_command(
     output: str,
     json_output: bool,
 ) -> None:
-    """Measure what accuracy costs: error against time over a ladder of time steps, and the cheapest one tested within a tolerance.
+    """Measure what accuracy costs: the error and the computing time at many time steps, and the cheapest configuration within a tolerance.
 
-    Without arguments: the scene spin-asymmetric and the methods that differ on it.
+    The default is the scene spin-asymmetric, with engines and methods that give different results for it.
     """
     from comparisons.tradeoff.study import tradeoff
     from reports.output import folder_made

@@ -33,7 +33,7 @@ def html_report(results: Results, summary: Overview, sections: Sequence[Section]
     Args:
         results: The run.
         summary: Its overview.
-        sections: Sections of other studies.
+        sections: Sections of studies to include.
     """
     words = sorted({status.words for by_engine in summary.statuses.values() for status in by_engine.values()})
     return page("report.html", **vars(summary), **_details(results, summary), words=words, sections=sections)
@@ -94,7 +94,7 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
 
 
 def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, str]]:
-    """The behaviour of each metric of each engine as dt → 0 in a few words, its cause, and the worse of the two verdicts."""
+    """For each metric and engine, the behaviour of the error as dt → 0, its cause, and the worse of the verdicts of its two checks."""
     trends = {}
     for (metric, engine), rows in studies.groupby(["metric", "engine"]):
         order, asymptotic = (rows[rows["kind"] == kind] for kind in STUDIES)
@@ -106,7 +106,7 @@ def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, str]]:
 
 
 def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[str, Any]:
-    """All results by metric, then by engine, those for dt → 0 last: the number of the engine, whether it failed, and numbers of texts."""
+    """All results by metric, engine and time step, dt → 0 last: number of the engine, whether the result failed, indices of texts."""
     metrics = {metric: number for number, metric in enumerate(dict.fromkeys(rows["metric"]))}
     engines = {engine: number for number, engine in enumerate(results.engines)}
     texts: dict[str, int] = {}
@@ -126,7 +126,7 @@ def _agreement(agreements: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
 
 
 def _ensemble(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
-    """The means over the ensemble, then the differences between engines, for each metric."""
+    """For each metric, the means over the ensemble, followed by the differences between engines."""
     rows = frame[(frame["dt"] == dt) & frame["metric"].isin(list(ENSEMBLE_METRICS))]
     return [_row(row) for metric in ENSEMBLE_METRICS for row in rows[rows["metric"] == metric].itertuples()]
 

@@ -1,7 +1,7 @@
 """Plots: each function returns a `Chart`, and each `plot_` function draws one into axes, for notebooks and papers.
 
-A plot function makes no figure and no legend; it labels what it draws, so that `axes.legend()` makes one. docs/examples.md shows every
-picture and the lines that draw it.
+A plot function creates no figure and no legend; it labels its lines, so that `axes.legend()` creates a legend. docs/examples.md shows every
+plot with the code that draws it.
 """
 
 from reports.plots.bounces import bounce_ladder, plot_bounce_ladder

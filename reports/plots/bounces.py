@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 def bounce_ladder(results: Results, scene_name: str) -> Chart:
-    """The apex after each bounce relative to the drop height, logarithmic: engines at the finest step, and the exact e²ᵏ.
+    """The apex after each bounce relative to the drop height, logarithmic, for each engine at the finest time step, and the exact e²ᵏ.
 
-    The flights of an engine lie between the steps in which the floor changes its velocity. The first flight shorter than 16 steps ends the
-    ladder.
+    A flight is the motion between two time steps in which the floor changes the velocity. The plot ends at the first flight shorter than 16
+    steps.
 
     Args:
         results: The run.
@@ -52,7 +52,7 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
 
 @np.errstate(all="ignore")  # an engine may return 1e300
 def apexes(scene: Scenario, motion: Trajectory) -> Array:
-    """Apex above the floor [m] of the drop and of the flight after each bounce, averaged over the inner half of it, shape (flights,)."""
+    """Apex above the floor [m] of the drop and of each later flight, averaged over the middle half of the flight, shape (flights,)."""
     touching = Comparison(scene, motion).touching
     edges = np.flatnonzero(np.diff(np.concatenate([[True], touching, [True]])))
     found = []
@@ -65,7 +65,7 @@ def apexes(scene: Scenario, motion: Trajectory) -> Array:
 
 
 def _exact_apexes(scene: Scenario, truth: Truth, shortest: float) -> tuple[Array, int]:
-    """Exact apexes above the floor [m], shape (flights,), and how many flights, counting the drop, last at least this long [s]."""
+    """Exact apexes above the floor [m], shape (flights,), and the number of flights, with the drop, of at least this duration [s]."""
     states = np.array([truth.events[0].before, *(event.after for event in truth.events)])
     heights = apex(scene, Trajectory.from_states(np.zeros(len(states)), states)) - _floor_height(scene)
     is_short = 2.0 * states[1:, 8] / -scene.acceleration[1] < shortest
@@ -73,5 +73,5 @@ def _exact_apexes(scene: Scenario, truth: Truth, shortest: float) -> tuple[Array
 
 
 def _floor_height(scene: Scenario) -> float:
-    """Height of the centre of mass when the body touches the floor in the attitude of the start [m]."""
+    """Height of the centre of mass when the body touches the floor in its initial orientation [m]."""
     return scene.start.position[1] - scene.clearance

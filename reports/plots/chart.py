@@ -1,4 +1,4 @@
-"""A chart as data: the lines of a plot with their labels, scales and remarks. matplotlib draws it, and so does the script of the report."""
+"""A chart as data: the lines of a plot with their labels, scales and remarks. matplotlib and the script of the report draw it."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,7 +17,7 @@ Dashes = Literal["", "dashed", "dotted"]
 DASHES: dict[Dashes, Any] = {"": "-", "dashed": (0, (3, 3)), "dotted": ":"}
 MARKER = 5.0  # points
 FLAT = 1e-9
-"""Values that vary by less than this share of the largest are constant: the axis shows them as such, not their rounding errors."""
+"""Values that vary by less than this share of the largest value are drawn as constant, so that the axis does not show rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,12 @@ class Line:
 
     Attributes:
         label: Label in the legend; lines with the same label are shown and hidden together.
-        x: Where the values are, shape (n,).
+        x: Positions of the values along the x axis, shape (n,).
         y: The values, shape (n,); NaN is a gap.
         colour: A colour; empty for the colour of the text.
         width: Width [points]; 0 for markers alone.
-        dashes: How the line is broken.
-        marker: A marker of matplotlib, or none.
+        dashes: The dash pattern of the line.
+        marker: A marker of matplotlib; empty for none.
         low, high: A band around the values, shape (n,) each.
         is_step: Whether a value holds until the next one.
         is_fill: Whether only the band is drawn: an envelope.
@@ -59,13 +59,13 @@ class Chart:
         lines: The lines, in the order they are drawn.
         x_log, y_log: Whether an axis is logarithmic.
         ticks: Positions and texts of the ticks of the x axis; empty for automatic ones.
-        reference: Label of the line that others may be subtracted from; empty if there is none at the same times.
+        reference: Label of the line that can be subtracted from the others; empty if no line has the same times.
         rounding: Values below this are rounding errors.
         remark: A sentence below the plot.
-        x_range: The ends of the x axis; None for those of the data.
-        rows: Texts of the rows, where y is the number of a row, the first on top; empty for a scale.
-        is_map: Whether both axes have the same scale, and no ticks.
-        texts: Texts with their positions x and y.
+        x_range: The limits of the x axis; None for the range of the data.
+        rows: Labels of the rows, if y is the number of a row, with the first row at the top; empty if y is a value.
+        is_map: Whether both axes have the same scale and no ticks.
+        texts: Texts, each with its position x and y.
     """
 
     x_label: str
@@ -84,7 +84,7 @@ class Chart:
 
     @property
     def is_flat(self) -> bool:
-        """Whether all values are one, up to rounding."""
+        """Whether all values are equal, up to rounding."""
         drawn = [values[np.isfinite(values)] for line in self.lines for values in (line.y, line.low, line.high) if values is not None]
         values = np.concatenate([np.empty(0), *drawn])
         return (
@@ -167,7 +167,7 @@ def figure_of(charts: Iterable[Chart], title: str = "") -> "Figure":
 
 @contextmanager
 def panels(count: int, across: int, size: tuple[float, float]) -> "Iterator[tuple[Figure, list[Axes]]]":
-    """A figure in the style of the report with `count` panels of this size [inches], at most `across` in a row."""
+    """A figure in the style of the report with `count` panels of a given size [inches], at most `across` in a row."""
     load_matplotlib()
     from matplotlib import rc_context
     from matplotlib.figure import Figure

@@ -9,13 +9,14 @@ from reports.plots.chart import Chart, Line
 from reports.plots.style import Array
 
 DIGITS = 6
-"""Of positions along an axis."""
+"""Number of significant digits of positions along an axis."""
 
 
 def chart_data(chart: Chart) -> dict[str, Any]:
     """The data of a chart, ready for JSON.
 
-    Values are float32. Those at the same times as the reference line are stored as differences from it, so that these keep seven digits.
+    Values are float32. Lines with the same times as the reference line are stored as differences from it, so that the differences have
+    seven digits.
     """
     reference = next((line for line in chart.lines if chart.reference and line.label == chart.reference), None)
     xs: list[Array] = []
@@ -65,7 +66,7 @@ def _line(line: Line, reference: Line | None, xs: list[Array]) -> dict[str, Any]
 
 
 def _at_the_same(x: Array, reference: Array) -> Array:
-    """Whether the first positions are those of the reference, up to the first that is not, shape (n,)."""
+    """For each position, whether it and all previous ones equal those of the reference, shape (n,)."""
     count = min(len(x), len(reference))
     same = np.isclose(x[:count], reference[:count], rtol=1e-12, atol=0.0)
     found: Array = np.logical_and.accumulate(same).astype(float)
@@ -73,7 +74,7 @@ def _at_the_same(x: Array, reference: Array) -> Array:
 
 
 def _positions(x: Array) -> Any:
-    """Positions along an axis: first, distance and number if they are evenly spaced, else rounded."""
+    """Positions along an axis: first position, spacing and number if they are evenly spaced, otherwise the rounded positions."""
     if len(x) > 2 and np.allclose(np.diff(x), x[1] - x[0], rtol=1e-6, atol=0.0):
         return {"first": float(x[0]), "step": float((x[-1] - x[0]) / (len(x) - 1)), "count": len(x)}
     return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in x]

@@ -14,10 +14,10 @@ EXACT = "exact solution"
 
 
 def engine_styles(engines: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """A colour and a marker for each engine, by its label with options.
+    """A colour and a marker for each engine, by its label including options.
 
-    They follow from the label alone, in every plot and page, as long as no other engine beside it has the same colour; then one of both
-    takes the next. Pairs repeat beyond 40 engines.
+    The label alone determines them, in every plot and page. If two engines of a plot have the same colour, one of them gets the next
+    colour. Pairs repeat beyond 40 engines.
     """
     styles = {engine: KNOWN[engine] for engine in engines if engine in KNOWN}
     for engine in sorted(set(engines) - set(KNOWN)):
@@ -31,10 +31,10 @@ def engine_styles(engines: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 
 def engine_colours(engines: Sequence[str]) -> dict[str, str]:
-    """A colour for each engine: that of `engine_styles`."""
+    """The colour of each engine, from `engine_styles`."""
     return {engine: colour for engine, (colour, _) in engine_styles(engines).items()}
 
 
 def engine_markers(engines: Sequence[str]) -> dict[str, str]:
-    """A marker for each engine, so that a plot does not rely on colour: that of `engine_styles`."""
+    """The marker of each engine, from `engine_styles`, so that a plot does not rely on colour."""
     return {engine: marker for engine, (_, marker) in engine_styles(engines).items()}

@@ -1,4 +1,4 @@
-"""Errors over the time step."""
+"""Errors as functions of the time step."""
 
 from typing import TYPE_CHECKING
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FINER = 0.25
-"""Finest step of the fits and place of the asymptotic errors, relative to the finest time step."""
+"""Smallest time step of the fitted lines, at which the asymptotic errors are drawn, relative to the finest time step."""
 
 
 def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
-    """The absolute value of an error over the time step, logarithmic.
+    """The absolute value of an error as a function of the time step, logarithmic.
 
-    A dotted line has order 1, dashed lines are the fits that the order and the asymptotic error come from, crosses are predicted errors.
-    Bars at the left end are the 95 % intervals of asymptotic errors that exclude 0.
+    A dotted line has order 1, dashed lines are the fits from which the order and the asymptotic error are taken, crosses are predicted
+    errors. Bars at the left end are the 95 % intervals of asymptotic errors that exclude 0.
 
     Args:
         results: The run.
@@ -70,6 +70,6 @@ def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Ax
 
 
 def _fit(engine: str, dts: Array, errors: Array, order: float, m: float, colour: str) -> Line:
-    """|m + C hᵖ| through the error at the finest step, from the coarsest step to a quarter of the finest."""
+    """The curve |m + C hᵖ| through the error at the finest time step, from the coarsest time step to a quarter of the finest."""
     h = np.geomspace(dts.max(), FINER * dts.min(), 50)
     return Line(engine, h, np.abs(m + (errors[0] - m) * (h / dts[0]) ** order), colour, width=0.8, dashes="dashed")

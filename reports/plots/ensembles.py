@@ -1,4 +1,4 @@
-"""Ensembles over time, at the finest step: energy, angular momentum, and the fraction of members at rest."""
+"""Ensembles over time, at the finest time step: energy, angular momentum, and the fraction of bodies at rest."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -21,15 +21,15 @@ def energy_of_ensemble(results: Results, scene_name: str) -> Chart:
 def angular_momentum_of_ensemble(results: Results, scene_name: str) -> Chart:
     """The magnitude of the angular momentum L over time: median and 10th–90th percentile of each engine.
 
-    It is divided by r √(2 E M), with the energy E of the scene and the size r of the body: the angular momentum of a ring of radius r whose
-    spin has all of E. This scale is defined for starts without spin too.
+    It is divided by r √(2 E M), with the energy E of the scene and the size r and the mass M of the body. This is the angular momentum of a
+    ring of radius r whose rotational energy is E, a scale that is above 0 even if the body does not rotate initially.
     """
     found = at_one_step(results, results.ensembles, scene_name, min)
     return Chart(TIME, "|L| / (r √(2 E M))", [_spread(outcome.t, outcome.angular_momentum, style) for outcome, style in found])
 
 
 def rest_of_ensemble(results: Results, scene_name: str) -> Chart:
-    """The fraction of members at rest over time; those that are in motion at the end are not."""
+    """The fraction of the ensemble at rest over time. Bodies that still move at the end are not counted as at rest."""
     duration, lines = results.scenes[scene_name].duration, []
     for outcome, style in at_one_step(results, results.ensembles, scene_name, min):
         rested = np.sort(outcome.rest_time[outcome.rest_time < outcome.t[-1]])

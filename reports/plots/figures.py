@@ -1,4 +1,4 @@
-"""The charts that each scene of a report has, each trade-off and each study of limits, and the figure of a history."""
+"""The charts of each scene of a report, of each trade-off and of each study of limits, and the figure of a history."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -35,14 +35,14 @@ CONVERGENCE = (
 )
 GROWTH = ("orientation_error", "position_error", "energy_error")
 WORTH_A_POINT, WORTH_A_LINE = 1e-13, 1e-11
-"""Errors that are nowhere larger are rounding; over time it accumulates."""
+"""Errors that never exceed this value are rounding errors, which accumulate over time."""
 MOST_PANELS = 3
 MOST_SCENES = 40
-"""A run of more scenes has plots of those that fail only, and of this many of them at most."""
+"""Largest number of scenes with plots; a run of more scenes has plots only of scenes in which a check fails."""
 
 
 def report_charts(results: Results) -> dict[str, dict[str, Sequence[Chart]]]:
-    """The charts of the report: by scene, and by a key of `CHARTS`."""
+    """The charts of the report, by scene and by a key of `CHARTS`."""
     names = list(results.scenes)
     failing = results.table.loc[results.breakdowns | results.table["verdict"].isin(FAILURES), "scene"].unique()
     plotted = names if len(names) <= MOST_SCENES else failing[:MOST_SCENES]
@@ -56,7 +56,7 @@ def time_charts(results: Results, scene_name: str) -> list[Chart]:
 
 
 def convergence_charts(results: Results, scene_name: str) -> list[Chart]:
-    """The first three errors of the scene that are above rounding somewhere, over the time step."""
+    """The first three errors of the scene that exceed rounding for some engine, as functions of the time step."""
     return [error_over_dt(results, scene_name, metric) for metric in _errors(results, scene_name, CONVERGENCE, WORTH_A_POINT)[:MOST_PANELS]]
 
 
@@ -87,7 +87,7 @@ def ensemble_charts(results: Results, scene_name: str) -> list[Chart]:
 
 
 def tradeoff_charts(found: "TradeOff") -> list[Chart]:
-    """Error over cost in one scene: of one world, and per world in a batch if an engine can step batches."""
+    """Error over cost in one scene, for one world, and per world in a batch if an engine can simulate batches."""
     return [error_over_cost(found, batch) for batch in ((False, True) if found.batch_pareto_front else (False,))]
 
 
@@ -108,7 +108,7 @@ def history_figure(history: "History", scene_name: str) -> "Figure":
 
 
 def _errors(results: Results, scene_name: str, metrics: Sequence[str], worth: float) -> list[str]:
-    """The metrics of which some engine has an error larger than `worth`."""
+    """The metrics for which at least one engine has an error larger than `worth`."""
     mine = results.measurements[results.measurements["scene"] == scene_name]
     return [name for name in metrics if (mine.loc[mine["metric"] == name, "value"].abs() > worth).any()]
 

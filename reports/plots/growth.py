@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 def error_growth(results: Results, scene_name: str, metric: str) -> Chart:
-    """The absolute value of an error over time, logarithmic, for each engine at its finest step.
+    """The absolute value of an error over time, logarithmic, for each engine at the finest time step.
 
-    The maximum of a line is the value of the metric for one start. Velocities are compared as in the metrics, in the inner half of each
-    flight: an impact one step late is an error in time and would be a spike in energy. Lines have gaps around impacts, and end where the
-    motion is desynchronised from the exact solution.
+    The maximum of a line is the value of the metric for a single initial state. As for the metrics, velocities are compared in the middle
+    half of each flight, because an impact that occurs one time step late is an error in time and would appear as a spike in energy. Lines
+    have gaps around impacts, and end where the motion is desynchronised from the exact solution.
 
     Args:
         results: The run.
@@ -36,7 +36,7 @@ def error_growth(results: Results, scene_name: str, metric: str) -> Chart:
     scene = results.scenes[scene_name]
     truth = truth_for(scene)
     if truth is None:
-        raise DropspinError(f"{scene_name} has no exact solution to compare with; choose a scene that has one, see dropspin list.")
+        raise DropspinError(f"{scene_name} has no exact solution to compare with; choose a scene that has one (see dropspin list).")
     if metric not in ERRORS:
         raise UnknownName("metric over time", metric, list(ERRORS))
     lines = []
@@ -53,7 +53,7 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
 
 @np.errstate(all="ignore")  # an engine may return 1e300
 def _sizes(scene: Scenario, motion: Trajectory, truth: Truth, metric: str) -> tuple[Array, Array]:
-    """Times [s] and absolute errors after the start; NaN where the error is undefined, no rows if the time step is too coarse."""
+    """Times [s] and absolute errors after the start, NaN where the error is undefined; empty if the time step is too coarse."""
     case = Comparison.with_truth(scene, motion, truth)
     try:
         sizes = np.maximum(np.abs(ERRORS[metric].at_each_row(case)), ROUNDING)

@@ -1,4 +1,4 @@
-"""Results over runs."""
+"""Results as functions of the run."""
 
 from typing import TYPE_CHECKING
 
@@ -14,11 +14,13 @@ if TYPE_CHECKING:
 
 LONGEST_LABEL = 22
 SMALLEST, MOST_TICKS = 1e-3, 7
-"""Results below this fraction of the largest are drawn on a linear part of the axis around 0; the most ticks of the axis."""
+"""Results below this fraction of the largest are drawn on a linear part of the axis around 0. The second number is the largest number of
+ticks.
+"""
 
 
 def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -> None:
-    """Draw a metric at the finest time step over runs, for each engine; a ring marks each run in which it moved.
+    """Draw a metric of each engine at the finest time step for a sequence of runs; a ring marks each run in which it changed.
 
     Args:
         history: The runs.

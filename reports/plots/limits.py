@@ -30,7 +30,7 @@ BAR = 10.0  # points
 
 
 def failure_modes(found: RobustnessStudy, axis_name: str) -> Chart:
-    """The failure mode of each engine along an axis of a robustness study; the nominal value of the scene is dotted.
+    """The failure mode of each engine along an axis of a robustness study; a dotted line marks the nominal value of the scene.
 
     Args:
         found: The study.
@@ -75,7 +75,7 @@ def _in_words(mode: str) -> str:
 
 
 def _ticks(axis: Axis, values: list[float]) -> list[tuple[float, str]]:
-    """Ticks at each power of ten, or at each third one; for restitutions, at the values of the study."""
+    """Ticks at each power of ten, or at every third one; for coefficients of restitution, at the tested values."""
     low, high = min(values), max(values)
     if axis.name == "restitution":
         ticks = [value for value in (0.0, 0.9, 0.99, 0.999, 0.9999) if low <= value <= high]

@@ -1,4 +1,4 @@
-"""Quantities of a motion over time, of each engine and of the exact solution."""
+"""Quantities of a motion over time, for each engine and for the exact solution."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 Quantity = Callable[[Scenario, Trajectory], Array]
 
 RESOLVED, MOST_MISSED = 0.05, 0.1
-"""Straight lines between the points that are drawn miss a curve where they are off by this share of its range; a curve of which they miss a
-tenth is not resolved. An impact is missed at one point alone."""
+"""Straight lines between the drawn points do not resolve a curve where they differ from it by more than this share of its range. A curve is
+drawn as an envelope if a tenth of it is not resolved. An impact affects only one point.
+"""
 POINTS_A_TURN = 32
 MOST_SAMPLES = 200_000
 
@@ -61,7 +62,7 @@ def quantities(scene: Scenario) -> dict[str, Quantity]:
 def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
     """A quantity over time: each engine at the coarsest time step, where engines differ most, and the exact solution.
 
-    A curve that oscillates too fast to be drawn is an envelope: the least and the largest value around each point.
+    A curve that oscillates too fast to be drawn is shown as an envelope: the smallest and the largest value around each point.
 
     Args:
         results: The run.
@@ -78,7 +79,7 @@ def over_time(results: Results, scene_name: str, quantity: Quantity) -> Chart:
         exact = _sampled(truth, times, min(scene.duration, truth.horizon))
         lines.append(_drawn(Line(EXACT, exact.t, quantity(scene, exact), width=1.0, dashes="dashed"), times))
     envelopes = any(line.is_fill for line in lines)
-    remark = "Oscillates faster than can be drawn: the bands are the least and the largest values." if envelopes else ""
+    remark = "The oscillation is too fast to be drawn: bands show the range from the smallest to the largest value." if envelopes else ""
     comparable = truth is not None and len(lines) > 1 and not envelopes
     return Chart(TIME, LABELS.get(quantity, ""), lines, reference=EXACT if comparable else "", remark=remark)
 
@@ -89,7 +90,7 @@ def plot_over_time(results: Results, scene_name: str, quantity: Quantity, axes: 
 
 
 def _sampled(truth: Truth, times: Array, end: float) -> Trajectory:
-    """The exact solution at these times up to its end, and so often between them that no turn is missed."""
+    """The exact solution at these times up to its end, and at as many times between them as are needed to resolve every turn."""
     coarse = truth(times[times <= end])
     fastest = float(np.linalg.norm(coarse.angular_velocity, axis=1).max(initial=0.0))
     turned = angle_between_orientations(coarse.orientation[:-1], coarse.orientation[1:]).max(initial=0.0)
@@ -100,7 +101,7 @@ def _sampled(truth: Truth, times: Array, end: float) -> Trajectory:
 
 
 def _drawn(line: Line, times: Array) -> Line:
-    """A line at these times, as far as it goes; an envelope if it is not resolved there."""
+    """A line at these times up to the end of the motion, or an envelope if the times do not resolve the motion."""
     shown = np.searchsorted(line.x, times[times <= line.x[-1] * (1.0 + 1e-12)])
     shown = np.minimum(shown, len(line.x) - 1)
     x, y = line.x[shown], line.y[shown]

@@ -23,36 +23,36 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FARTHEST = 1.6
-"""A path is drawn up to this multiple of the half axes, so that the ellipsoid does not become too small to see."""
+"""A path is drawn up to this multiple of the half axes, so that the ellipsoid stays visible."""
 FLATTEST = 0.4
-"""Least length of the shortest half axis in the picture, relative to the longest."""
+"""Smallest length of the shortest half axis in the plot, relative to the longest."""
 NEARLY_PARALLEL = 1e-9
 """A body whose ω and L enclose an angle with a smaller sine counts as spinning about a principal axis."""
 VIEWS = tuple(product((-40, -20, 20, 40), range(-165, 180, 30)))
-"""Elevations and azimuths [degrees], none along an axis."""
+"""Elevations and azimuths of the views [degrees]; no view is along an axis."""
 LABEL_POSITION = 1.2
-"""Position of the name of a half axis, as a multiple of it."""
+"""Position of the label of a half axis, as a multiple of its length."""
 LATITUDES, LONGITUDES = np.radians([-60.0, -30.0, 0.0, 30.0, 60.0]), np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0])
 GREY = "#8C8C8C"
 SUBSCRIPTS = "₁₂₃"
 
 
 def polhode(results: Results, scene_name: str) -> Chart:
-    """The path of the angular velocity in the body frame, on the energy ellipsoid of the start, seen from the side that shows most of it.
+    """The path of the angular velocity in the body frame, on the energy ellipsoid of the initial state.
 
     Engines are drawn at the coarsest time step, with the exact solution. A marker shows the end of each path. Without a gyroscopic term the
     path is a point; with an explicit one it leaves the ellipsoid.
 
     Args:
         results: The run.
-        scene_name: One of its scenes; it must start with a spin.
+        scene_name: One of its scenes, with an initial angular velocity.
 
     Raises:
-        DropspinError: The scene starts without spin.
+        DropspinError: The initial angular velocity of the scene is 0.
     """
     half_axes = energy_ellipsoid(results.scenes[scene_name])
     if not half_axes.any():
-        raise DropspinError(f"{scene_name} starts without spin: its polhode is a point; choose a scene with start.angular_velocity.")
+        raise DropspinError(f"{scene_name} has no initial angular velocity, so it has no polhode; set start.angular_velocity.")
     paths = polhode_paths(results, scene_name)
     reference = paths[-1][0] if paths else half_axes[None]
     view = View(facing(reference, half_axes) if len(reference) > 1 else VIEWS[0], half_axes, [path for path, _ in paths])
@@ -69,7 +69,7 @@ def polhode(results: Results, scene_name: str) -> Chart:
 
 @np.errstate(all="ignore")  # an engine may return 1e300
 def polhode_paths(results: Results, scene_name: str) -> list[tuple[Array, dict[str, Any]]]:
-    """The angular velocity along the principal axes [rad/s], shape (n, 3), of engines and the exact solution; with styles of lines."""
+    """The angular velocity along the principal axes [rad/s], shape (n, 3), of the engines and of the exact solution, with line styles."""
     scene = results.scenes[scene_name]
     half_axes, truth = energy_ellipsoid(scene), truth_for(scene)
     paths = [
@@ -103,18 +103,18 @@ class View:
         self._stretch = np.maximum(1.0, FLATTEST * drawn.max() / drawn)
 
     def __call__(self, points: Array) -> tuple[Array, Array]:
-        """Points, shape (n, 3), on the screen: x to the right and y upwards, shape (n,) each."""
+        """The screen coordinates of points of shape (n, 3): x to the right and y upwards, each of shape (n,)."""
         x, y = self._screen @ (points * self._stretch).T
         return x, y
 
 
 def principal_spin(scene: Scenario, motion: Trajectory) -> Array:
-    """Angular velocity along the principal axes of the body, least moment first [rad/s], shape (n, 3)."""
+    """Angular velocity along the principal axes of the body, smallest moment first [rad/s], shape (n, 3)."""
     return unrotate(motion.orientation, motion.angular_velocity) @ _principal(scene)[1]
 
 
 def energy_ellipsoid(scene: Scenario) -> Array:
-    """Half axes √(2 T / I) of the ellipsoid of the angular velocities with the rotational energy T of the start [rad/s], shape (3,)."""
+    """Half axes √(2 T / I) of the ellipsoid of angular velocities that have the initial rotational energy T [rad/s], shape (3,)."""
     moments, _ = _principal(scene)
     half_axes: Array = np.sqrt(moments @ _start(scene) ** 2 / moments)
     return half_axes
@@ -129,9 +129,9 @@ def wobbles_freely(scene: Scenario) -> bool:
 
 
 def facing(path: Array, half_axes: Array) -> tuple[int, int]:
-    """The view in `VIEWS` that shows most of a path on an ellipsoid: on the near side and not foreshortened.
+    """The view in `VIEWS` in which the visible part of a path on an ellipsoid is longest.
 
-    Length counts, not time: a body that flips stays longest where the path is short.
+    The length of the path is used and not the time, because a body that flips spends most of the time on a short part of the path.
 
     Args:
         path: Angular velocities [rad/s], shape (n, 3).
@@ -153,7 +153,7 @@ def facing(path: Array, half_axes: Array) -> tuple[int, int]:
 
 
 def _principal(scene: Scenario) -> tuple[Array, Array]:
-    """Principal moments of inertia, least first [kg m²], and their axes in the body frame, the columns of a right-handed triad."""
+    """Principal moments of inertia, smallest first [kg m²], and their axes in the body frame, as columns of a right-handed triad."""
     moments, axes = np.linalg.eigh(scene.body.inertia_tensor)
     return moments, axes * np.linalg.det(axes)
 
@@ -169,7 +169,7 @@ def _in_sight(path: Array, half_axes: Array) -> Array:
 
 
 def _name_of_axis(axis: int, view: View, half_axes: Array) -> tuple[float, float, str]:
-    """Position on the screen and name of the near end of a half axis."""
+    """Screen position and label of the near end of a half axis."""
     sign = -1.0 if view.towards[axis] < 0.0 else 1.0
     x, y = view(LABEL_POSITION * sign * half_axes[axis] * np.eye(3)[[axis]])
     return float(x[0]), float(y[0]), f"{'−' if sign < 0.0 else ''}ω{SUBSCRIPTS[axis]}"

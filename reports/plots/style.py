@@ -1,4 +1,4 @@
-"""The style of plots: colours that the page replaces, line widths that keep coinciding lines visible, axis labels with units."""
+"""The style of plots: colours, which the HTML page replaces; line widths at which coinciding lines stay visible; axis labels with units."""
 
 import os
 import sys
@@ -27,7 +27,7 @@ ByStep = Mapping[tuple[str, str, float], Kept]
 """Trajectories or ensemble outcomes of a run, by scene, engine and time step."""
 
 INK, FAINT = "#010203", "#040506"
-"""Placeholders for the text colour: the report replaces them by that of the page, so that one plot suits the light and the dark scheme."""
+"""Placeholders for the text colour, which the report replaces by that of the page, so that a plot suits the light and the dark scheme."""
 REPORT: Any = {
     "text.parse_math": False,  # dollar signs in names are text
     "text.color": INK,
@@ -46,19 +46,19 @@ REPORT: Any = {
     "legend.frameon": False,
 }
 TIME = "time [s]"
-"""Label of every time axis; the replay marks its time in plots with it."""
+"""Label of every time axis; the replay marks its current time in plots with this label."""
 MOST_POINTS = 400
 ROUNDING = 1e-17
 """Value at which exact zeros are drawn on logarithmic axes."""
 
 WIDEST_LABEL = 26
 LEAST_RATIO, MANY = 5.0, 50.0
-"""Least ratio of the ends of a logarithmic axis, and the ratio above which only powers of ten are labelled."""
+"""Smallest ratio of the ends of a logarithmic axis, and the ratio above which only powers of ten are labelled."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def load_matplotlib() -> None:
-    """Import matplotlib without the settings of the working directory and of the user: a damaged file of them stops its import."""
+    """Import matplotlib without the settings of the working directory and the user; a damaged settings file prevents the import."""
     if "matplotlib" not in sys.modules:
         named = os.environ.get("MATPLOTLIBRC")
         os.environ["MATPLOTLIBRC"] = os.devnull
@@ -72,19 +72,19 @@ def load_matplotlib() -> None:
 
 
 def ink() -> str:
-    """The text colour of the current matplotlib style, for everything that belongs to no engine."""
+    """The text colour of the current matplotlib style, for elements that belong to no engine."""
     from matplotlib import rcParams
 
     return str(rcParams["text.color"])
 
 
 def stride(length: int) -> int:
-    """The stride at which at most `MOST_POINTS` of `length` points are drawn."""
+    """The stride with which at most `MOST_POINTS` of `length` points are drawn."""
     return max(1, -(-length // MOST_POINTS))
 
 
 def thinner(first: float, last: float, number: int, count: int) -> float:
-    """A size between first and last by the number of the engine: lines often coincide, and later ones must not hide earlier ones."""
+    """A size between first and last by the number of the engine, so that later lines do not hide coinciding earlier ones."""
     return float(np.linspace(first, last, max(count, 2))[number])
 
 
@@ -96,7 +96,7 @@ def step_of(kept: ByStep[Kept], scene_name: str, which: Callable[..., float]) ->
 def at_one_step(
     results: Results, kept: ByStep[Kept], scene_name: str, which: Callable[..., float]
 ) -> Iterator[tuple[Kept, dict[str, Any]]]:
-    """The entry of each engine at the time step of `step_of`; and label, colour, marker and width of its line."""
+    """For each engine, the entry at the time step of `step_of`, and the label, colour, marker and width of its line."""
     dt, count = step_of(kept, scene_name, which), len(results.engines)
     styles = engine_styles(results.engines)
     for number, engine in enumerate(results.engines):
@@ -115,7 +115,8 @@ def metric_label(metric: str) -> str:
 def label_powers(axes: "Axes", name: str) -> None:
     """Label a logarithmic axis, `x` or `y`, after its data are drawn: at powers of ten, and at 2 and 5 times them on a short axis.
 
-    Labels are plain text: a page shows it in its own font, and parsing formulas would take half of the time of a figure.
+    Labels are plain text, because a page shows them in its own font, and because parsing formulas takes half of the time of drawing a
+    figure.
     """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 def error_over_cost(found: "TradeOff", batch: bool = False) -> Chart:
-    """Error over cost, both logarithmic: each engine's time steps joined, and the Pareto front.
+    """Error over cost, both logarithmic: a line for the time steps of each engine, and the Pareto front.
 
     Args:
         found: The trade-off.
-        batch: Whether the cost is that per world in a batch, of the engines that can step batches.
+        batch: Whether the cost is per world in a batch; only engines that can simulate batches are then shown.
     """
 
     def cost(point: "CostPoint") -> float:

@@ -1,4 +1,4 @@
-"""The motions of a run in 3D: engines side by side or overlaid, the exact solution dashed; data for a page, or a GIF."""
+"""The motions of a run in 3D, engines side by side or overlaid, with the exact solution dashed: the data for a page, or a GIF."""
 
 from reports.replay.data import as_data
 from reports.replay.motions import Replay, replay_of

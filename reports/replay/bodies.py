@@ -11,7 +11,7 @@ from scenarios.body import Body
 Array = NDArray[np.float64]
 
 IN_ONE_PLANE = 1e-9
-"""Largest distance of the points of a face from its plane, relative to the size of the body."""
+"""Largest allowed distance of the points of a face from its plane, relative to the size of the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +19,8 @@ class Outline:
     """The surface of a body, in its own frame.
 
     Attributes:
-        vertices: Positions relative to the centre of mass [m], shape (n, 3); a sphere has one, at its centre.
-        faces: For each face the numbers of its vertices, counterclockwise seen from outside; a sphere has none.
+        vertices: Positions relative to the centre of mass [m], shape (n, 3); a sphere has one vertex, at its centre.
+        faces: For each face, the indices of its vertices, counterclockwise as seen from outside; a sphere has no faces.
         radius: Distance of the surface from the vertices [m].
         is_flat: Whether the body is a plane polygon, visible from both sides.
     """

@@ -24,7 +24,7 @@ FRAME_RATE = 25
 """Frames per second of the GIF."""
 MOST_FRAMES = 5000
 MERIDIANS = 24
-"""Meridians of a drawn sphere."""
+"""Number of meridians of a drawn sphere."""
 MARK = 0.72
 """Share of white in the colour of the marked face of a body."""
 EXACT_COLOUR = "#202428"
@@ -48,7 +48,7 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
     from matplotlib.figure import Figure
 
     if Path(file).suffix.lower() != ".gif":
-        raise DropspinError(f"{file}: an animation is written as GIF; give the file the ending .gif.")
+        raise DropspinError(f"{file}: an animation is written as GIF; the file name must end in .gif.")
     times = _frame_times(replay, speed)
     figure = Figure(figsize=(6.4, 4.8), dpi=100)
     axes = _add_axes(figure, replay)
@@ -98,7 +98,7 @@ def _add_axes(figure: "Figure", replay: Replay) -> "Axes3D":
 
 
 def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: float) -> list[Any]:
-    """Draw the body and its trail at a time [s]; draw nothing if its motion has ended or it is out of sight."""
+    """Draw the body and its trail at a time [s], unless its motion has ended or the body is out of the view."""
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 

@@ -1,4 +1,4 @@
-"""The data of a replay for the viewer in the page: small, and exact enough for what is seen."""
+"""The data of a replay for the viewer of the page, rounded to what is visible so that the page is small."""
 
 import base64
 from dataclasses import replace
@@ -48,7 +48,7 @@ def _motion(motion: Motion, interval: float, tolerance: float) -> dict[str, Any]
     at_stride = np.abs(frames.t / interval - np.rint(frames.t / interval)) < 1e-6
     axes, angles = axis_and_angle(frames.orientation)
     rotations = [quantised(column, ATTITUDE_ERROR) for column in (axes * angles[:, None]).T]
-    # The viewer counts turns from the rounded attitudes: near half a turn, these may be on the other side of it.
+    # The viewer counts turns from the rounded orientations: near half a turn, these may be on the other side of it.
     turns = replace(motion, frames=replace(frames, orientation=_orientations(np.array([shown for _, shown in rotations]).T))).turns
     return {
         "label": motion.label,
@@ -68,10 +68,10 @@ def _motion(motion: Motion, interval: float, tolerance: float) -> dict[str, Any]
 
 
 def quantised(numbers: Array, tolerance: float) -> tuple[float | dict[str, Any], Array]:
-    """A column of numbers for JSON, and the numbers that the viewer reads from it, both shape (n,).
+    """A column of numbers for JSON, and the numbers that the viewer decodes from it, both of shape (n,).
 
-    Equal numbers are one number. Others are integers of 16 bits between the smallest and the largest, if the rounding error, half a level,
-    is within the tolerance. Else they are floats of 32 bits: a body that flies far.
+    If all numbers are equal, a single number is stored. Other numbers are stored as 16-bit integers that span the range of the values if
+    the rounding error, half a level, is within the tolerance, otherwise as 32-bit floats, which are needed for a body that flies far.
     """
     low, high = float(numbers.min()), float(numbers.max())
     if low == high:

@@ -1,4 +1,4 @@
-"""The motions of a replay: the body's poses in each engine and in the exact solution, and the impulses of the floor."""
+"""The motions of a replay: the poses of the body in each engine and in the exact solution, and the impulses of the floor."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,13 +17,15 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 MOST_FRAMES = 300
-"""Frames of a motion, if its steps can be divided so; the page interpolates between frames."""
+"""Largest number of frames of a motion, if the number of steps has a suitable divisor; the page interpolates between frames."""
 IN_SIGHT = 10.0
-"""The view reaches this many times as far from the start as the shortest motion."""
+"""The extent of the view, as a multiple of the extent of the motion that stays nearest to the start."""
 MOST_TURNS = 1e6
 """Upper bound on whole turns between two frames: a diverging engine may report any angular velocity."""
 RESOLVED_HOP = 4.0
-"""Steps: an impulse below that of the weight in this time is no impact. Engines hold up a resting body by a hop of a step or two."""
+"""Number of time steps: an impulse below that of the weight during this time is no impact. In some engines a resting body hops for a step
+or two.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,7 @@ class Impacts:
     """Impacts on the floor.
 
     Attributes:
-        times: When they happen [s], shape (k,).
+        times: Times of the impacts [s], shape (k,).
         impulses: Impulse of the floor on the body [N s], shape (k, 3).
         points: Point of the floor through which each impulse acts [m], shape (k, 3).
     """
@@ -49,8 +51,8 @@ class Motion:
         label: Label of the engine, or `EXACT`.
         colour: Colour of the engine; empty for the exact solution, which is drawn in the text colour.
         frames: States at a fixed stride, and those at impacts, from the start to the last finite one.
-        errors: Distance [m] and angle [rad] from the exact solution at each frame, NaN where that has ended, shape (frames, 2); None
-            without an exact solution.
+        errors: Distance [m] and angle [rad] from the exact solution at each frame, shape (frames, 2), NaN after the end of the exact
+            solution; None without an exact solution.
         impacts: The impacts on the floor, in order.
     """
 
@@ -63,14 +65,14 @@ class Motion:
     @cached_property
     @np.errstate(over="ignore")  # an engine may return 1e300
     def turns(self) -> NDArray[np.intp]:
-        """Whole turns between frames beyond the shorter rotation, from the angular velocity; shape (frames - 1,)."""
+        """Whole turns from each frame to the next in addition to the shorter rotation, by the angular velocity; shape (frames - 1,)."""
         axes, angles = self._rotations
         spins = 0.5 * (self.frames.angular_velocity[1:] + self.frames.angular_velocity[:-1])
         turns = (dot(spins, axes) * np.diff(self.frames.t) - angles) / (2.0 * np.pi)
         return np.rint(np.clip(turns, -MOST_TURNS, MOST_TURNS)).astype(np.intp)
 
     def pose(self, time: float) -> tuple[Array, Array]:
-        """Position [m] and orientation at a time [s], between frames interpolated: straight motion, uniform rotation."""
+        """Position [m] and orientation at a time [s], interpolated between frames by linear motion and uniform rotation."""
         t, x, q = self.frames.t, self.frames.position, self.frames.orientation
         row = min(max(int(np.searchsorted(t, time + 1e-9, side="right")) - 1, 0), len(t) - 1)
         if row == len(t) - 1:
@@ -82,7 +84,7 @@ class Motion:
 
     @cached_property
     def _rotations(self) -> tuple[Array, Array]:
-        """Axis and angle [rad] of the shorter rotation from each attitude to the next, shapes (frames - 1, 3) and (frames - 1,)."""
+        """Axis and angle [rad] of the shorter rotation from each orientation to the next, shapes (frames - 1, 3) and (frames - 1,)."""
         return axis_and_angle(multiply(self.frames.orientation[1:], conjugate(self.frames.orientation[:-1])))
 
 
@@ -101,7 +103,7 @@ class Replay:
         scene: The scene.
         dt: Time step [s].
         interval: Time between frames [s].
-        motions: Those of the engines, in order, then the exact solution if there is one.
+        motions: The motions of the engines, in order, and last the exact solution if there is one.
     """
 
     scene: Scenario
@@ -111,18 +113,21 @@ class Replay:
 
     @cached_property
     def sight(self) -> float:
-        """Distance from the start that the view covers [m]: a body that flies off must not make the others too small to see."""
+        """Distance from the start that the view covers [m].
+
+        It is limited, so that a body that flies off does not make the others too small to see.
+        """
         distances = [self._from_start(motion.frames.position).max() for motion in self.motions]
         return IN_SIGHT * max(float(min(distances)), self.scene.body.size)
 
     @cached_property
     @np.errstate(over="ignore")
     def spin(self) -> float:
-        """Largest angular velocity of the motion in which it is smallest [rad/s]: that of a broken engine does not count."""
+        """The smallest over all motions of the largest angular velocity [rad/s], so that a diverging engine has no effect."""
         return min(float(np.linalg.norm(motion.frames.angular_velocity, axis=1).max()) for motion in self.motions)
 
     def in_sight(self, positions: Array) -> NDArray[np.bool_]:
-        """Which positions [m], shape (k, 3), are in the view."""
+        """Whether positions [m], shape (k, 3), are in the view; shape (k,)."""
         return self._from_start(positions) <= self.sight
 
     @np.errstate(over="ignore")  # an engine may return 1e300
@@ -132,7 +137,7 @@ class Replay:
 
 @np.errstate(over="ignore")  # an engine may return 1e300
 def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Replay | None:
-    """The motions of a scene at a time step, by default at the coarsest, where engines differ most; None if no engine has a motion.
+    """The motions of a scene at a time step, by default the coarsest, at which engines differ most; None if no engine has a motion.
 
     Raises:
         DropspinError: The run has no such scene or time step.
@@ -157,7 +162,10 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
 
 
 def _stride(steps: int) -> int:
-    """Steps between frames: the least that makes the last state a frame, if it is at most twice the least that `MOST_FRAMES` allows."""
+    """Number of steps between frames.
+
+    This is the smallest number for which the last state is a frame, if it is at most twice the smallest that `MOST_FRAMES` allows.
+    """
     least = max(1, -(-steps // MOST_FRAMES))
     return next((every for every in range(least, 2 * least + 1) if steps % every == 0), least)
 
@@ -193,7 +201,7 @@ def _errors(motion: Trajectory, exact: Trajectory) -> Array:
 
 
 def impact_rows(scene: Scenario, motion: Trajectory) -> tuple[Rows, Rows, Rows]:
-    """Where a motion has impacts: steps in which the impulse of the floor is that of an impact; adjacent ones are one impact.
+    """The impacts of a motion: time steps in which the impulse of the floor is that of an impact; adjacent steps are one impact.
 
     Args:
         scene: The scene, which has a floor.
@@ -223,7 +231,8 @@ def floor_impulses(scene: Scenario, motion: Trajectory, before: Rows, after: Row
         after: The rows after, shape (k,).
 
     Returns:
-        The impulse J [N s], which is the change of momentum less those by gravity and damping, and the point of the floor through which it
+        The impulse J [N s], which is the change of momentum without the changes by gravity and damping, and the point of the floor through
+        which it
         acts [m], both of shape (k, 3). r × J = ΔL determines r except along J; the floor at y = 0 determines the rest. If that point is not
         near the body (an impulse along the floor, an engine that does not conserve L), it is the point below the centre of mass.
     """

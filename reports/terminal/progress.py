@@ -1,4 +1,4 @@
-"""Progress and status on the standard error: bars on a terminal, plain lines elsewhere."""
+"""Progress and status on standard error: bars on a terminal, plain lines elsewhere."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ from reports.views.numbers import in_ms
 
 @contextmanager
 def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
-    """A bar of scenes, each with some pieces of work, on a terminal; a line for each scene, with the time elapsed, elsewhere."""
+    """A progress bar of scenes on a terminal; elsewhere, a line for each scene with the elapsed time."""
     console, start = Console(stderr=True), time.monotonic()
     if not console.is_terminal:
         seen: set[str] = set()
@@ -44,7 +44,7 @@ def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
 
 @contextmanager
 def status(text: str) -> Iterator[None]:
-    """Show a text while the block runs."""
+    """Show a text while the `with` block runs."""
     console = Console(stderr=True)
     if not console.is_terminal:
         click.echo(text, err=True)
@@ -56,7 +56,7 @@ def status(text: str) -> Iterator[None]:
 
 @contextmanager
 def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
-    """A bar of the share of work done on a terminal, one line elsewhere."""
+    """A progress bar on a terminal; elsewhere, one line."""
     console = Console(stderr=True)
     if not console.is_terminal:
         click.echo(f"running {title}", err=True)
@@ -69,14 +69,14 @@ def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
 
 
 EVERY = 5.0
-"""Seconds between two lines."""
+"""Time between two lines [s]."""
 
 
 @contextmanager
 def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
-    """A bar of jobs done, with their rate and the time left, on a terminal; a line every few seconds elsewhere.
+    """A progress bar of jobs, with their rate and the remaining time, on a terminal; elsewhere, a line every few seconds.
 
-    The first call gives the jobs that an earlier run has done; they do not count towards the rate.
+    The first call gives the number of jobs that an earlier run completed; they are not included in the rate.
     """
     console = Console(stderr=True)
     start, before, done, last = time.monotonic(), -1, 0, 0.0
@@ -98,13 +98,13 @@ def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
             if jobs and (now - last >= EVERY or done == total):
                 last = now
                 left = f", {_duration((total - done) / rate())} left" if rate() > 0.0 else ""
-                click.echo(f"{done:,} of {total:,} jobs, {rate():,.0f} a second{left}", err=True)
+                click.echo(f"{done:,} of {total:,} jobs, {rate():,.0f} per second{left}", err=True)
 
         yield line
         return
 
     class Rate(TextColumn):
-        """Jobs a second."""
+        """Jobs per second."""
 
         def render(self, task: Task) -> Text:
             return Text(f"{rate():,.0f}/s")
@@ -121,7 +121,7 @@ def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
 
 
 def _described(progress: Progress) -> str:
-    """Scene, engine, time step, and which simulation of how many."""
+    """Scene, engine, time step, and the number of the simulation."""
     start = f", start {min(progress.done + 1, progress.total)} of {progress.total}" if progress.total and not progress.finished else ""
     return f"{progress.scene}, {progress.engine}, {in_ms(progress.dt)}{' (added)' if progress.added else ''}{start}"
 

@@ -1,4 +1,4 @@
-"""Rows as a table on a terminal, one line a row elsewhere, or as JSON; sentences."""
+"""Output of rows, as a table on a terminal, as one line per row elsewhere, or as JSON; and of sentences."""
 
 import json
 import math
@@ -17,20 +17,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PIECES = re.compile(r"(?<=\s)(?!(?<=\d\s)\S{1,4}\b)|(?:(?<=\w[\[=])|(?<=\w,))(?=[A-Za-z])")
-"""Where a line of a cell may end: at a space, but not between a number and its unit; and between the options of an engine."""
+"""The places at which a line of a cell may be broken: spaces that are not between a number and its unit, and between options of an
+engine.
+"""
 GAP = 3
-"""Characters between two columns of a table."""
+"""Number of characters between two columns of a table."""
 NARROWEST = 24
-"""Characters to which a column of text is narrowed before a column is left out."""
+"""Width in characters to which columns of text are narrowed before a column is left out."""
 
 
 def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Sequence[str] = ()) -> None:
-    """Print rows with the same keys: as a table as wide as the terminal, one line a row where the output is no terminal, or as JSON.
+    """Print rows with the same keys: as a table as wide as the terminal, as one line per row if the output is no terminal, or as JSON.
 
     Args:
         rows: The rows.
         json_output: Whether to print JSON.
-        left_out_first: The columns that are left out of a table that is wider than the terminal, in this order.
+        left_out_first: The columns to leave out, in this order, if the table is wider than the terminal.
     """
     if json_output:
         click.echo(json.dumps(rows, indent=1, ensure_ascii=False))
@@ -54,18 +56,18 @@ def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Se
         table.add_row(*(Text(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
     console.print(table)
     if left_out:
-        print_sentence(f"Not shown at this width: {', '.join(left_out)}; shown on a wider terminal or with --json.", console)
+        print_sentence(f"Columns not shown at this width: {', '.join(left_out)}; use a wider terminal or --json.", console)
 
 
 def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
-    """Rows as lines, with their columns under each other; a cell is one line."""
+    """Rows as lines with aligned columns, one line per row."""
     flat = [[" ".join(cell.split()) for cell in row] for row in cells]
     widths = [max(map(cell_len, column)) for column in zip(*flat, strict=True)]
     return ["  ".join(cell + " " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)).rstrip() for row in flat]
 
 
 def print_row(cells: Sequence[str], widths: Sequence[int], console: Console) -> None:
-    """Print one row of a table whose other rows are not yet known; the last cell, which has no width, is wrapped on a terminal."""
+    """Print one row of a table whose other rows are not yet known; the last cell has no fixed width and is wrapped on a terminal."""
     head = "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=False)) + "  "
     text = " ".join(cells[-1].split())
     if console.is_terminal:
@@ -79,14 +81,14 @@ def print_sentence(sentence: str, console: Console, style: str = "") -> None:
 
 
 def print_sentences(sentences: Iterable[str]) -> None:
-    """Print sentences, one after the other."""
+    """Print several sentences."""
     console = Console()
     for sentence in sentences:
         print_sentence(sentence, console)
 
 
 def _narrowest(rows: Sequence[dict[str, str]], head: Sequence[str]) -> int:
-    """The width of a table whose columns are no narrower than is readable: their cells, or `NARROWEST` where these are text."""
+    """The smallest width at which a table is readable: each column is as wide as its cells, or `NARROWEST` for text."""
     widths = []
     for key in head:
         longest = max(cell_len(row[key]) for row in rows)
@@ -95,14 +97,14 @@ def _narrowest(rows: Sequence[dict[str, str]], head: Sequence[str]) -> int:
 
 
 def _longest_piece(cells: Iterable[str]) -> int:
-    """The length of the longest piece of some cells that stays on one line."""
+    """The length of the longest part of some cells that cannot be broken."""
     return max(cell_len(piece.rstrip()) for cell in cells for piece in PIECES.split(cell))
 
 
 def _widths(cells: Sequence[Sequence[str]], available: int) -> list[int]:
-    """The width of each column: as wide as its cells if all fit, else the widest are narrowed.
+    """The width of each column: that of its cells if the table fits, otherwise the widest columns are narrowed.
 
-    Words are kept whole if possible; the first of several columns, which has the names, is narrowed last.
+    Words are kept whole if possible. The first column, which has the names, is narrowed last.
     """
     columns = list(zip(*cells, strict=True))
     widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) for column in columns]
@@ -116,7 +118,7 @@ def _widths(cells: Sequence[Sequence[str]], available: int) -> list[int]:
 
 
 def _wrapped(text: str, width: int) -> str:
-    """A text with line breaks between its pieces, so that no line is wider unless a piece is."""
+    """A text with line breaks, so that no line is wider than the width unless a single word is."""
     lines = [""]
     for piece in PIECES.split(text):
         if lines[-1] and cell_len(lines[-1] + piece.rstrip()) > width:
@@ -126,7 +128,7 @@ def _wrapped(text: str, width: int) -> str:
 
 
 def json_rows(frame: "pd.DataFrame") -> str:
-    """A table as JSON with all digits; a number that is not finite is null."""
+    """A table as JSON with all digits; numbers that are not finite are null."""
     rows = [
         {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row.items()}
         for row in frame.to_dict("records")

@@ -1,4 +1,4 @@
-"""A run on a terminal: scene by scene, engines side by side."""
+"""The tables of a run on a terminal: for each scene, a table with a column for each engine."""
 
 import math
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ STYLES = {"passed": "green", "failed": "bold red", "crashed": "bold red", "diver
 
 
 def print_table(results: Results, console: Console | None = None) -> None:
-    """Print a run at its finest time step: every metric of every engine, and the spread between independent engines; then the summary.
+    """Print every metric of every engine at the finest time step, the spread between independent engines, and the summary.
 
     Args:
         results: The run.
-        console: Rich's console to print to; None: the standard output.
+        console: Rich's console to print to; None means standard output.
     """
     out = console or Console()
     at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
@@ -71,7 +71,7 @@ def _cell(value: float, verdict: str) -> Text:
 
 
 def _print_trends(results: Results, name: str, out: Console) -> None:
-    """For each engine the observed orders, and the errors that do not vanish as dt → 0."""
+    """For each engine, a sentence with the observed orders and the errors that do not vanish as dt → 0."""
     frame = results.table[results.table["scene"] == name]
     for engine in results.engines:
         mine = frame[frame["engine"] == engine]
@@ -91,7 +91,7 @@ def _print_trends(results: Results, name: str, out: Console) -> None:
 
 
 def _print_ensemble(results: Results, name: str, out: Console) -> None:
-    """The means over the scene's starts at the finest time step, each with half its confidence interval."""
+    """The means over the initial states of the ensemble at the finest time step, each with the half-width of its confidence interval."""
     frame = results.table[(results.table["scene"] == name) & (results.table["kind"] == "ensemble")]
     finest = frame[frame["dt"] == frame["dt"].min()]
     for metric, rows in finest.groupby("metric", sort=False):

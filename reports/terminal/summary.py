@@ -1,4 +1,4 @@
-"""A run on a terminal in short: the findings, a matrix of scenes and engines, the failures, the verdict."""
+"""The summary of a run on a terminal: the findings, a matrix of scenes and engines, the failures, and the verdict."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from reports.views.matrix import Matrix, matrix
 from reports.views.run import overview
 
 MOST_SENTENCES = 6
-"""Sentences on the failures of one engine; JUnit, JSON and the report have all."""
+"""Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
 
 
 def print_summary(results: Results, console: Console | None = None) -> None:
@@ -40,7 +40,7 @@ def print_failures(groups: Sequence[FailureGroup], console: Console | None = Non
 
 
 def _print_matrix(found: Matrix, engines: Sequence[str], out: Console) -> None:
-    """Print a matrix: as wide as the terminal, with numbers for the engines where their names are too long, then without errors."""
+    """Print a matrix as wide as the terminal. If it does not fit, engines are numbered instead of named, and then errors are left out."""
     numbers = [str(number + 1) for number in range(len(engines))]
     complete = [[row.scene, row.quantity, *(f"{mark} {value}" for mark, value in row.cells)] for row in found.rows]
     marks = [[row.scene, *(mark for mark, _ in row.cells)] for row in found.rows]
@@ -48,7 +48,7 @@ def _print_matrix(found: Matrix, engines: Sequence[str], out: Console) -> None:
     forms = [
         ([], aligned([["scene", found.title, *engines], *complete])),
         (keys, aligned([["scene", found.title, *numbers], *complete])),
-        (["Errors are not shown at this width; a wider terminal shows them.", *keys], aligned([["scene", *numbers], *marks])),
+        (["Errors are not shown at this width; use a wider terminal.", *keys], aligned([["scene", *numbers], *marks])),
     ]
     notes, lines = next((form for form in forms if not out.is_terminal or max(map(cell_len, form[1])) <= out.width), forms[-1])
     for line, style in zip(lines, ["bold", *("red" if row.fails else "" for row in found.rows)], strict=True):

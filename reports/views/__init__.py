@@ -1,1 +1,1 @@
-"""Results as sentences and rows, one file for each command; no HTML, no terminal codes."""
+"""Results as sentences and table rows, without HTML and terminal codes; one file for each command."""

@@ -1,4 +1,4 @@
-"""`dropspin calibrate` in words: the settings, and the values measured with them."""
+"""The output of `dropspin calibrate`: the settings, and the values measured with them."""
 
 import math
 from dataclasses import asdict
@@ -11,10 +11,10 @@ Rows = list[dict[str, str]]
 
 
 def friction(text: str) -> str | float:
-    """A friction option as a floor takes it.
+    """The value of the option `--friction` as a floor's friction.
 
     Raises:
-        DropspinError: It is not a valid friction.
+        DropspinError: The value is not a valid friction.
     """
     if text in ("none", "infinite"):
         return text

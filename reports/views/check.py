@@ -1,4 +1,4 @@
-"""`dropspin check` and `accept` in words: sentences, and annotations for GitHub."""
+"""The output of `dropspin check` and `accept`: sentences, and annotations for GitHub."""
 
 import os
 import shlex
@@ -19,11 +19,11 @@ from reports.views.findings import counts, verdict_sentence
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 MOST_ANNOTATIONS = 10
-"""The number that GitHub shows for one step."""
+"""The number of annotations that GitHub shows for one step."""
 
 
 class BaselineFile(NamedTuple):
-    """A baseline, its file, and the folder of the run that is compared with it, for the commands."""
+    """A baseline, its file, and the folder of the run that is compared with it, as they appear in printed commands."""
 
     baseline: Baseline
     path: str
@@ -53,7 +53,7 @@ def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
 
 
 def _notes(checked: Checked, known: int) -> list[str]:
-    """Improvements, new results, accepted results that were not run, and known failures."""
+    """Sentences on improvements, new results, accepted results that the run does not cover, and known failures."""
     better, new = (int((checked.changes["change"] == change).sum()) for change in ("better", "new"))
     notes = [f"{_results(better)} better than accepted."] * bool(better) + [f"{_results(new)} new and not yet accepted."] * bool(new)
     if len(checked.not_run):
@@ -66,7 +66,7 @@ def _notes(checked: Checked, known: int) -> list[str]:
 
 
 def _verdict(checked: Checked, failed_rows: pd.DataFrame, own: str) -> str:
-    """The last sentence: the run's own verdict and that of the accepted results."""
+    """The last sentence: the verdict on the run's own checks and on the accepted results."""
     failed = len(regressed(checked.changes))
     judged = int(checked.changes["change"].isin(["same", "better"]).sum()) + failed
     changed = failed_rows.loc[failed_rows["reason"].str.startswith(SCENE_CHANGED), "scene"].nunique()
@@ -77,7 +77,7 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, own: str) -> str:
 
 
 def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bool) -> list[str]:
-    """How many results of a run were accepted, and which cannot be."""
+    """Sentences on how many results of a run were accepted, and which cannot be accepted."""
     changed = found["change"].value_counts()
     changes = ", ".join(f"{changed[one]:,} {one}" for one in ("new", "worse", "moved", "better", "gone", "same") if one in changed)
     scenes = f"{len(results.scenes)} {'scene' if len(results.scenes) == 1 else 'scenes'}"
@@ -91,12 +91,12 @@ def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bo
     if unknown and known_failures:
         listed.append(f"{unknown:,} failing {'check has' if unknown == 1 else 'checks have'} no comparable result and cannot be accepted.")
     if tally.broken:
-        listed.append(f"{tally.broken:,} engine runs broke down; what was accepted of them before stays.")
+        listed.append(f"{tally.broken:,} engine runs broke down; results accepted earlier for them stay in the baseline.")
     return listed
 
 
 def annotations(found: Sequence[Failure]) -> list[str]:
-    """The commands by which a runner of GitHub shows failures; empty elsewhere."""
+    """The workflow commands by which a runner of GitHub shows failures; empty elsewhere."""
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return []
     return [
@@ -128,7 +128,7 @@ def _results(count: int) -> str:
 
 
 def _escaped(text: str, more: str = "") -> str:
-    """Text as GitHub's commands require it; % first."""
+    """Text escaped for GitHub's workflow commands; % is escaped first."""
     for sign in f"%\r\n{more}":
         text = text.replace(sign, f"%{ord(sign):02X}")
     return text

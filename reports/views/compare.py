@@ -1,4 +1,4 @@
-"""`dropspin compare` in words: the changes between two runs as tables, sentences, and data for JSON."""
+"""The output of `dropspin compare`: the changes between two runs as tables, sentences, and data for JSON."""
 
 import math
 from collections.abc import Hashable, Mapping
@@ -13,13 +13,13 @@ from reports.views.failures import reproduce_scenes
 from reports.views.numbers import formatted, subject
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
-"""The heading of each kind of change, worst first."""
+"""The heading of each kind of change, the worst kind first."""
 MOST_LINES = 12
-"""Lines of a table; JSON has all."""
+"""Largest number of lines of a table; JSON has all lines."""
 
 
 def listed(changes: Changes) -> list[str]:
-    """The changes: under a heading for each kind, a line for each engine and scene."""
+    """The changes as lines, one for each engine and scene, under a heading for each kind."""
     listed = []
     for title, lines in tables(changes):
         listed.append(title)
@@ -34,7 +34,7 @@ def listed(changes: Changes) -> list[str]:
 
 
 def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
-    """A title and rows for each kind of change that occurs."""
+    """The title and the rows of a table for each kind of change that occurs."""
     found = []
     for change, word in TITLES.items():
         results = changes.of(change)
@@ -46,14 +46,14 @@ def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
 
 
 def sentences(changes: Changes) -> list[str]:
-    """The attributions, the scenes that were not compared, the speeds, and the verdict last."""
+    """Sentences on the attributions, the scenes that were not compared, the speeds, and, last, the verdict."""
     found = [
         f"{engine}: {_counted(changes, engine)}. {one.message[0].upper()}{one.message[1:]}." for engine, one in changes.attributions.items()
     ]
     if changes.surroundings and not changes.attributions:
-        found.append(f"No result has changed, though these differ: {', '.join(changes.surroundings)}.")
+        found.append(f"No result has changed, although these differ between the runs: {', '.join(changes.surroundings)}.")
     if changes.other_scenes:
-        found.append(f"Not compared, as these scenes have changed: {', '.join(changes.other_scenes)}.")
+        found.append(f"Not compared, because these scenes have changed: {', '.join(changes.other_scenes)}.")
     if changes.in_one_only:
         found.append(f"In one of the runs only: {', '.join(changes.in_one_only)}.")
     found += [_speed(change) for change in changes.speed]
@@ -64,7 +64,7 @@ def sentences(changes: Changes) -> list[str]:
 
 
 def commands(changes: Changes, results: Results) -> list[str]:
-    """For each engine with results that are worse, moved or gone, the command that runs the scenes of these again."""
+    """For each engine with results that are worse, moved or gone, the command that runs the scenes of these results again."""
     by_engine = changes.regressions.groupby("engine", sort=False)["scene"].unique()
     return [f"Reproduce: {reproduce_scenes(results, list(scenes), str(engine))}" for engine, scenes in by_engine.items()]
 
@@ -85,7 +85,7 @@ def as_data(changes: Changes) -> dict[str, Any]:
 
 
 def _lines(results: pd.DataFrame) -> list[dict[str, str]]:
-    """A line for each engine and scene: its largest change, and the number of others, which have one cause as far as can be seen."""
+    """A line for each engine and scene, with its largest change and the number of others, which probably have the same cause."""
     return [_line(group.iloc[0].to_dict(), len(group)) for _, group in results.groupby(["engine", "scene"], sort=False)]
 
 

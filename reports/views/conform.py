@@ -1,4 +1,4 @@
-"""`dropspin conform` in words: a row for each check, an error that several checks share written once, and the outcome."""
+"""The output of `dropspin conform`: a row for each check, and the outcome. An error message that several checks share is printed once."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,13 +9,13 @@ WRONG = frozenset({"failed", "crashed", "timed_out"})
 
 
 def message(result: CheckResult, earlier: Sequence[CheckResult]) -> str:
-    """The message of a check; where an earlier check has the same error, the name of that check."""
+    """The message of a check, or, if an earlier check has the same message, the name of that check."""
     same = [one.check for one in earlier if result.outcome in WRONG and one[1:3] == result[1:3]]
     return f"the same error as in '{same[0]}'" if same else result.message
 
 
 def sentences(found: Sequence[CheckResult]) -> list[str]:
-    """Errors that several checks share, the most frequent first, and how many checks fail."""
+    """Sentences on error messages that several checks share, the most frequent first, and on how many checks fail."""
     wrong = [one for one in found if one.outcome in WRONG]
     errors = Counter(one.message for one in wrong)
     shared = [f"{count} checks have one error: {error}" for error, count in errors.most_common() if count > 1]

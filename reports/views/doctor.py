@@ -1,4 +1,4 @@
-"""`dropspin doctor` in words: versions, processor, and whether each engine steps."""
+"""The output of `dropspin doctor`: versions, processor, and whether each engine can take a time step."""
 
 import sys
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ Rows = list[dict[str, str]]
 
 
 def rows(engines: Sequence[str]) -> Rows:
-    """Versions, processor, and whether each engine steps."""
+    """Versions, processor, and whether each engine can take a time step."""
     found = [{"what": package, "found": version or "not installed"} for package, version in versions().items()]
     found += [{"what": "python", "found": sys.version.split()[0]}, {"what": "processor", "found": processor()}]
     with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
@@ -23,7 +23,7 @@ def rows(engines: Sequence[str]) -> Rows:
 
 
 def _health(name: str, processes: EngineProcesses) -> str:
-    """Whether an engine steps, tried in a process of its own."""
+    """Whether an engine can take a time step, tried in a separate process."""
     try:
         entry = engine_entry(name)
         return f"{entry.absence}: {entry.reason}" if entry.absence else processes.call(entry, _fall)

@@ -1,4 +1,4 @@
-"""The error budget of each error in words: its asymptotic value as dt → 0, with its interval, and what the error is attributed to."""
+"""The error budget of each error in words: the asymptotic error with its interval, and the cause."""
 
 import math
 from collections.abc import Hashable, Mapping
@@ -14,7 +14,7 @@ OF = ["metric", "engine"]
 
 @dataclass(frozen=True)
 class BudgetRow:
-    """An error of an engine in a scene at its finest step.
+    """An error of an engine in a scene at the finest time step.
 
     Attributes:
         engine: Label of the engine.
@@ -22,11 +22,11 @@ class BudgetRow:
         unit: Unit of the values.
         dt: Time step [s].
         value: The error.
-        asymptotic: The error as dt → 0; NaN where it is undefined, as the next two.
-        lower: Lower end of its 95 % interval.
-        upper: Upper end of its 95 % interval.
-        cause: What the error is attributed to.
-        sentence: The budget in a sentence.
+        asymptotic: The asymptotic error; `asymptotic`, `lower` and `upper` are NaN where it is undefined.
+        lower: Lower end of the 95 % interval of the asymptotic error.
+        upper: Upper end of that interval.
+        cause: The cause to which the error is attributed.
+        sentence: The error budget in a sentence.
     """
 
     engine: str
@@ -42,7 +42,7 @@ class BudgetRow:
 
 
 def error_budgets(results: Results, scene_name: str) -> list[BudgetRow]:
-    """The error budgets of a scene, metric by metric, of engines that ran at enough time steps; negligible errors are left out."""
+    """The error budgets of a scene, by metric, for engines that ran at enough time steps; negligible errors are left out."""
     table = results.table[results.table["scene"] == scene_name]
     errors = table[table["kind"].isin(["truth", "invariant"]) & ~table["metric"].isin(ARTEFACTS)]
     columns = [*OF, "value", "lower", "upper", "cause", "reason"]
@@ -80,7 +80,7 @@ def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:
     rest = value - limit
     if abs(rest) <= 0.5 * (float(row["upper_of_limit"]) - float(row["lower_of_limit"])):
         return f"A {kind}."
-    return f"{formatted(limit)} is a {kind}; the other {formatted(rest)} is discretisation error."
+    return f"{formatted(limit)} is a {kind}; the remaining {formatted(rest)} is discretisation error."
 
 
 def _why_undecided(row: Mapping[Hashable, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The failures of a run in words: where, what, by how much, and the command that reproduces each or all of an engine."""
+"""The failures of a run, with scene, engine, result and size, and the commands that reproduce them."""
 
 import math
 import shlex
@@ -15,23 +15,23 @@ from reports.views.numbers import bound, formatted, step, subject, word
 
 Row = Mapping[Hashable, Any]
 MOST_NAMES = 4
-"""Names that a sentence lists."""
+"""Largest number of names in a sentence."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """The failed rows of one metric of one engine in one scene, described by the first of them.
+    """A failure: the failed rows of one metric of one engine in one scene, described by the first of these rows.
 
     Attributes:
         scene: Name of the scene.
         engine: Label of the engine.
         where: The time step, in words.
-        what: What is wrong, with value, bound and reason.
-        result: The result that is wrong, such as `order of attitude error`; empty if there is none.
-        others: How many other rows, at other time steps, fail in the same way.
+        what: The failed result in words, with value, bound and reason.
+        result: The name of the failed result, such as `order of orientation error`; empty for a breakdown.
+        others: Number of other rows, at other time steps, that fail in the same way.
         reproduce: The command, or the call, that reproduces it.
         broke_down: Whether the engine crashed, hung, diverged, or is missing.
-        accepted: Whether an accepted result fails.
+        accepted: Whether the failure is of an accepted result.
     """
 
     scene: str
@@ -53,12 +53,13 @@ class Failure:
 
 @dataclass(frozen=True)
 class FailureGroup:
-    """The failures of one engine: a sentence for each scene, which has one cause as far as can be seen, and one command for all.
+    """The failures of one engine: a sentence for each scene, whose failures probably have one cause, and one command for all scenes.
 
     Attributes:
         engine: Label of the engine.
-        sentences: For each scene its first failure, and how many other results fail; for a breakdown the scenes that share it.
-        consistent_with: The single wrong parameters that explain all asymptotic errors of these scenes; empty if none does.
+        sentences: For each scene its first failure and the number of other failing results; for a breakdown, the scenes in which it occurs.
+        consistent_with: The parameters of which each, if wrong, explains all asymptotic errors of these scenes; empty if there is no
+            such parameter.
         reproduce: The command, or the call, that reproduces them.
     """
 
@@ -69,7 +70,7 @@ class FailureGroup:
 
 
 def failures(results: Results, baseline: str | None = None) -> list[Failure]:
-    """The failures: breakdowns first, then accepted results that moved, the largest changes first, then asymptotic errors, then others.
+    """The failures of a run, in this order: breakdowns, accepted results by the size of the change, asymptotic errors, others.
 
     Args:
         results: The run, with the rows of a check if there was one.
@@ -103,7 +104,7 @@ def _failure(results: Results, group: list[Row], baseline: str | None) -> Failur
 
 
 def grouped(results: Results, found: Sequence[Failure], baseline: str | None = None) -> list[FailureGroup]:
-    """Failures, as `failures` gives them, by engine and scene; equal breakdowns of an engine in several scenes are one."""
+    """The failures of a run, grouped by engine and scene; equal breakdowns of an engine in several scenes are one failure."""
     by_engine: dict[str, dict[tuple[bool, str], list[Failure]]] = {}
     broken = {(one.scene, one.engine) for one in found if one.broke_down}
     for one in found:
@@ -131,7 +132,7 @@ def _described(parameter: WrongParameter) -> str:
 
 
 def _of_one_cause(some: Sequence[Failure]) -> str:
-    """The first of some failures, and the others counted."""
+    """The first of some failures in words, and the number of the others."""
     first = some[0]
     if first.broke_down:
         others = list(dict.fromkeys(one.scene for one in some[1:]))
@@ -143,12 +144,12 @@ def _of_one_cause(some: Sequence[Failure]) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names with commas, the first few of many."""
+    """The first `MOST_NAMES` names, separated by commas, and the number of the others."""
     return ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
 
 
 def what_fails(row: Row) -> str:
-    """Value, bound or interval, and reason of a failed row."""
+    """A failed row in words: value, bound or interval, and reason."""
     if not row["metric"]:
         return str(row["reason"]) if row["verdict"] in FAILURES else f"{word(row['verdict'])}. {row['reason']}"
     what = subject(row["metric"], row["kind"], row["truth"])
@@ -161,7 +162,7 @@ def what_fails(row: Row) -> str:
 
 
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
-    """The command that measures a row again, or the call if its scene or its engine was given as an object."""
+    """The command that measures a row again, or the Python call if the scene or the engine was given as an object."""
     dts = None if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
     return reproduce_scenes(results, [row["scene"]], row["engine"], dts, baseline if row["kind"] == "baseline" else None)
 
@@ -169,7 +170,7 @@ def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
 def reproduce_scenes(
     results: Results, names: Sequence[str], label: str, dts: Sequence[float] | None = None, baseline: str | None = None
 ) -> str:
-    """The command that runs some scenes of a run with one of its engines again, or the call if one of them was given as an object.
+    """The command that runs scenes with one engine again, or the Python call if a scene or the engine was given as an object.
 
     Args:
         results: The run.
@@ -191,7 +192,7 @@ def reproduce_scenes(
 
 
 def reproduce_drawn(results: Results) -> list[str]:
-    """A sentence with the seed of a run's drawn scenes and the command that runs them again; empty if none were drawn."""
+    """A sentence with the seed of a run's random scenes and the command that runs them again; empty if the run has no random scenes."""
     asked = results.provenance["asked"]
     if "draw" not in asked:
         return []

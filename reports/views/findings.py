@@ -1,4 +1,4 @@
-"""The findings of a run, counted and in words; terminal, HTML and Markdown share them."""
+"""The findings of a run as counts and sentences, for terminal, HTML and Markdown."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
@@ -15,10 +15,10 @@ from reports.views.leading_errors import step_costs
 from reports.views.numbers import duration, quantity, size, word
 
 CONVERGING = frozenset({"passed", "measured", "no_truth"})
-"""Verdicts of a scene without a finding."""
+"""Verdicts that are no finding."""
 MOST_NAMED = 2
 ENGINE_NAMES = {"document": "document (Wang's method)"}
-"""Engines whose label does not say what they are."""
+"""Descriptive names of engines, by label, where the label is not descriptive."""
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ class Counts:
     """The checks of a run.
 
     Attributes:
-        passed: How many passed.
-        failed: How many failed.
-        known: How many show a fault that is expected by name.
-        fixed: How many passed although such a fault is expected.
-        limited: How many would fail, but for a known limitation of the engine.
-        of_studies: How many of those that passed or failed are on orders and asymptotic errors.
-        broken: How many rows are of engines that broke down.
+        passed: Number of passed checks.
+        failed: Number of failed checks.
+        known: Number of checks that show a fault that the scene expects of the engine by name.
+        fixed: Number of passed checks for which such a fault is expected.
+        limited: Number of checks whose failure is explained by a known limitation of the engine.
+        of_studies: Number of passed and failed checks of orders and asymptotic errors.
+        broken: Number of rows that report a breakdown of an engine.
     """
 
     passed: int
@@ -45,7 +45,7 @@ class Counts:
 
 
 def counts(results: Results) -> Counts:
-    """The verdicts of a run, counted."""
+    """Count the verdicts of a run."""
     verdicts = results.table["verdict"]
     passed, failed, known = verdicts == "passed", verdicts.isin(FAILURES), verdicts == "known"
     fixed = passed & results.table["reason"].str.startswith(HOLDS_AGAIN)
@@ -56,7 +56,7 @@ def counts(results: Results) -> Counts:
 
 
 def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
-    """For each engine the scenes in which an error with this cause does not vanish as dt → 0, negligible ones left out."""
+    """For each engine, the scenes in which an error with this cause does not vanish as dt → 0; negligible errors are left out."""
     rows = results.asymptotic_errors(cause)
     worth = rows[rows["value"].abs() > NEGLIGIBLE]
     return {
@@ -72,7 +72,7 @@ class ProfileComparison:
     Attributes:
         engine: Label of the engine with default settings.
         calibrated: Label of the calibrated one.
-        rows: Errors of both at the finest step; `part` is the share of the first that the calibrated engine does not have.
+        rows: Errors of both at the finest time step; `part` is the share of the first error that the calibrated engine does not have.
     """
 
     engine: str
@@ -81,7 +81,7 @@ class ProfileComparison:
 
     @property
     def clause(self) -> str:
-        """The comparison in words, to follow the engine's name."""
+        """The comparison as a clause that follows the engine's name."""
         parts = sorted(row["part"] for row in self.rows)
         half = parts[len(parts) // 2]
         return (
@@ -96,7 +96,7 @@ class ProfileComparison:
 
 
 def profile_comparisons(results: Results) -> list[ProfileComparison]:
-    """For each engine that was run with default settings and calibrated: how much of the errors is due to settings."""
+    """For each engine that was run with default and with calibrated settings, the share of its errors that is due to the settings."""
     frame = results.measurements
     truths = frame[(frame["kind"] == "truth") & frame["value"].notna()]
     found = []
@@ -152,23 +152,23 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
 
 
 def _known(tally: Counts) -> str:
-    """The results that show known faults, those that do no longer, and those within limitations, as the end of a sentence."""
+    """The end of a sentence: how many results show known faults or are within limitations, how many expected faults do not occur."""
     known = f"; {tally.known} {'result shows' if tally.known == 1 else 'results show'} known faults" if tally.known else ""
     limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} within known limitations" if tally.limited else ""
     return (
-        known + limited + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not show" if tally.fixed else "")
+        known + limited + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not occur" if tally.fixed else "")
     )
 
 
 def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
     """One sentence for each engine, and one for all errors that the time steps leave undecided.
 
-    An engine's sentence has the number of scenes in which it converges, what it does in the others with its largest error, breakdowns,
-    and the cost of a step. That of a missing engine says why it is missing.
+    The sentence gives the number of scenes in which the engine converges, the number with each other status, its largest error, its
+    breakdowns, and the cost of a time step. The sentence of a missing engine gives the reason why it is missing.
 
     Args:
         results: The run.
-        lasting: By cause and engine, the scenes with errors that do not vanish as dt → 0.
+        lasting: The scenes with errors that do not vanish as dt → 0, by cause and engine.
         profiles: Engines with default settings compared with the calibrated ones.
     """
     missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine").set_index("engine")["reason"]
@@ -196,14 +196,14 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
-    """In how many scenes an engine converges, and what it does in the others, with its largest error relative to its scale."""
+    """The number of scenes in which an engine converges, the number with each other status, and the largest error relative to its scale."""
     mine = results.table[results.table["engine"] == engine]
     studied = list(mine.loc[mine["kind"] == "asymptotic_error", "scene"].unique())
     if not studied:
         frame = results.measurements
         measured = _scenes(frame.loc[frame["engine"] == engine, "scene"].nunique())
         enough = is_sufficient(results.provenance["asked"]["dts"])
-        return f"{measured} measured, no asymptotic errors" + ("" if enough else "; they take three time steps that span a factor of four")
+        return f"{measured} measured, no asymptotic errors" + ("" if enough else "; these need three time steps that span a factor of four")
     wrong = [scene for scene in studied if scene in remain or statuses[scene].verdict not in CONVERGING]
     kinds = Counter("setting error" if statuses[scene].verdict in CONVERGING else statuses[scene].words for scene in wrong)
     kinds[UNDECIDED] = sum(statuses[scene].words == UNDECIDED for scene in studied if scene not in wrong)
@@ -218,33 +218,33 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(shown["scene"], shown["unit"], strict=True)]
     largest = (shown["value"].abs() / scales).sort_values(ascending=False, kind="stable").index[:1]
     worst = [
-        f"largest: {quantity(row['metric'])} {size(row['value'], row['unit'])}, {row['scene']}"
+        f"largest: {quantity(row['metric'])} {size(row['value'], row['unit'])} in {row['scene']}"
         for row in shown.loc[largest].to_dict("records")
     ]
     return f"{converges}{''.join(f' ({one})' for one in worst)}"
 
 
 def _named(scenes: Collection[str]) -> str:
-    """The names of a few scenes, or the number of many."""
+    """The names of the scenes if they are few, otherwise their number."""
     return ", ".join(scenes) if len(scenes) <= MOST_NAMED else _scenes(len(scenes))
 
 
 def _breakdowns(results: Results, engine: str) -> list[str]:
-    """In how many scenes an engine broke down, by verdict."""
+    """The number of scenes in which an engine broke down, for each kind of breakdown."""
     table = results.table[(results.table["engine"] == engine) & results.table["verdict"].isin(BREAKDOWNS)]
     return [f"{word(str(verdict))} in {_scenes(scenes)}" for verdict, scenes in table.groupby("verdict")["scene"].nunique().items()]
 
 
 def _cost(results: Results, engine: str, costs: Mapping[str, float]) -> list[str]:
-    """The median time of a step of the fastest engine; of the others its ratio to that of the fastest in the same scene at the same dt."""
+    """The median time per step of the fastest engine; for others, the ratio to the fastest engine in the same scene at the same dt."""
     timed = {label: cost for label, cost in costs.items() if cost > 0.0}
     if engine not in timed:
         return []
     fastest = min(timed, key=timed.__getitem__)
     if engine != fastest:
-        return [f"steps take {float(f'{timed[engine]:.2g}'):g} times as long"]
+        return [f"a time step takes {float(f'{timed[engine]:.2g}'):g} times as long"]
     seconds = results.table.loc[results.table["engine"] == engine, "time_per_step"].median()
-    return [f"steps take {duration(float(seconds))}{', the least' if len(timed) > 1 else ''}"]
+    return [f"a time step takes {duration(float(seconds))}{', the shortest' if len(timed) > 1 else ''}"]
 
 
 def _scenes(count: int) -> str:

@@ -1,19 +1,19 @@
-"""`dropspin history` in words: the runs in which results moved."""
+"""The output of `dropspin history`: the runs in which results changed."""
 
 from comparisons.regressions.history import History, Move
 from reports.views.numbers import formatted, subject
 
 MOST_RESULTS = 6
-"""Results listed for one run; the table in the file has them all."""
+"""Largest number of results listed for one run; the table in the file has all of them."""
 
 
 def rows(found: History) -> list[dict[str, str]]:
-    """The results that moved most, for every run in which some moved."""
+    """For each run in which results changed, the results that changed most."""
     return [row for move in found.moves for row in _of_move(found, move)]
 
 
 def listed(found: History) -> list[str]:
-    """The same, one line each."""
+    """The results that changed most, one line for each."""
     return [
         f"{row['run']} · {row['engine']} · {row['scene']}: "
         f"{row['result']} at {row['step']} from {row['before']} to {row['now']}, {row['change']}"
@@ -22,14 +22,14 @@ def listed(found: History) -> list[str]:
 
 
 def sentences(found: History) -> list[str]:
-    """What each move is attributed to."""
+    """The cause to which the changes in each run are attributed."""
     moved = [
-        f"{move.engine}: {len(move.results):,} results moved in {found.names[move.run]}, after {found.names[move.before]}. "
+        f"{move.engine}: {len(move.results):,} results changed in {found.names[move.run]}, after {found.names[move.before]}. "
         f"{move.attribution.message[0].upper()}{move.attribution.message[1:]}."
         for move in found.moves
     ]
     scenes = found.results["scene"].nunique()
-    return moved or [f"No result has moved in {len(found.names)} runs of {scenes} scenes."]
+    return moved or [f"No result changed in {len(found.names)} runs of {scenes} scenes."]
 
 
 def _of_move(found: History, move: Move) -> list[dict[str, str]]:

@@ -1,4 +1,4 @@
-"""Engines side by side: the leading error of each in each scene, and the relative cost of its steps."""
+"""A table of engines: the leading error of each engine in each scene, and the relative cost of its time steps."""
 
 import math
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ class Leading:
         metric: The leading metric of the scene.
         unit: Unit of the errors.
         dt: Time step [s].
-        sizes: By engine, the size of the error; NaN where it is undefined.
-        levels: By engine, the decade of the error relative to its scale, from 0 (1e-8 or less) to 8 (1 or more); None if undefined.
-        least: The engines with the smallest error or one within 1 % of it; where errors are within rounding, all engines with such errors.
+        sizes: The size of the error, by engine; NaN where it is undefined.
+        levels: The decade of the error relative to its scale, by engine, from 0 (1e-8 or less) to 8 (1 or more); None if undefined.
+        least: The engines whose error is within 1 % of the smallest error, or is within rounding.
     """
 
     scene: str
@@ -49,7 +49,7 @@ def leading_errors(results: Results) -> dict[str, Leading]:
 
 
 def step_costs(results: Results) -> dict[str, float]:
-    """By engine, the median time per step relative to the fastest engine in the same scene at the same dt; NaN where none was timed."""
+    """The median time per step relative to the fastest engine in the same scene at the same dt, by engine; NaN if not timed."""
     timed = results.table[results.table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
     least = timed.groupby(["scene", "dt"])["time_per_step"].transform("min")
     ratios = (timed["time_per_step"] / least).groupby(timed["engine"]).median()

@@ -1,4 +1,4 @@
-"""`dropspin limits` in words: the largest time steps, and the range in which each engine is sound, of the values tested."""
+"""The output of `dropspin limits`: the largest time steps, and for each engine the range of tested values in which it is sound."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterio
 
 
 def rows(found: RobustnessStudy) -> list[dict[str, Any]]:
-    """Every point of every scan, the smaller steps tried at the nominal values, and a row without a value of each engine left out."""
+    """Every tested value of every scan, the smaller time steps tried at the nominal values, and a row for each engine left out."""
     name, scanned = found.scene.name, {scan.engine for scan in found.scans if scan.axis.name == "step"}
     table = [_row(name, scan.engine, scan.axis, point) for scan in found.scans for point in scan.points]
     not_scanned = [engine for engine in found.refinements if engine not in scanned]
@@ -40,12 +40,12 @@ def _row(scene: str, engine: str, axis: Axis, point: ScanPoint) -> dict[str, Any
 
 
 def nominal(found: RobustnessStudy) -> str:
-    """What holds for every axis of a study but those that vary it."""
-    return f"{found.scene.name} at dt = {_step(found.dt)}; an error up to {found.within:g} is sound."
+    """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
+    return f"{found.scene.name} at dt = {_step(found.dt)}; an error up to {found.within:g} counts as sound."
 
 
 def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
-    """The largest time steps tried, by scene and engine."""
+    """The largest tested time steps at which each engine is accurate and stable, for each scene."""
     table = []
     for one in found:
         spin = float(np.linalg.norm(one.scene.start.angular_velocity)) if one.scene.floor is None else 0.0
@@ -56,7 +56,7 @@ def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
 
 
 def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
-    """The largest step of some kind, or the smallest tried if there is none."""
+    """The largest time step that meets a condition, or, if none does, the smallest tested one with its failure mode."""
     if dt is None:
         return f"{_mode(tried[0])} at {_step(tried[0].value)}, the smallest tested"
     turn = f", {spin * dt:.2g} rad" if spin else ""
@@ -92,7 +92,7 @@ def _range(scan: AxisScan) -> dict[str, str]:
 
 
 def sentences(found: RobustnessStudy) -> list[str]:
-    """Of each engine that is not sound at the nominal values: how far off it is, and at which smaller steps; and the engines left out."""
+    """Sentences on engines that are not sound at the nominal values, with their errors, and on engines left out."""
     failing = [(engine, points) for engine, points in found.refinements.items() if points[0].mode != "sound"]
     return [_refinement(engine, points) for engine, points in failing] + [
         f"Left out: {engine}, {why}." for engine, why in found.left_out.items()
@@ -105,9 +105,9 @@ def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:
         f"{engine} is not sound at the nominal values and dt = {_step(nominal.value)}: {_mode(nominal)}, {nominal.diagnosis.message}."
     )
     if not smaller:
-        return f"{sentence} No smaller step was tried."
+        return f"{sentence} No smaller time step was tried."
     tried = [f"{mode} at {', '.join(_step(point.value) for point in some)}" for mode, some in groupby(smaller, _mode)]
     at_the_end = (
         "" if smaller[-1].mode == "sound" else f" At {_step(smaller[-1].value)}, the smallest tried, {smaller[-1].diagnosis.message}."
     )
-    return f"{sentence} Smaller steps tried: {'; '.join(tried)}.{at_the_end}"
+    return f"{sentence} Smaller time steps tried: {'; '.join(tried)}.{at_the_end}"

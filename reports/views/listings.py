@@ -1,4 +1,4 @@
-"""`dropspin list` in words: the scenes, the engines, the metrics."""
+"""The output of `dropspin list`: the scenes, the engines, the metrics."""
 
 from scenarios.catalogue_truths import CATALOGUE_TRUTHS
 from scenarios.errors import DropspinError
@@ -6,7 +6,7 @@ from scenarios.loading import load, names
 
 Rows = list[dict[str, str]]
 LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs", "unit")}
-"""Columns of each list that a narrow terminal lacks."""
+"""The columns of each list that are left out on a narrow terminal."""
 
 
 def scene_rows() -> Rows:
@@ -18,7 +18,7 @@ def scene_rows() -> Rows:
 
 
 def engine_rows() -> Rows:
-    """The engines that can be named, with their options."""
+    """The engines that can be chosen by name, with their options."""
     from comparisons.engines.registry import engine_names
     from comparisons.engines.stand_in import StandIn
     from comparisons.running.entries import present_entry

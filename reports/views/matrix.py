@@ -10,13 +10,15 @@ from reports.views.leading_errors import leading_errors
 from reports.views.numbers import formatted, in_ms, quantity, unit
 
 MOST_SCENES = 24
-"""Rows at most; of more scenes those are left out in which no engine has a finding, and then the least severe."""
+"""Largest number of rows. Of more scenes, those in which no engine has a finding are left out first, then those with the least severe
+findings.
+"""
 WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
 
 @dataclass(frozen=True)
 class MatrixRow:
-    """A scene: what the leading error is of, and each engine's mark with the size of that error, in the order of the engines."""
+    """A scene: the quantity of its leading error, and for each engine, in order, the mark of its status and the size of that error."""
 
     scene: str
     quantity: str
@@ -26,7 +28,7 @@ class MatrixRow:
 
 @dataclass(frozen=True)
 class Matrix:
-    """The rows of a matrix, in the order of the scenes; what their errors are, the meaning of the marks, and which rows are left out."""
+    """The rows of a matrix, a heading for the errors, the meaning of the marks, and a sentence on the scenes left out."""
 
     rows: list[MatrixRow]
     title: str

@@ -1,4 +1,4 @@
-"""How numbers, bounds and verdicts are formatted, everywhere."""
+"""The format of numbers, bounds and verdicts in all output."""
 
 import math
 from functools import cache
@@ -30,7 +30,7 @@ def word(verdict: str) -> str:
 
 
 def quantity(metric: str) -> str:
-    """What a metric is the error of, in words; of one that is no error, its name."""
+    """The quantity of which a metric is the error, in words; for a metric that is no error, its name."""
     return metric.replace("_", " ").removesuffix(" error")
 
 
@@ -63,7 +63,7 @@ def unit(of: str) -> str:
 
 
 def subject(metric: str, kind: str, truth: str = "") -> str:
-    """The subject of a row in words, such as `order of attitude error`; a row of kind `baseline` names what was accepted in `truth`."""
+    """The subject of a row in words, such as `order of orientation error`; for a row of kind `baseline`, that of the accepted result."""
     words = metric.replace("_", " ")
     prefixed = {"order": f"order of {words}", "asymptotic_error": f"asymptotic {words}", "ensemble": f"mean {words}"}
     return prefixed.get(_accepted_kinds().get(truth, kind), words)
@@ -77,7 +77,7 @@ def _accepted_kinds() -> dict[str, str]:
 
 
 def trend(order: float, asymptotic_error: float, cause: str) -> str:
-    """What an error tends to as dt → 0."""
+    """The behaviour of an error as dt → 0, in a few words."""
     if cause == "discretisation":
         return "→ 0" if math.isnan(order) else f"order {order:.2f}"
     return {"model": f"→ {formatted(asymptotic_error)}", "setting": f"→ {formatted(asymptotic_error)}, a setting"}.get(cause, cause)

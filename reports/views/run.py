@@ -1,4 +1,4 @@
-"""`dropspin run` in words: the overview of a run, computed once for terminal, HTML and Markdown."""
+"""The output of `dropspin run`: the overview of a run, computed once for terminal, HTML and Markdown."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from reports.views.findings import (
 
 @dataclass(frozen=True)
 class Overview:
-    """What a report begins with.
+    """The first part of a report.
 
     Attributes:
         verdict: The outcome of the checks in one sentence.
-        findings: The main finding about each engine, and how drawn scenes are drawn again.
-        counts: The verdicts, counted.
-        statuses: By scene and engine.
+        findings: The main finding on each engine, and the command that draws the same random scenes again.
+        counts: The number of checks with each verdict.
+        statuses: The status of each engine in each scene, by scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
-        failures: What failed.
+        failures: The failures, grouped.
     """
 
     verdict: str

@@ -1,4 +1,4 @@
-"""A scene in words: what it models and what it leaves out."""
+"""The description of a scene: the effects that it models and those that it leaves out."""
 
 from scenarios.model import Scenario
 

@@ -1,4 +1,4 @@
-"""`dropspin show` in words: a scene, or what an engine builds of it."""
+"""The output of `dropspin show`: a scene, or the model that an engine builds of the scene."""
 
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ Rows = list[dict[str, str]]
 
 
 def scene_rows(scene: Scenario) -> Rows:
-    """A scene: what it models, its exact solution, its expectations."""
+    """The description of a scene: what it models, its exact solution and its expectations."""
     truth = truth_for(scene)
     verify_expectations(scene, truth, [])
     start = scene.start
@@ -40,7 +40,7 @@ def scene_rows(scene: Scenario) -> Rows:
 
 
 def _applies_to(expectation: Expectation) -> str:
-    """The engine and the time steps that an expectation is for."""
+    """The engine and the time steps to which an expectation applies."""
     steps = ", ".join(f"{dt:g}" for dt in expectation.dt or ())
     return " at ".join(filter(None, [expectation.engine or "any engine", f"{steps} s" if steps else ""]))
 
@@ -52,7 +52,7 @@ def _allowed(expectation: Expectation) -> str:
 
 
 def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
-    """What an engine builds of a scene, read back, with its settings.
+    """The model that an engine builds of a scene, as read back from the engine, with its settings.
 
     Raises:
         DropspinError: The engine cannot run, or breaks down while it builds the scene.
@@ -71,7 +71,7 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
 
 
 def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
-    """In the engine's process: what it builds."""
+    """The model that an engine builds; runs in the engine's process."""
     from comparisons.running.verification import verified_refusal, verified_settings, verify_build
 
     engine = entry.adapter

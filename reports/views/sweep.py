@@ -12,7 +12,7 @@ from reports.views.numbers import formatted, word
 
 WORST_OF = ("energy_drift", "energy_gain", "penetration")
 LEFT_OUT_FIRST = tuple(f"worst {name.replace('_', ' ')}" for name in reversed(WORST_OF))
-"""Columns of the summary that a narrow terminal lacks."""
+"""The columns of the summary that are left out on a narrow terminal."""
 
 
 @dataclass
@@ -25,7 +25,7 @@ class Tally:
 
 
 def tallies(where: str) -> dict[str, Tally]:
-    """The tally of each engine, read part by part, because the table may be larger than memory."""
+    """The tally of each engine; the table is read part by part, because it may be larger than memory."""
     found: dict[str, Tally] = {}
     for part in read_sweep_parts(where, ["engine", "verdict", "steps", "time_per_step", *WORST_OF]):
         frame = part.to_pandas()
@@ -41,7 +41,7 @@ def tallies(where: str) -> dict[str, Tally]:
 
 
 def summary_rows(found: dict[str, Tally]) -> list[dict[str, Any]]:
-    """The tallies as numbers; None where there is no value."""
+    """The tallies as rows of numbers; None where there is no value."""
     return [
         {"engine": engine, "jobs": tally.verdicts.total(), "verdicts": dict(tally.verdicts)}
         | {f"worst_{name}": tally.worst.get(name) for name in WORST_OF}
@@ -51,7 +51,7 @@ def summary_rows(found: dict[str, Tally]) -> list[dict[str, Any]]:
 
 
 def formatted_rows(found: dict[str, Tally]) -> list[dict[str, str]]:
-    """The tallies as text for a table."""
+    """The tallies as rows of text for a table."""
     return [
         {
             "engine": engine,
@@ -64,5 +64,5 @@ def formatted_rows(found: dict[str, Tally]) -> list[dict[str, str]]:
 
 
 def exit_code(found: dict[str, Tally]) -> int:
-    """0 if all jobs were run, 3 if an engine broke down in any."""
+    """The exit code: 0 if all jobs were run, 3 if an engine broke down in any job."""
     return 3 if any(tally.verdicts.keys() & BREAKDOWNS for tally in found.values()) else 0

@@ -1,4 +1,4 @@
-"""`dropspin tradeoff` in words: the Pareto front, and the cheapest configuration within each tolerance."""
+"""The output of `dropspin tradeoff`: the Pareto front, and the cheapest configuration within each tolerance."""
 
 import math
 from collections.abc import Sequence
@@ -18,13 +18,14 @@ COLUMNS = (
 )
 
 LEFT_OUT_FIRST = (f"per world (batch of {BATCH})", "on the Pareto front")
-"""Columns of the table of the Pareto front that a narrow terminal lacks."""
+"""The columns of the table of the Pareto front that are left out on a narrow terminal."""
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
-    """Every time step tried with every engine, and a row without a step of an engine that was not run.
+    """A row for every engine and time step tried, and a row without a time step for each engine that was not run.
 
-    With its error, the time per simulated second as median, best and quartiles of the rounds [s], and why the engine's ladder ended.
+    A row has the error, the median, minimum and quartiles over the rounds of the wall time per simulated second [s], and the reason why the
+    engine's ladder ended.
     """
     points = {(point.engine, point.dt): point for point in found.points}
     front = found.pareto_front
@@ -64,7 +65,7 @@ def _costs(point: CostPoint | None) -> dict[str, Any]:
 
 
 def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
-    """The Pareto front, cheapest first; then the most accurate step of each dominated engine; then the engines left out."""
+    """The Pareto front, cheapest first, then the most accurate time step of each dominated engine, then the engines left out."""
     on_front = [_row(found, point, "yes") for point in found.pareto_front]
     dominated = [_row(found, point, f"dominated by {other.engine}") for point, other in found.dominated.items()]
     left_out = [dict(zip(on_front[0], (label, *["–"] * 4, "left out, see below"), strict=True)) for label in found.left_out]
@@ -83,20 +84,20 @@ def _row(found: TradeOff, point: CostPoint, on_front: str) -> dict[str, str]:
 
 
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
-    """The cheapest configuration within each tolerance, then where and why each ladder of time steps ended, and who is left out."""
+    """Sentences: the cheapest configuration within each tolerance, the end of each ladder with the reason, and engines left out."""
     ended: dict[str, list[str]] = {}
     for ladder in found.ladders:
         if ladder.steps:
             ended.setdefault(_reason(ladder), []).append(f"{ladder.engine} at {_step(ladder.steps[-1][0])}")
     return [
         *(_recommendation(found, tolerance) for tolerance in within),
-        *(f"No smaller step was tried because {reason}: {', '.join(labels)}." for reason, labels in ended.items()),
+        *(f"No smaller time step was tried because {reason}: {', '.join(labels)}." for reason, labels in ended.items()),
         *(f"Left out: {label}, {why}." for label, why in found.left_out.items()),
     ]
 
 
 def _recommendation(found: TradeOff, tolerance: float) -> str:
-    """The cheapest configuration within a tolerance, the next best, and the best for a batch."""
+    """A sentence with the cheapest configuration within a tolerance, the next best, and the best one in a batch."""
     unit = _unit(found)
     goal = f"{found.scene.name}, {found.metric.replace('_', ' ')} within {tolerance:g}{unit}"
     advice = found.recommendation(tolerance)
@@ -104,9 +105,9 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         nearest = min(found.points, key=lambda point: point.error)
         ladder = next(one for one in found.ladders if one.engine == nearest.engine)
         last = ladder.steps[-1][0]
-        where = "where its ladder of steps ended" if nearest.dt == last else f"and its ladder of steps ended at {_step(last)}"
+        where = "where its ladder of time steps ended" if nearest.dt == last else f"and its ladder of time steps ended at {_step(last)}"
         return (
-            f"{goal}: no tested configuration reaches it; the nearest is {_named(nearest)} with {nearest.error:.2e}{unit}, "
+            f"{goal}: no tested configuration reaches it; the most accurate is {_named(nearest)} with {nearest.error:.2e}{unit}, "
             f"{where} because {_reason(ladder)}."
         )
     sentence = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second"

@@ -19,18 +19,19 @@ __all__ = ["LAWS", "Impact", "Law", "Truth", "truth_for"]
 
 @lru_cache(maxsize=128)  # a run, its tables and its plots all need it, and the solution of a tumble takes a second
 def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
-    """The exact motion of a scene, or None where there is no closed form for it.
+    """Return the exact motion of a scene, or None if no exact solution is known.
 
     Args:
         scene: The scene.
-        law: An impact law in place of the floor's, for bodies that strike with a corner, an edge or as a ball. An engine that implements
+        law: An impact law to use instead of that of the floor, for balls and for bodies that strike with a corner or an edge. An engine
+            that implements
             this law must converge to this solution.
 
     Returns:
         A callable of times [s] that returns a `Trajectory`, with the impacts in `events` and the end of its validity in `horizon`.
 
     Raises:
-        DropspinError: It is not a `Scenario`.
+        DropspinError: The argument is not a `Scenario`.
     """
     if not isinstance(scene, Scenario):
         raise DropspinError(f"scene: got {scene!r} ({type(scene).__name__}); give a Scenario, as load() returns it.")

@@ -7,9 +7,9 @@
 For e < 1 the impacts accumulate at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time; then the body rests.
 
 Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
-Valid for: a ball on a frictionless floor, with any spin and any sideways motion; a box that lands on a face of a frictionless floor, with
-any sideways motion and with spin about the vertical only, to its rounding; both on any floor without spin and sideways motion; gravity
-straight down, no damping. Valid until one ulp of a spin about the intermediate axis may turn the body over.
+Valid for: a ball on a frictionless floor, with any spin and any horizontal motion; a box that lands on a face on a frictionless floor, with
+any horizontal motion and with spin only about the vertical, up to rounding; both on any floor without spin and horizontal motion; gravity
+straight down, no damping. Valid until a difference of one ulp in a spin about the intermediate axis can turn the body over.
 """
 
 import math
@@ -27,10 +27,10 @@ Array = NDArray[np.float64]
 
 MAX_BOUNCES = 100_000
 MIN_FLIGHT_SHARE = 1e-12
-"""Flights shorter than this share of the first fall count as rest; their apexes are below 1e-24 of the drop height."""
+"""Flights shorter than this share of the first fall count as rest; the apexes of such flights are below 1e-24 of the drop height."""
 
 SPIN_ROUNDING = 1e-15
-"""Horizontal part of a spin about the vertical, as in a state that was computed."""
+"""Largest horizontal part of an angular velocity about the vertical that counts as rounding, relative to the angular velocity."""
 
 
 def bounce_ladder(scene: Scenario) -> Truth | None:
@@ -75,7 +75,7 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
 
 
 def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array | None:
-    """Speeds after the impacts that start a flight, until the scene ends or the body rests; None if there are too many."""
+    """Speeds after the impacts until the scene ends or the body rests; None if there are too many impacts."""
     e = floor.restitution
     if remaining < 0.0 or u0 < floor.rest_speed or e * u0 <= 0.0:
         return np.empty(0)
@@ -103,7 +103,7 @@ def _falls_straight_down(scene: Scenario) -> bool:
 
 
 def _stays_flat(scene: Scenario) -> bool:
-    """Whether every impact is one upward impulse through the centre of mass."""
+    """Whether every impact is a single upward impulse through the centre of mass."""
     assert scene.floor is not None
     start = scene.start
     if scene.floor.friction != "none" and (start.velocity[0] or start.velocity[2] or any(start.angular_velocity)):

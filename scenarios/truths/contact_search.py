@@ -1,4 +1,4 @@
-"""When a body in free flight next descends through the floor, found by steps that cannot contain a contact.
+"""The time at which a body in free flight next descends through the floor, found by time steps that cannot contain a contact.
 
 A corner r of a free body has the upward acceleration g_y + (α × r + ω × (ω × r))_y. With Ω the largest |ω|, |α| <= Ω²/√3 for the moments
 that a body can have, because |(I_j - I_k)/I_i| <= 1. So from its height h and its upward velocity v, for all s > 0,
@@ -9,8 +9,8 @@ and there is no contact before the first zero of the right-hand side. The zeros 
 rotation c = 0, and the first zero is the contact.
 
 Source: interval exclusion by Taylor's theorem with Lagrange's remainder; Euler's equations for |α|.
-Valid for: undamped flight. A corner that comes within rounding of the floor without clearly crossing it ends the search: whether it touches
-is beyond the digits. So does a stretch too long to search.
+Valid for: undamped flight. The search ends without a contact time in two cases: a corner comes within rounding of the floor without clearly
+crossing it, so that double precision does not determine whether it touches the floor; or the search would take too many steps.
 """
 
 import math
@@ -44,7 +44,7 @@ ATTITUDE_ROUNDING = 1e-15  # rad, for each rad turned
 
 @dataclass(frozen=True)
 class Contact:
-    """Where a search ends: at a contact, or undecided, where it is not known whether there is one from here on; `time` in s."""
+    """The end of a search at a `time` [s]: a contact, or a time after which it is not known whether there is a contact."""
 
     time: float
     is_decided: bool
@@ -57,7 +57,7 @@ class ContactSearch:
     Attributes:
         flight: The flight.
         points: Corners of the body's convex hull, from the centre of mass in the body [m], shape (n, 3).
-        rounding: Radius about each of them [m].
+        rounding: Rounding radius of the corners [m].
     """
 
     flight: Flight
@@ -65,9 +65,9 @@ class ContactSearch:
     rounding: float
 
     def next_contact(self, duration: float) -> Contact | None:
-        """The next descent of a corner through the floor; None if there is none within `duration` [s].
+        """The next time at which a corner passes through the floor downwards; None if there is none within `duration` [s].
 
-        Corners that touch the floor at the start must ascend, or rest where gravity pulls them upwards.
+        Corners that touch the floor at the start must ascend, or be at rest while gravity accelerates them upwards.
         """
         searched = 0
         for begin, end in self._within_reach(duration):
@@ -87,7 +87,7 @@ class ContactSearch:
 
     @cached_property
     def _curvature(self) -> Array:
-        """Bound c of each corner's acceleration apart from gravity's [m/s²], shape (n,)."""
+        """Bound c on the acceleration of each corner without that of gravity [m/s²], shape (n,)."""
         rotor = self.flight.rotor
         if rotor.is_steady:
             spin = self.flight.start[SPIN]
@@ -117,7 +117,7 @@ class ContactSearch:
         return [(a, b) for a, b in pairwise(edges) if y + 0.5 * (a + b) * (speed + 0.25 * (a + b) * self._gravity) < 0.0]
 
     def _suspects(self, edges: Array) -> Iterator[tuple[float, float]]:
-        """The intervals between ascending times in which a contact could not be excluded, neighbours joined; in order."""
+        """The intervals between ascending times in which a contact could not be excluded, in order; adjacent intervals are joined."""
         begins, ends = edges[:-1], edges[1:]
         for _ in range(HALVINGS if len(edges) > 2 else 0):
             clear, is_below = self._excluded(begins, ends)
@@ -132,7 +132,7 @@ class ContactSearch:
     def _excluded(self, begins: Array, ends: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether no corner can touch the floor in each interval, by the bounds from both of its ends up to its middle, shape (m,).
 
-        And whether the body is below the floor at its begin, farther than at any start.
+        Also whether the body is below the floor at the beginning of the interval, deeper than at any start.
         """
         half = 0.5 * (ends - begins)
         sag = 0.5 * max(float(self._curvature.max()) - self._gravity, 0.0) * half**2
@@ -141,7 +141,7 @@ class ContactSearch:
         return lowest > self._tolerance(ends), first < -2.0 * TOUCHING * self._size
 
     def _lowest(self, times: Array, later: Array) -> tuple[Array, Array]:
-        """The lowest height at times [s], and the lowest if from then on each corner kept its velocity, `later` [s]; shapes (m,)."""
+        """The lowest height at given times [s], and the lowest height `later` [s] if each corner keeps its velocity; shapes (m,)."""
         height, speed, vertical, turning = self._vertical_motion(times)
         now = height + (vertical @ self.points.T).min(axis=1)
         return now, height + later * speed + ((vertical + later[:, None] * turning) @ self.points.T).min(axis=1)
@@ -166,9 +166,9 @@ class ContactSearch:
         return Contact(now, False)
 
     def _landing(self, now: float, lands: NDArray[np.bool_], tolerance: float) -> Contact:
-        """The contact of corners within rounding of the floor that descend; decided once one of them certainly crosses it.
+        """The contact of descending corners within rounding of the floor; it is decided when one of them certainly crosses the floor.
 
-        A step of |v| over the largest upward acceleration does not pass the lowest point of any of them.
+        A step of |v| divided by the largest upward acceleration does not pass the lowest point of any corner.
         """
         upward = (self._gravity + self._curvature)[lands]
         later = now
@@ -196,14 +196,14 @@ class ContactSearch:
         return states[:, 1] - self.rounding, states[:, 8], unrotate(states[:, ORIENTATION], up), turning
 
     def _tolerance(self, times: Array) -> Array:
-        """Rounding of a corner's height [m] at times [s], shape (m,)."""
+        """Rounding error of the height of a corner [m] at times [s], shape (m,)."""
         y, speed = self.flight.start[POSITION][1], self.flight.start[VELOCITY][1]
         terms = abs(y) + times * (abs(speed) + 0.5 * times * abs(self._gravity)) + self._size
         return HEIGHT_ROUNDING * terms + ATTITUDE_ROUNDING * self._reach * self.flight.rotor.largest_spin * times
 
 
 def _safe_steps(heights: Array, speeds: Array, acceleration: Array) -> Array:
-    """The first positive zero [s] of h + v s + a s²/2 for h >= 0, infinite where there is none; from 0 upwards the next one."""
+    """The first positive zero [s] of h + v s + a s²/2 for h >= 0, infinite where there is none; if h is 0 and v > 0, the next zero."""
     discriminant = speeds * speeds - 2.0 * acceleration * heights
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(discriminant)

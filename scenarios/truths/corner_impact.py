@@ -1,13 +1,14 @@
-"""A body falls and strikes the floor repeatedly, with a corner, an edge or as a ball: flight, one impulse, flight.
+"""A body falls and strikes the floor repeatedly, as a ball or with a corner or an edge: flight, impulse, flight, and so on.
 
 The impulse is that of `impact_laws`: normal without friction, eq 17 of Wang's lecture note with infinite friction, Coulomb's for a ball; or
 that of a given law.
 
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
-Valid for: one corner touches, or the two of an edge that meet the floor at once and have one velocity, before and after; a ball with any
-spin; a Coulomb coefficient for a ball of equal moments only, or by a given law; no damping. Valid from the start to the tenth impact at
-most, to an impact that is not of this kind, to one after which the body stays on the floor, to where rounding decides whether the body
-touches or when it turns over, or to where a disturbance of 1e-10 rad/s at the start has grown to 1e-6, whichever comes first.
+Valid for: impacts of one corner, or of the two corners of an edge that strike the floor at once and have equal velocities before and after;
+a ball with any
+spin; a Coulomb coefficient for a ball of equal moments only, or by a given law; no damping. Valid up to the first of these events: the
+tenth impact; an impact that is not of this kind, or after which the body stays on the floor; a time at which rounding determines whether
+the body touches the floor or when it turns over; growth of an initial disturbance of 1e-10 rad/s to 1e-6.
 """
 
 import math
@@ -43,7 +44,7 @@ LAW_NAMES = {
 
 
 def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
-    """The exact solution of a drop on a corner, an edge or as a ball, up to where a disturbance has grown too much.
+    """The exact solution of a drop on a corner, an edge or as a ball, up to the time at which a disturbance has grown too much.
 
     Args:
         scene: The scene.
@@ -77,7 +78,7 @@ def _slides_one_way(scene: Scenario) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """Flights from one impact to the next, until `horizon` [s]."""
+    """The flights between impacts, until `horizon` [s]."""
 
     flights: tuple[Flight, ...]
     events: tuple[Impact, ...]
@@ -96,7 +97,7 @@ class _Course:
 
 
 def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
-    """The course until the scene ends, the body stays on the floor, or an impact is not of this kind."""
+    """The flights and impacts until the scene ends, the body stays on the floor, or an impact is not covered by the formula."""
     assert scene.floor is not None
     inertia, g = scene.body.inertia_tensor, scene.acceleration
     flights, now = [flight_states(start, inertia, g)], 0.0
@@ -121,7 +122,7 @@ def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
 
 
 def _until_sensitive(course: _Course, disturbed: _Course) -> _Course:
-    """The course up to the impact after which the disturbance of the start has grown by more than `MAX_GROWTH`."""
+    """The flights and impacts up to the impact after which a disturbance of the initial state has grown by more than `MAX_GROWTH`."""
     for number, event in enumerate(course.events):
         difference = math.inf
         if number < len(disturbed.events):
@@ -132,13 +133,13 @@ def _until_sensitive(course: _Course, disturbed: _Course) -> _Course:
 
 
 def _next_impact(scene: Scenario, flight: Flight, duration: float, leaves: bool) -> Contact | None:
-    """The next descent of the lowest point through the floor; None if there is none within `duration`.
+    """The next time at which the lowest point passes through the floor downwards; None if there is none within `duration`.
 
     Args:
         scene: The scene.
         flight: A flight that starts at or above the floor.
         duration: Length of the search [s].
-        leaves: Whether the body leaves the floor at the start, after an impact.
+        leaves: Whether the body leaves the floor at the beginning of the flight, after an impact.
     """
     body, start = scene.body, flight.start
     offsets = rotate(start[ORIENTATION], body.hull)
@@ -162,7 +163,7 @@ def _touching(scene: Scenario, state: Array) -> Array:
 
 
 def _leave(points: Array, state: Array) -> bool:
-    """Whether all of these points ascend."""
+    """Whether all of the given points ascend."""
     return bool(_rising(points, state).min() > 1e-12 * np.linalg.norm(state[VELOCITY]))
 
 
@@ -173,11 +174,11 @@ def _rising(points: Array, state: Array) -> Array:
 
 
 def _no_speed(scene: Scenario, state: Array) -> float:
-    """Speed [m/s] up to which a point counts as at rest."""
+    """Speed [m/s] up to which a point counts as resting."""
     return float(1e-12 * (np.linalg.norm(state[VELOCITY]) + scene.body.size * np.linalg.norm(state[SPIN])))
 
 
 def _have_one_velocity(points: Array, state: Array) -> bool:
-    """Whether points of the body have one velocity, so that one impulse at their mean is equivalent to one at each."""
+    """Whether points of the body have equal velocities, so that one impulse at their mean is equivalent to one at each."""
     velocities = state[VELOCITY] + np.cross(state[SPIN], points)
     return bool(np.ptp(velocities, axis=0).max() <= 1e-9 * np.linalg.norm(velocities, axis=1).max())

@@ -6,7 +6,7 @@ The box stays flat if the normal force can act ahead of the centre of mass by f 
 
 Source: C. A. de Coulomb, Théorie des machines simples (1785).
 Valid for: a box or other body on at least three vertices, lying on the floor at the start, without spin, moving horizontally; a Coulomb
-coefficient above 0; gravity straight down, no damping. Restitution has no effect, because nothing separates.
+coefficient above 0; gravity straight down, no damping. Restitution has no effect, because no contact separates.
 """
 
 import numpy as np
@@ -45,7 +45,7 @@ def coulomb_slide(scene: Scenario) -> Truth | None:
 
 
 def _slides_flat(scene: Scenario, direction: Array, friction: float) -> bool:
-    """Whether the point ahead of the centre of mass by friction times its height lies within the base."""
+    """Whether the normal force can act ahead of the centre of mass by friction coefficient times height, within the base."""
     from scipy.spatial import ConvexHull, QhullError
 
     offsets = rotate(np.array(scene.start.orientation), scene.body.vertices)

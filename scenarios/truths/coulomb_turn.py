@@ -2,22 +2,23 @@
 
     ω(t) = ω₀ - α t,   φ(t) = ω₀ t - α t²/2,   α = f M g ρ / I     until it stops at t = ω₀/α
 
-ρ is the distance of the base's corners from the axis. For any distribution of the weight that is equal at opposite corners, friction has
-this moment and no resultant force.
+ρ is the distance of the corners of the base from the axis. If opposite corners carry equal loads, friction has this moment and no resultant
+force.
 
-A tilt θ about the horizontal axes 1 and 2 loads corners unequally, and by friction b = f h/ρ of this load acts at right angles, below the
-centre of mass at the height h. With I_1, I_2 the moments of inertia and S_1, S_2 the sums of the corners' squared distances from the axes,
-contacts of stiffness k give
+A tilt θ about the horizontal axes 1 and 2 changes the loads of the corners. The friction of these loads has a moment about the centre of
+mass, at the height h, that is perpendicular to the moment of the loads and b = f h/ρ times as large. With I_1, I_2 the moments of inertia
+and S_1, S_2 the sums of the corners' squared distances from the axes, contacts of stiffness k give
 
     I_1 θ_1'' = -k (S_1 θ_1 - b S_2 θ_2),   I_2 θ_2'' = -k (S_2 θ_2 + b S_1 θ_1)
 
-which flutters at a rate that grows with k if (p - q)² < 4 b² p q, p = S_1/I_1, q = S_2/I_2. Only an impact without rebound stops that.
+These equations have growing oscillations (flutter), at a rate that increases with k, if (p - q)² < 4 b² p q, p = S_1/I_1, q = S_2/I_2. Only
+contacts without restitution suppress the flutter.
 
 Source: C. A. de Coulomb, Théorie des machines simples (1785); Euler's equation about a principal axis; V. V. Bolotin, Nonconservative
 Problems of the Theory of Elastic Stability (1963), for the flutter by forces that are not symmetric.
 Valid for: a box flat on the floor at the start, turning about the vertical and not moving otherwise; a Coulomb coefficient above 0; gravity
-straight down, no damping. The corners touch, not the face between them. With restitution only where it does not flutter; then restitution
-has no effect, because nothing separates.
+straight down, no damping. The corners touch the floor, not the face between them. With restitution, valid only if there is no flutter;
+restitution then has no effect, because no contact separates.
 """
 
 import math
@@ -71,7 +72,7 @@ def _lever(scene: Scenario) -> float | None:
 
 
 def _flutters(scene: Scenario, friction_over_lever: float) -> bool:
-    """Whether the load of the corners oscillates with growing amplitude unless impacts damp it."""
+    """Whether the loads of the corners oscillate with growing amplitude unless impacts damp the oscillation."""
     assert isinstance(scene.body, Box)
     upright = int(np.argmax(np.abs(unrotate(np.array(scene.start.orientation), UP))))
     first, second = (axis for axis in range(3) if axis != upright)

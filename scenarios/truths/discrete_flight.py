@@ -1,9 +1,9 @@
-"""Free flight as Algorithm 1 must compute it, to the last digits: the exact solution of the difference equations of semi-implicit Euler.
+"""Free flight as computed by Algorithm 1 without rounding: the exact solution of the difference equations of semi-implicit Euler.
 
     v_n = v₀ + n h g,   x_n = x₀ + n h v₀ + h² g n (n + 1)/2
-    ω_n = ω₀,           q_n: turned by n θ about ω₀, with θ = 2 atan(|ω| h/2) by eq 6, or |ω| h by an exact rotation
+    ω_n = ω₀,           q_n: rotated by n θ about ω₀, with θ = 2 atan(|ω| h/2) by eq 6, or |ω| h by an exact rotation
 
-x is g h t/2 ahead of the parabola; the relative lag of the angle is (ω h)²/12. The predicted errors of engines in flight follow from this.
+x is g h t/2 ahead of the parabola; the relative lag of the angle is (ω h)²/12. From this follow the predicted errors of engines in flight.
 
 Source: H. Wang, Rigid Body Dynamics, eq 1 and 6; arithmetic and geometric sums.
 Valid for: no floor, no damping; eq 6 for any body, because it omits the gyroscopic term; exact rotation where ω is constant.

@@ -1,6 +1,6 @@
 """Jacobi's elliptic functions of the complementary parameter, accurate up to the separatrix.
 
-Taking m₁ = 1 - k² as the argument, instead of computing it from k, keeps all digits of a motion near an unstable axis.
+With m₁ = 1 - k² as the argument, instead of k, all digits of a motion near an unstable axis are kept.
 """
 
 import math
@@ -16,7 +16,7 @@ CONVERGED = 1e-8  # each arithmetic-geometric mean squares the error, so one mor
 
 
 class Jacobi(NamedTuple):
-    """sn, cn and dn at some arguments."""
+    """The values of sn, cn and dn."""
 
     sn: Array
     cn: Array
@@ -26,8 +26,8 @@ class Jacobi(NamedTuple):
 def jacobi(u: Array, m1: float | Array) -> Jacobi:
     """sn, cn and dn of u for the complementary parameter m₁ = 1 - k²: one number in [0, 1], or one in (0, 1] for each u.
 
-    Gauss's transformation is applied to cn/sn, not to the amplitude, which would lose half the digits where sn is near 1: nearly everywhere
-    on a motion near the separatrix.
+    Gauss's transformation is applied to cn/sn, not to the amplitude, which would lose half the digits where sn is near 1, which is nearly
+    everywhere in a motion near the separatrix.
 
     Source: R. Bulirsch, Numerische Mathematik 7 (1965), 78-90, procedure sncndn.
     """
@@ -74,7 +74,7 @@ def argument(sn: float, cn: float, m1: float) -> float:
 def integral_of_sn2(u: Array, at_u: Jacobi, n: float, m1: float) -> Array:
     """The integral of sn² / (1 - n sn²) from 0 to u, for n <= 0: (Π(n; u) - u) / n, without the cancellation.
 
-    On the separatrix it is the elementary integral of tanh² / (1 - n tanh²), which grows without end.
+    On the separatrix it is the elementary integral of tanh² / (1 - n tanh²), which grows without bound.
 
     Source: B. C. Carlson, DLMF 19.25.14: Π(n; φ, k) = F + n/3 sin³φ R_J(cos²φ, 1 - k² sin²φ, 1, 1 - n sin²φ).
     """

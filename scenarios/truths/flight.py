@@ -7,12 +7,12 @@ Without damping:
 With decay rates k of velocity and κ of angular velocity (v' = g - k v, (I ω)' = -κ I ω), φ₁(z) = (1 - e⁻ᶻ)/z, φ₂(z) = (z - 1 + e⁻ᶻ)/z²:
 
     x(t) = x₀ + v₀ t φ₁(kt) + g t² φ₂(kt),   v(t) = v₀ e⁻ᵏᵗ + g t φ₁(kt)
-    ω(t) = e^(-κt) Ω(s),  attitude of the free rotor Ω at the time s = t φ₁(κt)
+    ω(t) = e^(-κt) Ω(s),  orientation of the free rotor Ω at the time s = t φ₁(κt)
 
-because the substitution of the time s turns the damped Euler equations into the free ones.
+because with the time s, the damped Euler equations become the free ones.
 
 Source: Galileo (1638), Discorsi, fourth day, for the parabola; J. Bernoulli (1719) for a resistance proportional to speed; `free_rotor`
-for the attitude.
+for the orientation.
 Valid for: any body without floor, or, undamped, between two impacts.
 """
 
@@ -51,7 +51,7 @@ class Flight:
 
     @property
     def horizon(self) -> float:
-        """Time up to which one ulp of the start leaves the motion determined [s]."""
+        """Time up to which a difference of one ulp in the initial state does not change the motion noticeably [s]."""
         kappa, until = self.damping.angular, self.rotor.horizon
         if kappa == 0.0:
             return until
@@ -86,7 +86,7 @@ def flight(scene: Scenario) -> Truth | None:
     parabola = "" if scene.gravity is None else "x = x0 + v0 t + g t²/2; "
     if not states.rotor.is_steady:
         name = "free-rotor"
-        turning = "Jacobi's elliptic functions for rates and attitude (Landau & Lifshitz, section 37; Whittaker, section 69)"
+        turning = "Jacobi's elliptic functions for rates and orientation (Landau & Lifshitz, section 37; Whittaker, section 69)"
     else:
         spins = states.rotor.largest_spin > 0.0
         name = "principal-spin" if spins else "parabola"

@@ -1,14 +1,14 @@
-"""A rigid body without torque: its angular velocity and its attitude in closed form.
+"""A rigid body without torque: its angular velocity and its orientation in closed form.
 
     ω = (A_a cn, ± A_b sn, ± A_c dn)(u) along the body's principal axes a, b, c,   u = rate t + u₀
     R(t) = R₀ B₀ R_z(φ(t)) B(t)ᵀ
 
-b is the intermediate axis, c the one that the angular momentum L circles. B is a triad in the body with L along its third axis and another
-axis perpendicular to a body axis p; in space it only turns about L, by φ, with
+b is the intermediate axis, and c is the axis about which the angular momentum L moves in the body frame. B is a triad in the body whose
+third axis is along L and one of whose other axes is perpendicular to a body axis p. In space, the triad only rotates about L, by φ, with
 
     dφ/dt = L (m_a²/I_a + m_b²/I_b) / (m_a² + m_b²)      (for p = c; m_i = I_i ω_i)
 
-Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; the attitude as E. T. Whittaker, Analytical Dynamics, section 69,
+Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; the orientation as E. T. Whittaker, Analytical Dynamics, section 69,
 with Carlson's integrals for the theta functions.
 Valid for: any inertia and angular velocity; a spin about a principal axis is constant.
 """
@@ -29,7 +29,9 @@ from scenarios.truths.rotor_horizon import ULP, horizon, spin_rounding
 
 Array = NDArray[np.float64]
 SMALLEST_M1 = 1e-290
-"""Below it the squares of the elliptic functions underflow; then a body takes more than 300 e-foldings to turn over."""
+"""Smallest value for which the squares of the elliptic functions do not underflow; below it, a body turns over only after more than 300
+e-foldings.
+"""
 
 Exact = NDArray[Any]
 """An array of exact rationals."""
@@ -39,11 +41,11 @@ Rotor = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True, eq=False)
 class FreeRotor:
-    """The motion of a free body; call it with times.
+    """The motion of a free body, as a function of time.
 
     Attributes:
-        motion: Its attitude and angular velocity at times.
-        largest_spin: The largest |ω| [rad/s].
+        motion: Function of times that returns orientations and angular velocities.
+        largest_spin: The largest magnitude of ω [rad/s].
         is_steady: Whether ω is constant.
         horizon: Time up to which one ulp of the start leaves the motion determined [s]: `rotor_horizon`.
     """
@@ -59,14 +61,14 @@ class FreeRotor:
 
 
 def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> FreeRotor:
-    """The motion of a free body from its start.
+    """The motion of a free body from its initial state.
 
-    The numbers given are taken as exact: a spin that is 1e-16 off an unstable axis turns over in time.
+    The given numbers are taken as exact, so that a body whose ω is 1e-16 off an unstable axis turns over after some time.
 
     Args:
-        inertia: In the body frame [kg m²], shape (3, 3).
-        orientation: At t = 0, shape (4,).
-        angular_velocity: At t = 0, world frame [rad/s], shape (3,).
+        inertia: Inertia tensor in the body frame [kg m²], shape (3, 3).
+        orientation: Initial orientation, shape (4,).
+        angular_velocity: Initial angular velocity in the world frame [rad/s], shape (3,).
     """
     heaviest, fastest = _power_of_two(inertia), _power_of_two(angular_velocity)
     inertia, unit_spin = inertia / heaviest, angular_velocity / fastest  # so that no product leaves the range of doubles

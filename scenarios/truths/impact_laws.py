@@ -1,4 +1,4 @@
-"""The velocities after one impulse at one point of a body, by each impact law.
+"""The velocities of a body after one impulse at one of its points, for each impact law.
 
 With u = v + ω × r the velocity of the point, K = 1/M - r* I⁻¹ r* (eq 15 of Wang's lecture note), e the restitution and f the friction:
 
@@ -8,7 +8,7 @@ With u = v + ω × r the velocity of the point, K = 1/M - r* I⁻¹ r* (eq 15 of
     clamped    normal without friction; with infinite friction eq 17 with the largest restitution up to e that adds no energy
     coulomb    eq 17 while it stays within the cone of f, else j = j_n (N - f t), t along u's tangential part
 
-An edge or a face whose points have one velocity acts as one point at its middle.
+An edge or a face whose points have equal velocities acts as one point at its middle.
 
 Source: H. Wang, Rigid Body Dynamics, eq 15 and 17; E. T. Whittaker, Analytical Dynamics, section 95; S. D. Poisson, Traité de mécanique
 (1833); A. Chatterjee & A. Ruina, J. Applied Mechanics 65 (1998); C. A. de Coulomb (1785), E. J. Routh, Elementary Rigid Dynamics (1905).
@@ -31,7 +31,7 @@ LAWS: tuple[Law, ...] = get_args(Law)
 
 
 def law_of(floor: Floor) -> Law:
-    """The law of the exact solution on a floor: the normal impulse without friction, eq 17 with infinite friction, else Coulomb's law."""
+    """The impact law of the exact solution: the normal impulse without friction, eq 17 with infinite friction, else Coulomb's law."""
     return {"none": "normal", "infinite": "note"}.get(str(floor.friction), "coulomb")  # type: ignore[return-value]
 
 

@@ -2,14 +2,14 @@
 
 ψ is the angle at the pivot between the vertical and the centre of mass, R their distance, k = I/(M R²):
 
-    ψ'' = p² sin ψ,   p² = g / ((1 + k) R)               an inverted pendulum
+    ψ'' = p² sin ψ,   p² = g / ((1 + k) R)               (an inverted pendulum)
     sin(ψ/2) = √s nd(u),   ψ' = 2p √s √(1-s) sd(u)       u = p (t - T); at rest at the time T with sin²(ψ/2) = s; modulus² = 1 - s
 
-It lands at tan α = a/h, with a the half width of the face it lands on and h the half height of the box above it, and continues about the
-other edge of that face. For the rockings n = 0, 1, …:
+The box lands at tan α = a/h, where a is the half width of the face on which it lands and h the half height above that face, and continues
+about the other edge of that face. For the rockings n = 0, 1, …:
 
-    ω⁺/ω⁻ = r = (k R² + h² - a²) / ((1 + k) R²)          conservation of angular momentum about the new pivot
-    sin²(α/2) - s_n = r²ⁿ (sin²(α/2) - s_0)              from one rocking to the next
+    ω⁺/ω⁻ = r = (k R² + h² - a²) / ((1 + k) R²)          (conservation of angular momentum about the new pivot)
+    sin²(α/2) - s_n = r²ⁿ (sin²(α/2) - s_0)              (from one rocking motion to the next)
 
 For r <= 0 the box stops at the first landing. The landings accumulate like the impacts of a bouncing ball; then the box lies still.
 
@@ -38,11 +38,11 @@ Array = NDArray[np.float64]
 PENDULUM = "inverted pendulum by Jacobi's elliptic functions (Whittaker, section 44)"
 MAX_ROCKINGS = 100_000
 MIN_ENERGY_SHARE = 1e-24
-"""Energy of a rocking over that of the first, below which the box counts as at rest, as in the bounce ladder."""
+"""Energy of a rocking motion relative to the first one, below which the box counts as resting, as in the bounce ladder."""
 
 
 class _Ladder(NamedTuple):
-    """The successive rockings: time of rest [s], sin²(ψ/2) at rest, and time of landing [s]; shapes (n,)."""
+    """The successive rocking motions: time of rest [s], sin²(ψ/2) at rest, and time of landing [s]; shapes (n,)."""
 
     rests: Array
     levels: Array
@@ -87,7 +87,7 @@ def _pivots(scene: Scenario, stand: Stand) -> bool:
 
 
 def _rate(stand: Stand) -> float:
-    """The pendulum's p [1/s]."""
+    """The parameter p of the pendulum [1/s]."""
     return math.sqrt(stand.gravity / ((1.0 + stand.share) * stand.radius))
 
 
@@ -98,7 +98,7 @@ def _ratio(stand: Stand) -> float:
 
 
 def _ladder(stand: Stand, duration: float) -> _Ladder | None:
-    """All rockings until the scene ends or the box lies still; None if it passes the top, lifts off, or lands too often."""
+    """All rocking motions until the scene ends or the box lies still; None if the box passes the top, lifts off, or lands too often."""
     at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.flat) ** 2
     risen = (0.5 * stand.speed / _rate(stand)) ** 2
     level = at_start - risen
@@ -121,7 +121,7 @@ def _ladder(stand: Stand, duration: float) -> _Ladder | None:
 
 
 def _would_lift_off(stand: Stand, level: float) -> bool:
-    """Whether the normal force would be negative at some angle of the first rocking, the widest."""
+    """Whether the normal force would be negative at some angle of the first rocking motion, which is the widest."""
     at_rest = 1.0 - 2.0 * level
     cosine = min(max(at_rest / 3.0, math.cos(stand.flat)), at_rest)
     return stand.share + 3.0 * cosine**2 - 2.0 * cosine * at_rest < 0.0

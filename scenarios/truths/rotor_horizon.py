@@ -1,12 +1,14 @@
-"""How long one ulp of the start leaves a free rotation determined: growth near the unstable motion about the intermediate axis.
+"""The horizon of a free rotation near the unstable rotation about the intermediate axis.
+
+The horizon is the time up to which the initial state, known to one ulp, determines the motion.
 
 With a < b < c or a > b > c the principal axes, P = |I_c (I_c - I_b)| and Q = |I_a (I_b - I_a)|, the separatrix is
 
     S = L² - 2 T I_b = ± (√P ω_c - √Q ω_a) (√P ω_c + √Q ω_a) = 0
 
 near which one factor grows as e^(λt), λ² = (I_c - I_b) (I_b - I_a) ω_b²/(I_a I_c). An error δ of a factor, over its largest value F,
-becomes δ/F (e^(λt) - 1) rad of the attitude; a relative error κ of the moments, which leaves the state as it is, κ (cosh λt - 1). Where
-these errors change S by a share of `TOLERANCE` at most, they only shift when the body turns over, by that share.
+becomes δ/F (e^(λt) - 1) rad of the orientation; a relative error κ of the moments, which does not change the initial state, becomes κ (cosh
+λt - 1). If these errors change S by at most the share `TOLERANCE`, they only change the time at which the body turns over, by that share.
 
 Source: linearised Euler equations, L. D. Landau & E. M. Lifshitz, Mechanics, section 37.
 """
@@ -20,13 +22,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9
-"""Error of the attitude over the angle turned that one ulp of the start may cause, before the solution counts as undetermined."""
+"""Largest error of the orientation, relative to the angle turned, that one ulp of the initial state may cause before the solution counts as
+undetermined.
+"""
 
 ULP = 2.0**-52
 
 
 def spin_rounding(orientation: Array, angular_velocity: Array) -> Array:
-    """How far one ulp of a start's numbers changes its spin along the body axes [rad/s], shape (3,); 0 where all terms are 0."""
+    """The change of ω along the body axes by one ulp of the initial state [rad/s], shape (3,); 0 where all terms are 0."""
     x, y, z, w = np.abs(orientation)
     off = 2.0 * np.array([[0.0, x * y + z * w, x * z + y * w], [x * y + z * w, 0.0, y * z + x * w], [x * z + y * w, y * z + x * w, 0.0]])
     rounding: Array = ULP * (np.eye(3) + off) @ np.abs(angular_velocity)
@@ -34,12 +38,12 @@ def spin_rounding(orientation: Array, angular_velocity: Array) -> Array:
 
 
 def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Array) -> float:
-    """Time [s] up to which one ulp of a start changes the attitude by at most `TOLERANCE` of the angle turned; often infinite.
+    """Time [s] up to which one ulp of the initial state changes the orientation by at most `TOLERANCE` times the angle turned.
 
     Args:
         moments: Principal moments [kg m²], the intermediate one second.
         spin: Along their axes, at the start [rad/s].
-        rounding: Of the spin [rad/s], shape (3,).
+        rounding: Rounding error of the spin [rad/s], shape (3,).
     """
     Ia, Ib, Ic = map(Fraction, moments)
     P, Q = math.sqrt(abs(Ic * (Ic - Ib))), math.sqrt(abs(Ia * (Ib - Ia)))

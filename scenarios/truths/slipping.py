@@ -1,4 +1,4 @@
-"""A box that stands on an edge falls over on a frictionless floor: the edge slips and the centre of mass falls straight down.
+"""A box that stands on an edge falls over on a frictionless floor: the edge slips and the centre of mass falls vertically.
 
 ψ is the angle at the edge between the vertical and the centre of mass, R their distance, k = I/(M R²). Energy is conserved:
 
@@ -11,7 +11,7 @@ With sin(ψ/2) = √s cosh u, s = sin²(ψ_rest/2), the time since rest is the i
 which is not an elliptic integral. It is integrated as a Chebyshev series and inverted by Newton's method.
 
 Source: the integrals of energy and of horizontal momentum; C. W. Clenshaw & A. R. Curtis, Numerische Mathematik 2 (1960), for the time.
-Valid for: a box that stands on one edge, with any horizontal velocity, at rest or turning about the edge too slowly to pass the top; a
+Valid for: a box that stands on one edge, with any horizontal velocity, at rest or rotating about the edge too slowly to pass the top; a
 frictionless floor; gravity straight down, no damping; until the box lands. The normal force is never negative.
 """
 

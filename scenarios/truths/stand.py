@@ -14,7 +14,7 @@ from scenarios.state import ORIENTATION, POSITION, SPIN, UP
 Array = NDArray[np.float64]
 
 MIN_LEVEL = 1e-15
-"""Least sin²(ψ/2) at rest; below it rounding decides when the box falls, and to which side."""
+"""Smallest sin²(ψ/2) at rest; below it, rounding determines when the box falls, and to which side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Stand:
 
     @property
     def to_centre(self) -> Array:
-        """From the pivot to the centre of mass, at the start [m], shape (3,)."""
+        """The initial vector from the pivot to the centre of mass [m], shape (3,)."""
         return self.radius * (math.sin(self.angle) * self.outward + math.cos(self.angle) * UP)
 
     @property

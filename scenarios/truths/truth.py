@@ -10,7 +10,7 @@ from scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 States = Callable[[Array], Array]
-"""Times [s], shape (n,), to states, shape (n, 13)."""
+"""A function from times [s], shape (n,), to states, shape (n, 13)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Truth:
     """The exact motion of a scene.
 
     Attributes:
-        name: Short name, as in the column `truth` of the results.
+        name: Short name, which is also in the column `truth` of the results.
         statement: The formula and its source, one sentence.
         states: Function of times, shape (n,), that returns states, shape (n, 13).
         events: The impacts within the scene's duration, in order.
@@ -47,7 +47,7 @@ class Truth:
     horizon: float = float("inf")
 
     def covers(self, t: Array) -> NDArray[np.bool_]:
-        """Mask of the times [s] up to the horizon, with a margin because the last of n dt may round past it."""
+        """Mask of the times [s] up to the horizon, with a margin, because rounding of n dt may exceed the horizon."""
         return t <= self.horizon * (1.0 + 1e-9)
 
     def covers_all(self, duration: float) -> bool:
@@ -55,7 +55,7 @@ class Truth:
         return bool(self.covers(np.array([duration]))[0])
 
     def after(self, delay: float) -> "Truth":
-        """The motion from a time `delay` [s] on, which must not be after the first impact."""
+        """The motion that starts at the time `delay` [s], which must not be after the first impact."""
         later = tuple(replace(event, time=event.time - delay) for event in self.events)
         return replace(self, states=lambda t: self.states(t + delay), events=later, horizon=self.horizon - delay)
 

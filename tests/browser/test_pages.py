@@ -58,7 +58,7 @@ def folder(results, tmp_path_factory):
         "a-picture", [Chart("cost [s]", "error", [Line("<img src=x onerror=alert(1)>", np.array([1.0, 2.0]), np.array([3.0, 4.0]))])]
     )
     # Two studies of one scene have pictures of the same name.
-    sections = [study, Section("Where engines break", study.parts)]
+    sections = [study, Section("Where engines break down", study.parts)]
     made = ds.write_report(results, tmp_path_factory.mktemp("out") / "run", sections).parent
     assert dropspin("replay", made, "--no-open", cwd=made.parent).returncode == 0
     return made

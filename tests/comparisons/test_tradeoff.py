@@ -130,7 +130,7 @@ def test_errors_fall_by_their_order(spin):
 
 def test_engine_that_does_not_converge_is_left_out(spin):
     """Wang's method has no gyroscopic term: it converges to another motion."""
-    assert spin.left_out["document"].startswith("no convergence is seen: orientation error is 1.")
+    assert spin.left_out["document"].startswith("no convergence observed: orientation error is 1.")
     [ladder] = [one for one in spin.ladders if one.engine == "document"]
     coarsest, finest = (f"{1e3 * dt:.4g} ms" for dt, _ in (ladder.steps[0], ladder.steps[-1]))
     assert spin.left_out["document"].endswith(f"at the {len(ladder.steps)} time steps tried, {coarsest} to {finest}")
@@ -142,7 +142,7 @@ def test_engine_that_conserves_the_energy_of_a_wrong_motion_is_left_out():
     """Wang's method keeps the energy of a spin that it gets wrong; midpoint keeps that of the right one."""
     short = SPIN.model_copy(update={"duration": 10.0})
     found = tradeoff(short, ["document", "document[rotation=midpoint]", "document[rotation=rk4]"], metric="energy_error")
-    assert "no convergence is seen: orientation error" in found.left_out["document"]
+    assert "no convergence observed: orientation error" in found.left_out["document"]
     of = {name: [point.error for point in found.points if name in point.engine] for name in ("midpoint", "rk4")}
     assert max(of["midpoint"]) < 1e-11  # measured 1e-13, at steps of a radian too
     assert of["rk4"][0] > 1e-4
@@ -234,7 +234,7 @@ def test_every_engine_that_was_asked_for_has_a_ladder_with_the_reason_of_its_end
 def test_ladder_that_ends_at_the_longest_run_says_so(monkeypatch):
     monkeypatch.setattr(errors, "MOST_STEPS", 60)
     [ladder] = tradeoff(SHORT, ["mujoco"]).ladders
-    assert (ladder.ended, ladder.reason) == ("longest_run", "a run of the next smaller step would have more than 60 steps")
+    assert (ladder.ended, ladder.reason) == ("longest_run", "a run at the next smaller time step would have more than 60 steps")
     assert 60 / 1.5 <= SHORT.steps(ladder.steps[-1][0]) <= 60
 
 

@@ -167,7 +167,7 @@ def quoted_constants():
 
     ladder = [
         f"exceeds `--budget` ({errors.BUDGET:g} s)",
-        f"with a floor {errors.MOST_RECORDED:,}",
+        f"with a floor, {errors.MOST_RECORDED:,}",
         f"above {errors.CONVERGED:g} of its largest",
     ]
     cost = [f"the median of {study.ROUNDS} rounds", f"less than a factor of {points.LEVEL:g}", f"in a batch of {costs.BATCH}"]

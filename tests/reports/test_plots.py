@@ -190,7 +190,7 @@ def test_plots_name_a_valid_choice_when_they_cannot_draw():
     with pytest.raises(ds.DropspinError, match=r"is unknown\. Did you mean 'energy_error'"):
         plots.plot_error_growth(results, "drop-ball", "energy_eror", axes_of())
     with pytest.raises(
-        ds.DropspinError, match=r"drop-ball starts without spin: its polhode is a point; choose a scene with start\.angular_velocity\."
+        ds.DropspinError, match=r"drop-ball has no initial angular velocity, so it has no polhode; set start\.angular_velocity\."
     ):
         plots.plot_polhode(results, "drop-ball", axes_of())
     spin = ds.load("spin-principal")

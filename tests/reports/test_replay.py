@@ -50,7 +50,7 @@ def test_last_motion_is_the_exact_solution_at_the_frames(results):
 
 
 def test_interpolation_between_frames_follows_the_angular_velocity():
-    """500 rad/s, 18 rad between frames: a quarter of an interval after a frame the attitude is that of the closed form."""
+    """500 rad/s, 18 rad between frames: a quarter of an interval after a frame the orientation is that of the closed form."""
     scene = ds.load("spin-principal-500")
     results = ds.run(scene, "mujoco", dt=4e-3)
     replay = replay_of(results, scene.name)
@@ -214,11 +214,11 @@ def test_gif_is_four_times_slower_than_real_time_by_default():
     [
         (["no-such-scene"], "this run has no scene 'no-such-scene'; choose one of drop-box-corner, spin-asymmetric, drop-ball."),
         (["drop-ball", "--dt", "0.5"], "drop-ball was not run at 0.5 s; choose one of 0.004, 0.002 s."),
-        (["drop-ball", "--gif", "clip.avi"], "--gif clip.avi: give the file the ending .gif"),
+        (["drop-ball", "--gif", "clip.avi"], "--gif clip.avi: the file name must end in .gif"),
         (["drop-ball", "--gif", "clip.gif", "--speed", "nan"], "more than 5,000 frames; choose a speed of at least 0.0075."),
         (["drop-ball", "--gif", "clip.gif", "--speed", "1e-9"], "a GIF at a speed of 1e-09 has more than 5,000 frames"),
         (["drop-ball", "--gif", "/dev/null/clip.gif"], "/dev/null/clip.gif: cannot be written: File exists; choose another file."),
-        (["drop-ball", "--gif", "clip.gif", "-o", "page.html"], "-o page.html is for the page"),
+        (["drop-ball", "--gif", "clip.gif", "-o", "page.html"], "-o page.html names the page"),
         (["--gif", "clip.gif"], "name it: drop-box-corner"),
         (["drop-ball", "--dt", "-1"], "--dt"),
     ],
@@ -234,7 +234,7 @@ def assert_refused(done, message):
 
 
 def test_gif_file_name_must_end_in_gif(results, tmp_path):
-    with pytest.raises(DropspinError, match=r"clip\.mp4: an animation is written as GIF; give the file the ending \.gif\."):
+    with pytest.raises(DropspinError, match=r"clip\.mp4: an animation is written as GIF; the file name must end in \.gif\."):
         write_clip(replay_of(results, "drop-ball"), tmp_path / "clip.mp4", 1.0)
 
 
@@ -294,4 +294,4 @@ def test_damaged_run_is_refused(folder, tmp_path, damage):
 )
 def test_damaged_study_is_refused(folder, tmp_path, content):
     (tmp_path / "section.json").write_text(content)
-    assert_refused(dropspin("report", folder, "--add", tmp_path, cwd=tmp_path), "has no study, or a damaged one")
+    assert_refused(dropspin("report", folder, "--add", tmp_path, cwd=tmp_path), "has no study, or a damaged one (section.json: ")

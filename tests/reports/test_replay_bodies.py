@@ -34,7 +34,7 @@ def test_faces_of_a_body_enclose_its_volume(name):
 
 
 def test_plane_body_is_one_face():
-    """A square of points in a general attitude: one face of four corners, in order."""
+    """A square of points in a general orientation: one face of four corners, in order."""
     corners = np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
     points = rotate(np.array([0.1, 0.2, 0.3, 0.4]) / np.sqrt(0.3), corners)
     shape = outline(ds.load({"duration": 1.0, "body": {"shape": "vertices", "points": points.tolist(), "mass": 1.0}}).body)

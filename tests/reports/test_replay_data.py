@@ -41,7 +41,7 @@ def shown(motion, interval):
 
 
 def test_frames_are_stored_states_to_a_fraction_of_a_pixel(results):
-    """At a fixed stride and around impacts: coordinates to 1e-3 of the size of the body, attitudes to 9e-5 rad, errors to 0.4 %."""
+    """At a fixed stride and around impacts: coordinates to 1e-3 of the size of the body, orientations to 9e-5 rad, errors to 0.4 %."""
     for name, scene in results.scenes.items():
         replay = replay_of(results, name)
         data = as_data(replay)

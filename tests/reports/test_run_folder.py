@@ -244,7 +244,7 @@ def test_files_that_no_run_wrote_are_never_deleted(small, tmp_path, monkeypatch)
     write_report(small, run)
     assert run.stat().st_mode & 0o777 == 0o700
     monkeypatch.chdir(run)
-    with pytest.raises(DropspinError, match="the working directory, or a mount point"):
+    with pytest.raises(DropspinError, match="the working directory and mount points"):
         write_report(small, ".")
     assert (keep / "run.json").read_text() == "{}"
     assert (tmp_path / "thesis.txt").read_text() == "x"
@@ -309,7 +309,7 @@ def studied():
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
     """Orders in a column of their own, with window and limit; model errors named above and on a chip."""
     _, text = studied
-    assert "converges in 0 of 1 scene; known model error in 1 (largest: orientation 2.67 rad, spin-asymmetric); " in text
+    assert "converges in 0 of 1 scene; known model error in 1 (largest: orientation 2.67 rad in spin-asymmetric); " in text
     assert "mujoco: converges in 1 of 1 scene; " in text
     assert len(re.findall(r'<span class="status known">≠<span class="words"> known model error</span></span>', text)) == 1
     assert len(re.findall(r">order 1\.0[012]</td>", text)) >= 4
@@ -332,7 +332,7 @@ def test_two_time_steps_give_no_asymptotic_errors():
     found = run("spin-asymmetric", "mujoco", [8e-3, 4e-3])
     assert not found.table["kind"].isin(["order", "asymptotic_error"]).any()
     [sentence] = overview(found).findings
-    assert sentence.startswith("mujoco: 1 scene measured, no asymptotic errors; they take three time steps that span a factor of four; ")
+    assert sentence.startswith("mujoco: 1 scene measured, no asymptotic errors; these need three time steps that span a factor of four; ")
 
 
 def test_an_empty_folder_is_not_a_run(tmp_path):

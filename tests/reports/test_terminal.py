@@ -106,14 +106,14 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     assert [len(some) for some in of.values()] == [1, 1, 1]
     known = core.table[(core.table["verdict"] == "known") & (core.table["unit"] == "rad")]
     row = known.loc[known["value"].abs().idxmax()]
-    assert f"(largest: {row['metric'].split('_')[0]} {row['value']:.3g} rad, {row['scene']})" in of["document"][0]
+    assert f"(largest: {row['metric'].split('_')[0]} {row['value']:.3g} rad in {row['scene']})" in of["document"][0]
     for engine in core.engines:
         words = [by_engine[engine].words for by_engine in core.statuses().values()]
         studied = len(words) - words.count("declined")
         assert f"converges in {words.count('converges')} of {studied} scenes" in of[engine][0]
         for status in set(words) - {"converges", "declined"}:
             assert f"{status} in {words.count(status)}" in of[engine][0]
-    assert of["document"][0].endswith(" ns, the least.")
+    assert of["document"][0].endswith(" ns, the shortest.")
     assert all(of[engine][0].endswith(" times as long.") for engine in ("mujoco", "pybullet"))
 
 
@@ -126,7 +126,7 @@ def test_piped_list_has_one_line_for_each_scene(tmp_path):
 def test_narrow_terminal_leaves_out_columns_and_names_them(tmp_path):
     text = dropspin("list", cwd=tmp_path, **TERMINAL).stdout
     assert max(map(len, text.splitlines())) <= 80
-    assert "Not shown at this width: tags; shown on a wider terminal or with --json." in text
+    assert "Columns not shown at this width: tags; use a wider terminal or --json." in text
     wide = dropspin("list", cwd=tmp_path, FORCE_COLOR="1", NO_COLOR="1", COLUMNS="200").stdout
     assert "tags" in wide
     assert "Not shown" not in wide
@@ -148,4 +148,4 @@ def test_table_keeps_numbers_whole(capsys, monkeypatch):
     assert {"3.05e+00", "1.23e+04"} <= set(text.split())
     assert "49.1 ns" in text
     assert "9.87e-05" not in text
-    assert "Not shown at this width: least wanted; " in text
+    assert "Columns not shown at this width: least wanted; " in text

@@ -71,11 +71,11 @@ def test_full_inertia_tensors_are_drawn_with_a_floor_and_without():
 @pytest.mark.parametrize(
     ("count", "seed", "message"),
     [
-        (0, 1, "count: got 0; it is a whole number from 1 to 1000"),
+        (0, 1, "count: got 0; give a whole number from 1 to 1000"),
         (1001, 1, "count: got 1001"),
         (2.0, 1, "count: got 2.0"),
         (True, 1, "count: got True"),
-        (1, -1, "seed: got -1; it is a whole number from 0 to 18446744073709551615"),
+        (1, -1, "seed: got -1; give a whole number from 0 to 18446744073709551615"),
         (1, 2**64, "seed: got 18446744073709551616"),
     ],
 )

@@ -41,7 +41,7 @@ def test_unreadable_files_are_rejected(tmp_path):
     huge = tmp_path / "huge.toml"
     with huge.open("wb") as file:
         file.truncate(100_000_000)
-    with pytest.raises(SceneError, match=r"huge\.toml: more than 1,000,000 bytes; no scene is that long"):
+    with pytest.raises(SceneError, match=r"huge\.toml: larger than 1,000,000 bytes, the limit for a scene"):
         load(huge)
     deep = tmp_path / "deep.toml"
     deep.write_text("a = " + "[" * 5000 + "]" * 5000)
@@ -109,7 +109,7 @@ def test_mapping_may_have_a_name():
         ({"body": BALL["body"] | {"mass": -1}}, "scene['body']['mass']: got -1; must be greater than 0."),
         (
             {"floor": {"restitution": 0.5, "friction": "none"}},
-            "scene['start']['position']: got [0.0, 0.0, 0.0]; there the body is 0.1 m below the floor; raise it.",
+            "scene['start']['position']: got [0.0, 0.0, 0.0]; there the body is 0.1 m below the floor; increase its height.",
         ),
         ({"gravity": {"acceleration": -9.8}}, "scene['gravity']['acceleration']: got -9.8; must be a list."),
         ({"body": {"shape": "ball"}}, "scene['body']['shape']: got 'ball'; must be one of 'sphere', 'box', 'vertices'."),

@@ -288,7 +288,7 @@ HEAD = ["family", "time steps", "series", "covered", "of those decided", "unreso
 TABLES = {
     "Asymptotic errors from a thousandth of the leading term": ((*FAMILIES, *OTHERS), SMALL),
     "Asymptotic errors from a tenth of the leading term": ((*FAMILIES, *OTHERS), COMPARABLE),
-    "Families that no constant was chosen by, at steps that do not halve": (tuple(HELD_OUT), COMPARABLE),
+    "Held-out families, at time steps that are not halved": (tuple(HELD_OUT), COMPARABLE),
 }
 
 

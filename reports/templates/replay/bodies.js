@@ -1,4 +1,4 @@
-  // --- bodies: filled or as outlines; a mark and axes show their attitude ---
+  // --- bodies: filled or as outlines; a mark and axes show their orientation ---
   const LIGHT = unit([0.35, 0.85, 0.4]);
   const SPOT = unit([1, 1, 2]);    // of a sphere, in its own frame
   const SPOT_SIZE = 0.2;           // rad on a sphere, and relative to the distance from the middle of a face to its corner

@@ -47,7 +47,7 @@
       const { motions, exact, hasFloor, scene } = viewer, group = `filled-${viewer.home.dataset.replay}`;
       this.viewer = viewer;
       this.rows = motions.map((motion) => this.row(motion, group));
-      const heads = ["body (chosen: filled)", "shown", "height [m]", ...(exact ? ["position error [m]", "attitude error [rad]"] : []),
+      const heads = ["body (chosen: filled)", "shown", "height [m]", ...(exact ? ["position error [m]", "orientation error [rad]"] : []),
         ...(hasFloor ? [`largest impulse in ${HELD} s [N s]`] : [])];
       const table = made("table", {}, made("thead", {}, made("tr", {}, ...heads.map((text) => made("th", { scope: "col" }, text)))),
         made("tbody", {}, ...this.rows.map((row) => row.element)));

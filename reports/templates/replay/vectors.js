@@ -13,7 +13,7 @@
   };
   const multiply = (a, b) => [...plus(plus(times(b, a[3]), a, b[3]), cross(a, b)), a[3] * b[3] - dot(a, b)];
   const about = (axis, angle) => [...times(axis, Math.sin(angle / 2)), Math.cos(angle / 2)];
-  // From one attitude to another: the shorter rotation, or a fraction of it and of the whole turns beyond it.
+  // From one orientation to another: the shorter rotation, or a fraction of it and of the whole turns beyond it.
   const turned = (a, b, share, turns) => {
     const q = multiply(b, [-a[0], -a[1], -a[2], a[3]]), v = q[3] < 0 ? times(q, -1) : q.slice(0, 3);
     const angle = 2 * Math.atan2(size(v), Math.abs(q[3]));

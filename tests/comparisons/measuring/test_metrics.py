@@ -82,7 +82,7 @@ def test_planted_attitude_error_has_its_components(turn):
 
 
 def test_planted_position_and_momentum_errors_have_their_components():
-    """One vector in the only flight of a spin, and one in each of two flights of a drop, at the end of its inner half."""
+    """One vector in the only flight of a spin, and one in each of two flights of a drop, at the end of its middle half."""
     _, motion = exact_motion("spin-asymmetric")
     aside = exact_motion("spin-asymmetric", position=motion.position + np.array([3e-9, 0, -4e-9]))[1]
     np.testing.assert_allclose(components("spin-asymmetric", "position_error", aside), [[3e-9, 0.0, -4e-9]], rtol=1e-6)

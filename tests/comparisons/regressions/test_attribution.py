@@ -45,7 +45,7 @@ def settings(version, solref):
             {"cpu": "B", "adapters": {"candidate": "b"}},
             [],
             "either",
-            "the code of candidate's adapter, processor A → B; the cause cannot be isolated, as no engine's results stayed the same",
+            "the code of candidate's adapter, processor A → B; the cause cannot be isolated, because the results of every engine changed",
         ),
         ({"settings": {}}, [], "absent", "it has no measurements in the later run: it broke down, declined, or is missing"),
     ],

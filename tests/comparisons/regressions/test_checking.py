@@ -141,7 +141,7 @@ def test_run_without_accepted_results_is_refused(accepted):
         check(elsewhere, accepted)
     assert str(error.value) == (
         f"none of the {len(accepted.results):,} accepted results is covered by this run's scenes, engines and time steps; "
-        "run what was accepted, or accept what was run."
+        "run the accepted scenes, engines and time steps, or accept this run."
     )
 
 

@@ -35,7 +35,7 @@ def test_history_finds_the_run_in_which_results_moved(before, release):
 
 
 def test_history_of_one_run_is_refused(before):
-    with pytest.raises(DropspinError, match=r"^a history needs two runs or more, got 1; give more, or a folder of runs\.$"):
+    with pytest.raises(DropspinError, match=r"^a history needs two or more runs, got 1; give more, or a folder of runs\.$"):
         history({"a": before})
 
 

@@ -206,7 +206,7 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"start.position[01]": [2.0]}}, "is not a valid field name"),
         ({"grid": {"dt": [float("inf")]}, "dts": []}, "got inf; a time step is a number above 0"),
         ({"grid": {"ensemble.turn": [0.5]}, "scenes": ["drop-box-anyhow"]}, "has an effect only with seeds"),
-        ({"scenes": ["x\0.toml"]}, "no file has such a name"),
+        ({"scenes": ["x\0.toml"]}, "this cannot be the name of a file"),
         ({"grid": {"floor.restitutoin": [0.5]}}, "Did you mean 'restitution'"),
         ({"grid": {"damping.linear": [0.5]}}, r"grid: damping.linear: scene 'drop-ball' has no \[damping\]"),
         ({"grid": {"flor.restitution": [0.5]}}, "grid: flor.restitution: no such field. Did you mean 'floor'"),

@@ -100,12 +100,12 @@ def test_a_crash_cannot_be_accepted(repository, tmp_path):
     done = dropspin("accept", "out/crashing", "--baseline", tmp_path / "b.toml", "--reason", "x", cwd=repository)
     assert done.returncode == 0
     assert "gone" not in done.stdout
-    assert "3 engine runs broke down; what was accepted of them before stays." in done.stdout
+    assert "3 engine runs broke down; results accepted earlier for them stay in the baseline." in done.stdout
     assert (tmp_path / "b.toml").read_text() == (repository / "dropspin-baseline.toml").read_text()
     dropspin("run", "drop-ball", "-e", ENGINE, "--dt", "0.01", "-o", tmp_path / "dead", cwd=repository, RELEASE="crashing")
     done = dropspin("accept", tmp_path / "dead", "--baseline", tmp_path / "none.toml", "--reason", "x", cwd=repository)
     assert done.returncode == 2
-    assert "there is nothing to accept, as no engine was measured; " in done.stderr
+    assert "there is nothing to accept, because no engine was measured; " in done.stderr
     assert not (tmp_path / "none.toml").exists()
 
 
@@ -166,7 +166,7 @@ def test_annotations_are_for_github(repository):
         (["check", "out/good", "--baseline", "out"], "out: is a directory; a baseline is one file"),
         (["check", "out/good", "--junit", "my_engine.py/x"], "my_engine.py"),
         (["accept", "out/good"], "Missing option '--reason'"),
-        (["accept", "out/good", "--reason", " "], "--reason is empty; say why these results are accepted."),
+        (["accept", "out/good", "--reason", " "], "--reason is empty; give the reason why these results are accepted."),
         (["accept", "out/good", "--reason", "a\nb"], "contains control characters or more than one line; give one line of text."),
         (["accept", "--reason", "x"], "Missing argument 'RUN...'"),
         (["accept", "out/good", "--reason", "x", "--baseline", "my_engine.py"], "my_engine.py: not TOML"),
@@ -174,7 +174,7 @@ def test_annotations_are_for_github(repository):
         (["compare", "out/good"], "Missing argument 'NEW'"),
         (["compare", "out/good", "absent"], "absent: not the folder of a run"),
         (["compare", "out/good", "out/good", "--fail-speed", "20%"], "No such option"),
-        (["history", "out/good"], "a history needs two runs or more, got 1; give more, or a folder of runs."),
+        (["history", "out/good"], "a history needs two or more runs, got 1; give more, or a folder of runs."),
         (["history", "absent"], "absent: neither a run nor a folder of runs; "),
     ],
     ids=lambda case: " ".join(case) if isinstance(case, list) else "",

@@ -32,11 +32,11 @@ def test_engine_that_is_not_accurate_at_the_nominal_step_is_tried_at_smaller_one
     """MuJoCo's explicit gyroscopic term at 5 ms, and a tolerance that none of the smaller steps meets; every step tried is in the files."""
     asked = ("limits", "spin-asymmetric", "-e", "mujoco", "--axis", "mass", "-o", "out")
     output = " ".join(dropspin(*asked, cwd=tmp_path).stdout.split())
-    assert "spin-asymmetric at dt = 5 ms; an error up to 0.1 is sound." in output
+    assert "spin-asymmetric at dt = 5 ms; an error up to 0.1 counts as sound." in output
     assert "mujoco is not sound at the nominal values and dt = 5 ms: gains energy, the energy rises by 0.01" in output
-    assert "of the scene's (limit 0.01). Smaller steps tried: sound at 2.5 ms." in output
+    assert "times the scene's energy (limit 0.01). Smaller time steps tried: sound at 2.5 ms." in output
     output = " ".join(dropspin(*asked, "--within", "1e-6", cwd=tmp_path).stdout.split())
-    assert "Smaller steps tried: inaccurate at 2.5 ms, 1.25 ms, 0.625 ms, 0.312 ms, 0.156 ms, 0.0781 ms. " in output
+    assert "Smaller time steps tried: inaccurate at 2.5 ms, 1.25 ms, 0.625 ms, 0.312 ms, 0.156 ms, 0.0781 ms. " in output
     assert re.search(r"At 0.0781 ms, the smallest tried, orientation error is [\d.e-]+ rad \(tolerance 1e-06\)\.", output)
     rows = [row for row in json.loads((tmp_path / "out/limits.json").read_text()) if row["axis"] == "step"]
     assert [row["value"] for row in rows] == [5e-3 / 2**n for n in range(6, -1, -1)]
@@ -52,7 +52,7 @@ def test_engine_that_is_not_accurate_at_the_nominal_step_is_tried_at_smaller_one
         (["--within", "nan"], "within: got nan"),
         (["--pair", "spin,mass"], "No such option"),
         (["--time-limit", "nan"], "is not a finite number of seconds"),
-        (["spin-principal"], "two scenes have the same name; a scene's name is its file's name, rename one."),
+        (["spin-principal"], "two scenes have the same name, which is that of the file; rename one of the files."),
     ],
 )
 def test_bad_input_is_refused(asked, message, tmp_path):

@@ -68,7 +68,7 @@ def test_internal_error_is_exit_code_70(tmp_path):
     command = [sys.executable, "-c", program, "list"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout) == (70, "")
-    assert done.stderr.startswith("dropspin: internal error; please report what follows.\nTraceback (most recent call last):\n")
+    assert done.stderr.startswith("dropspin: internal error; please report the following output.\nTraceback (most recent call last):\n")
     assert done.stderr.endswith("TypeError: 'NoneType' object is not callable\n")
 
 
@@ -84,8 +84,8 @@ def test_internal_error_is_exit_code_70(tmp_path):
         (["run", "drop-ball", "--dt", "fast"], "'fast' is not a valid float"),
         (["run", "drop-ball", "--out", "x"], "No such option"),
         (["run", "drop-ball", "--dry-run"], "No such option"),
-        (["run", "drop-ball", "-o", "."], "the working directory, or a mount point, cannot be replaced"),
-        (["run", "drop-ball", "-o", "precious"], "precious: is a file; choose a folder"),
+        (["run", "drop-ball", "-o", "."], "the working directory and mount points cannot be replaced"),
+        (["run", "drop-ball", "-o", "precious"], "precious: this is a file; choose a folder"),
         (["run", "drop-ball", "-o", "precious/x"], "precious/x: cannot be written"),
         (["run", "drop-ball", "--dt", "1e-310"], "dt: got 1e-310 s"),
         (["run", "drop-ball", "--dt", "0.01", "--dt", "0.01"], "dt: a time step is given twice (0.01, 0.01); give each once."),

@@ -155,8 +155,7 @@ def test_an_interrupted_run_is_resumed(how, whole, tmp_path):
         [DROPSPIN, *INTERRUPTED, "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
-    while "drop-ball" not in process.stderr.readline():
-        pass
+    assert any("drop-ball" in line for line in process.stderr)
     process.send_signal(how)
     _, errors = process.communicate(timeout=60)
     if how == signal.SIGINT:
@@ -219,11 +218,11 @@ def test_drawn_scenes_are_run_and_reproduced(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--seed", "3"), "--seed is for drawn scenes; add --draw N."),
-        (("--draw", "0"), "count: got 0; it is a whole number from 1 to 1000."),
-        (("--draw", "1001"), "count: got 1001; it is a whole number from 1 to 1000."),
+        (("--seed", "3"), "--seed has an effect only with random scenes; add --draw N."),
+        (("--draw", "0"), "count: got 0; give a whole number from 1 to 1000."),
+        (("--draw", "1001"), "count: got 1001; give a whole number from 1 to 1000."),
         (("--draw", "two"), "Invalid value for '--draw': 'two' is not a valid integer."),
-        (("--draw", "1", "--seed", "-1"), "seed: got -1; it is a whole number from 0 to 18446744073709551615."),
+        (("--draw", "1", "--seed", "-1"), "seed: got -1; give a whole number from 0 to 18446744073709551615."),
         (("draw-3-000",), "scene 'draw-3-000': scenes are drawn with seeds up to 18446744073709551615 and numbers from 1 to 1000."),
     ],
 )

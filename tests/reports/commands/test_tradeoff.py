@@ -25,9 +25,9 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     assert done.returncode == 0, done.stderr
     output = " ".join(done.stdout.split())
     assert "orientation error within 1e-09 rad: document[rotation=" in output
-    assert "within 1e-30 rad: no tested configuration reaches it; the nearest is document[rotation=" in output
-    assert "Left out: document, no convergence is seen: orientation error is" in output
-    assert "No smaller step was tried because over the last 2 steps the error fell by less than a fifth per step: document[" in output
+    assert "within 1e-30 rad: no tested configuration reaches it; the most accurate is document[rotation=" in output
+    assert "Left out: document, no convergence observed: orientation error is" in output
+    assert "No smaller time step was tried because over the last 2 steps the error fell by less than a fifth per step: document[" in output
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "section.json",
         "short.svg",

@@ -54,11 +54,11 @@ def budget(results):
         ),
         (
             made(4e-2, asymptotic=(3e-2, 2.9e-2, 3.1e-2, "model"), order=1.0),
-            "3.00e-02 is a model error, which no time step removes; the other 1.00e-02 is discretisation error.",
+            "3.00e-02 is a model error, which no time step removes; the remaining 1.00e-02 is discretisation error.",
         ),
         (
             made(0.8, asymptotic=(0.9, 0.89, 0.91, "setting")),
-            "9.00e-01 is a setting error, which the calibrated profile does not have; the other -1.00e-01 is discretisation error.",
+            "9.00e-01 is a setting error, which the calibrated profile does not have; the remaining -1.00e-01 is discretisation error.",
         ),
         (made(4e-2, asymptotic=(4.05e-2, 3.9e-2, 4.2e-2, "model")), "A model error, which no time step removes."),
         (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "rounding")), "Within rounding."),

@@ -81,10 +81,10 @@ def test_engine_that_is_not_sound_at_the_nominal_values_has_the_smaller_steps_tr
     study.refinements.update(never=never, crashing=(points_of("crashed", "no such thing"),))
     assert limits.sentences(study) == [
         "b is not sound at the nominal values and dt = 5 ms: inaccurate, it is off by 0.2 rad (tolerance 0.1). "
-        "Smaller steps tried: sound at 2.5 ms.",
+        "Smaller time steps tried: sound at 2.5 ms.",
         "never is not sound at the nominal values and dt = 5 ms: inaccurate, it is off by 0.2 rad (tolerance 0.1). "
-        "Smaller steps tried: gains energy at 2.5 ms; inaccurate at 1.25 ms. At 1.25 ms, the smallest tried, it is off by 0.15 rad.",
-        "crashing is not sound at the nominal values and dt = 5 ms: crashed, no such thing. No smaller step was tried.",
+        "Smaller time steps tried: gains energy at 2.5 ms; inaccurate at 1.25 ms. At 1.25 ms, the smallest tried, it is off by 0.15 rad.",
+        "crashing is not sound at the nominal values and dt = 5 ms: crashed, no such thing. No smaller time step was tried.",
         "Left out: c, not installed.",
     ]
 

@@ -26,7 +26,7 @@ def found():
             "document[rotation=implicit-gyroscopic]", ((0.033, 2e-2), (0.01, np.nan), (0.005, 7e-3)), "error_stopped_falling", "it stays"
         ),
         Ladder("accurate", ((0.033, 1e-2), (0.01, 4e-3)), "longest_run", "a run would be too long"),
-        Ladder("other", ((0.033, 2.0),), "budget", SPENT, "no convergence is seen"),
+        Ladder("other", ((0.033, 2.0),), "budget", SPENT, "no convergence observed"),
         Ladder("missing", (), "not_run", "not installed", "not installed"),
     )
     costs = {"mujoco[integrator=implicitfast]": 5e-6, "document[rotation=implicit-gyroscopic]": 2e-6, "accurate": 1e-6}
@@ -44,26 +44,27 @@ def test_nearest_configuration_has_the_reason_why_no_smaller_step_was_tried(foun
     """The conclusion is about the tested steps; a ladder that its budget ended names the option that continues it."""
     [sentence, *_] = tradeoff.sentences(found, [1e-3])
     assert sentence == (
-        "spin-asymmetric, orientation error within 0.001 rad: no tested configuration reaches it; the nearest is accurate at 10 ms "
-        "with 4.00e-03 rad, where its ladder of steps ended because a run would be too long."
+        "spin-asymmetric, orientation error within 0.001 rad: no tested configuration reaches it; the most accurate is accurate at 10 ms "
+        "with 4.00e-03 rad, where its ladder of time steps ended because a run would be too long."
     )
     budgeted = TradeOff(found.scene, found.metric, found.points[:2], found.ladders[:1])
     assert tradeoff.sentences(budgeted, [1e-3])[0].endswith(
-        "the nearest is mujoco[integrator=implicitfast] at 10 ms with 5.20e-03 rad, "
-        f"where its ladder of steps ended because {SPENT} (option --budget)."
+        "the most accurate is mujoco[integrator=implicitfast] at 10 ms with 5.20e-03 rad, "
+        f"where its ladder of time steps ended because {SPENT} (option --budget)."
     )
     earlier = Ladder("accurate", (*found.ladders[2].steps, (0.005, 5e-3)), "error_stopped_falling", "it stays")
     stays = TradeOff(found.scene, found.metric, found.points, (*found.ladders[:2], earlier))
-    assert "at 10 ms with 4.00e-03 rad, and its ladder of steps ended at 5 ms because it stays." in tradeoff.sentences(stays, [1e-3])[0]
+    sentence = tradeoff.sentences(stays, [1e-3])[0]
+    assert "at 10 ms with 4.00e-03 rad, and its ladder of time steps ended at 5 ms because it stays." in sentence
 
 
 def test_ladders_are_listed_with_their_ends_and_reasons(found):
     assert tradeoff.sentences(found, [])[:3] == [
-        f"No smaller step was tried because {SPENT} (option --budget): mujoco[integrator=implicitfast] at 10 ms, other at 33 ms.",
-        "No smaller step was tried because it stays: document[rotation=implicit-gyroscopic] at 5 ms.",
-        "No smaller step was tried because a run would be too long: accurate at 10 ms.",
+        f"No smaller time step was tried because {SPENT} (option --budget): mujoco[integrator=implicitfast] at 10 ms, other at 33 ms.",
+        "No smaller time step was tried because it stays: document[rotation=implicit-gyroscopic] at 5 ms.",
+        "No smaller time step was tried because a run would be too long: accurate at 10 ms.",
     ]
-    assert tradeoff.sentences(found, [])[3:] == ["Left out: other, no convergence is seen.", "Left out: missing, not installed."]
+    assert tradeoff.sentences(found, [])[3:] == ["Left out: other, no convergence observed.", "Left out: missing, not installed."]
 
 
 def test_only_engine_within_a_tolerance_is_compared_with_tested_ones(found):

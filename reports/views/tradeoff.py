@@ -10,7 +10,7 @@ from comparisons.measuring.metrics import METRICS
 from comparisons.tradeoff.costs import BATCH
 from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
-from reports.views.numbers import duration
+from reports.views.numbers import duration, formatted
 
 COLUMNS = (
     *("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "cost_per_world", "on_pareto_front"),
@@ -76,7 +76,7 @@ def _row(found: TradeOff, point: CostPoint, on_front: str) -> dict[str, str]:
     return {
         "engine": point.engine,
         "step [ms]": f"{1e3 * point.dt:.4g}",
-        f"error [{METRICS[found.metric].unit}]": f"{point.error:.2e}",
+        f"error [{METRICS[found.metric].unit}]": formatted(point.error),
         "per simulated second": duration(point.typical_cost),
         f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else duration(point.cost_per_world),
         "on the Pareto front": on_front,
@@ -107,7 +107,7 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         last = ladder.steps[-1][0]
         where = "where its ladder of time steps ended" if nearest.dt == last else f"and its ladder of time steps ended at {_step(last)}"
         return (
-            f"{goal}: no tested configuration reaches it; the most accurate is {_named(nearest)} with {nearest.error:.2e}{unit}, "
+            f"{goal}: no tested configuration reaches it; the most accurate is {_named(nearest)} with {formatted(nearest.error)}{unit}, "
             f"{where} because {_reason(ladder)}."
         )
     sentence = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second"

@@ -313,7 +313,7 @@ def test_the_page_shows_orders_and_asymptotic_errors(studied):
     assert "mujoco: converges in 1 of 1 scene; " in text
     assert len(re.findall(r'<span class="status known">≠<span class="words"> known model error</span></span>', text)) == 1
     assert len(re.findall(r">order 1\.0[012]</td>", text)) >= 4
-    assert ">→ 7.53e-01</td>" in text
+    assert ">→ 0.753</td>" in text
     assert "fitted at 0.008, 0.004, 0.002 s; claimed 1" in text
     assert ">rounding</td>" in text
 
@@ -324,7 +324,7 @@ def test_the_terminal_shows_orders_and_asymptotic_errors(studied, capsys):
 
     print_table(studied[0], Console(width=200, no_color=True))
     text = capsys.readouterr().out
-    assert "as dt → 0, document: angular momentum error → 7.36e-01" in text
+    assert "as dt → 0, document: angular momentum error → 0.736" in text
     assert re.search(r"as dt → 0, mujoco: orders 0\.99 to 1\.02|as dt → 0, mujoco: orders? 1\.0", text)
 
 

@@ -68,7 +68,7 @@ def test_cells_have_status_and_leading_error(core, capsys):
     of = errors[errors["scene"] == "spin-asymmetric"].set_index("engine")["value"]
     assert lines["spin-asymmetric"].split()[1:] == [
         *("orientation", "[rad]"),
-        *(part for engine, mark in zip(core.engines, "≠✓✓", strict=True) for part in (mark, f"{of[engine]:.2e}")),
+        *(part for engine, mark in zip(core.engines, "≠✓✓", strict=True) for part in (mark, f"{of[engine]:.3g}")),
     ]
     assert lines["slide-box"].split()[3] == "–"
 

@@ -50,15 +50,15 @@ def budget(results):
         (made(8e-3, asymptotic=(1e-5, -1e-4, 1e-4, "discretisation")), "Discretisation error."),
         (
             made(8e-3, asymptotic=(1e-5, -1e-4, 2e-2, "discretisation"), order=4.0),
-            "Discretisation error down to 2.00e-02; the time steps do not resolve smaller ones.",
+            "Discretisation error down to 0.02; the time steps do not resolve smaller ones.",
         ),
         (
             made(4e-2, asymptotic=(3e-2, 2.9e-2, 3.1e-2, "model"), order=1.0),
-            "3.00e-02 is a model error, which no time step removes; the remaining 1.00e-02 is discretisation error.",
+            "0.03 is a model error, which no time step removes; the remaining 0.01 is discretisation error.",
         ),
         (
             made(0.8, asymptotic=(0.9, 0.89, 0.91, "setting")),
-            "9.00e-01 is a setting error, which the calibrated profile does not have; the remaining -1.00e-01 is discretisation error.",
+            "0.9 is a setting error, which the calibrated profile does not have; the remaining -0.1 is discretisation error.",
         ),
         (made(4e-2, asymptotic=(4.05e-2, 3.9e-2, 4.2e-2, "model")), "A model error, which no time step removes."),
         (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "rounding")), "Within rounding."),

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import tempfile
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -115,9 +114,11 @@ class MeasuredScenes:
         """Write the results of a scene, completely or not at all."""
         [scene] = part.scenes
         self._path.mkdir(exist_ok=True)
-        unfinished = Path(tempfile.mkdtemp(prefix="unfinished-", dir=self._path))
-        save(part, unfinished)
-        unfinished.rename(self._path / f"{len(self):03d}-{part.scenes[scene].digest}")
+        with unfinished_folder(self._path) as folder:
+            new = folder / "new"
+            new.mkdir()
+            save(part, new)
+            new.rename(self._path / f"{len(self):03d}-{part.scenes[scene].digest}")
 
     def __len__(self) -> int:
         return len(list(self._path.glob(PARTS)))

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from scenarios.text import Text, verify_printable
+from scenarios.text import Prose, Text
 
 TOUCHING = 1e-9
 """Height above the floor, relative to the size of the body, up to which the body counts as touching the floor."""
@@ -92,7 +92,7 @@ class Expectation(Table):
     below: Positive | None = None
     above: Number | None = None
     within: Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)] | None = None
-    reason: Annotated[Text, Field(min_length=1)]
+    reason: Annotated[Prose, Field(min_length=1)]
 
     @field_validator("dt", mode="before")
     @classmethod
@@ -127,11 +127,11 @@ class Scenario(Table):
         expect: Bounds on metrics, each with a reason.
     """
 
-    name: Annotated[str, Field(json_schema_extra={"hidden": "in files"})]
+    name: Annotated[Text, Field(json_schema_extra={"hidden": "in files"})]
     origin: Annotated[str, Field(exclude=True, json_schema_extra={"hidden": "always"})] = ""
-    summary: str = ""
-    source: str = ""
-    tags: tuple[str, ...] = ()
+    summary: Prose = ""
+    source: Prose = ""
+    tags: tuple[Text, ...] = ()
     duration: Positive
     body: Body
     start: Start = Start()
@@ -140,13 +140,6 @@ class Scenario(Table):
     damping: Damping | None = None
     ensemble: Ensemble | None = None
     expect: tuple[Expectation, ...] = ()
-
-    @field_validator("name", "summary", "source", "tags")
-    @classmethod
-    def _is_printable(cls, given: str | tuple[str, ...]) -> str | tuple[str, ...]:
-        for text in [given] if isinstance(given, str) else given:
-            verify_printable(text)
-        return given
 
     @model_validator(mode="after")
     def _has_an_inertia(self) -> Self:

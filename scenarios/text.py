@@ -1,27 +1,32 @@
-"""Printable text: without control characters, bidirectional marks, or lone surrogates."""
+"""Printable text: one line, without control characters, bidirectional marks, or lone surrogates."""
 
+import json
 from typing import Annotated
 
-from pydantic import AfterValidator
-
-_LAYOUT = frozenset("\n\t")
+from pydantic import AfterValidator, BeforeValidator
 
 
 def printable(text: str) -> str:
-    """A text with a backslash escape in place of each character that is not printable; line ends and tabs stay."""
-    return "".join(one if one.isprintable() or one in _LAYOUT else one.encode("unicode_escape").decode() for one in text)
+    r"""A text with an escape in place of each character that is not printable, such as \u001b or \n. The text of JSON stays valid."""
+    return "".join(one if one.isprintable() else json.dumps(one)[1:-1] for one in text)
 
 
-def verify_printable(text: str) -> str:
+def _verified(text: str) -> str:
     """Return the text unchanged.
 
     Raises:
         ValueError: The text is not printable.
     """
-    if printable(text) != text:
-        raise ValueError("must be printable text, without control characters")
+    if not text.isprintable():
+        raise ValueError("must be one line of printable text, without control characters")
     return text
 
 
-Text = Annotated[str, AfterValidator(verify_printable)]
+def _joined(text: object) -> object:
+    return " ".join(text.split()) if isinstance(text, str) else text
+
+
+Text = Annotated[str, AfterValidator(_verified)]
 """A field of a model whose value is printable text."""
+Prose = Annotated[Text, BeforeValidator(_joined)]
+"""A field of a model whose value may be written over several lines, which are joined to one."""

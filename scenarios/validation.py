@@ -49,7 +49,7 @@ def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: A
     problems = error.errors(include_url=False)
     # A key that takes a word or something else is reported once for each; for a value that is not a word, the word's problem is irrelevant.
     relevant = [problem for problem in problems if problem["type"] != "literal_error" or isinstance(problem["input"], str)]
-    others = len({tuple(_located(kind, problem["loc"])[0][:2]) for problem in problems}) - 1
+    others = len({tuple(_located(kind, problem)[0][:2]) for problem in problems}) - 1
     more = f" (and {others} more {'problem' if others == 1 else 'problems'})" if others else ""
     return f"{_described(kind, (relevant or problems)[0], alternatives or {}, root)}{more}"
 
@@ -72,7 +72,7 @@ def _key(path: Sequence[str | int], root: str) -> str:
 
 def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternatives, root: str) -> str:
     """One problem as 'key: got value; what is allowed.'."""
-    path, table = _located(kind, problem["loc"])
+    path, table = _located(kind, problem)
     key = _key(path, root)
     prefix = f"{key}: " if key else ""
     given = shown(problem["input"])
@@ -114,7 +114,7 @@ def _is_hidden(field: Any, root: str) -> bool:
     return hidden == "always" or (hidden == "in files" and not root)
 
 
-def _located(kind: type[BaseModel], location: tuple[Any, ...]) -> tuple[list[str | int], type[BaseModel]]:
+def _located(kind: type[BaseModel], problem: Problem) -> tuple[list[str | int], type[BaseModel]]:
     """The keys and indices of a problem as in a file, and the model of the innermost table.
 
     Pydantic's location also names the member of a union that it tried; a file has no such key.
@@ -122,10 +122,12 @@ def _located(kind: type[BaseModel], location: tuple[Any, ...]) -> tuple[list[str
     path: list[str | int] = []
     table = kind
     members: dict[str, type[BaseModel]] = {}
-    for part in location:
-        if isinstance(part, str) and part in members:
+    location = problem["loc"]
+    unknown = len(location) - 1 if problem["type"] == "extra_forbidden" else -1  # a key of the file, which may have any name
+    for number, part in enumerate(location):
+        if isinstance(part, str) and part in members and number != unknown:
             table, members = members[part], {}
-        elif isinstance(part, int) or not _is_union_member(part):
+        elif isinstance(part, int) or number == unknown or not _is_union_member(part):
             path.append(part)
             if isinstance(part, str) and part in table.model_fields:
                 field = table.model_fields[part]

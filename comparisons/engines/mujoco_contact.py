@@ -17,7 +17,9 @@ import math
 from typing import Any
 
 IMPEDANCE = 0.9999  # the largest that MuJoCo allows
-INFINITE_FRICTION = 1e6  # with elliptic cones, values up to 1e9 work
+INFINITE_FRICTION = 1e6
+STRONGEST_FRICTION = 1e9
+"""The largest coefficient with which contacts work, with elliptic cones."""
 MOST_DAMPED = 1e3
 
 

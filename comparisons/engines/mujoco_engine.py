@@ -17,7 +17,7 @@ from comparisons.engines.base import (
     Simulation,
     may_tumble,
 )
-from comparisons.engines.mujoco_contact import IMPEDANCE, contact
+from comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
 from comparisons.engines.mujoco_model import INTEGRATORS, calibrated_specification, default_specification
 from comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
 from comparisons.engines.mujoco_versions import BATCHES, flight_of, numbers_of, refusal, refusal_of_boxes, solver
@@ -118,6 +118,8 @@ class MuJoCo(Engine):
             return "only spheres and boxes are mapped onto a floor"
         if self.option("profile") == "default":
             return None
+        if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
+            return f"contacts break down at coefficients of friction above {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
         if isinstance(body, Box) and (too_old := refusal_of_boxes(VERSION)) is not None:
             return too_old
         if self.option("integrator") == "rk4" and "spring_steps" not in self.options:

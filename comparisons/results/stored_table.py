@@ -14,7 +14,6 @@ from comparisons.measuring.metrics import METRICS
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.measurement import COLUMNS, Kind
 from scenarios import Scenario
-from scenarios.text import printable
 from scenarios.validation import shown
 
 _ARROW = {"str": (pa.string(), pa.large_string()), "float64": (pa.float64(),), "int64": (pa.int64(),)}
@@ -75,7 +74,7 @@ def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Co
         "means of scenes without an ensemble": (of_ensembles & ~rows["scene"].isin(with_ensembles)).any(),
         "negative steps or times": (rows["steps"] < 0).any() or (rows["time_per_step"] < 0.0).any(),
         "tolerances that are not above 0": not rows["tolerance"].dropna().between(0.0, np.inf, inclusive="neither").all(),
-        "control characters": any(printable(text) != text for text in texts),
+        "control characters": not all(map(str.isprintable, texts)),
     }
     if found := [problem for problem, is_one in problems.items() if is_one]:
         raise ValueError(f"has {found[0]}")

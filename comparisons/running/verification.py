@@ -157,9 +157,10 @@ def verified_predictions(predicted: Mapping[str, Any]) -> dict[str, float]:
 def _verified_text(what: str, text: Any) -> str:
     if not isinstance(text, str) or not text.strip():
         raise BuildMismatch(f"{what} is {shown(text)}; it must be a sentence")
-    if short(text) != text:
+    joined = " ".join(text.split())
+    if short(joined) != joined:
         raise BuildMismatch(f"{what} is {short(shown(text))}; it must be printable text of at most {LONGEST} characters")
-    return str(text)
+    return joined
 
 
 def _verified_number(what: str, number: Any) -> float:

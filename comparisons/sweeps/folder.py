@@ -18,11 +18,11 @@ from fsspec.implementations.local import LocalFileSystem
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from comparisons.judging.verdicts import VERDICTS
+from comparisons.results.output import UNFINISHED, unfinished_folder
 from comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS
 from scenarios import DropspinError
 
 DESCRIPTION = "sweep.json"
-UNFINISHED = ".unfinished-"
 PARTS_PER_FOLDER = 1000
 """File systems are slow with many files in one folder, and so is listing it."""
 
@@ -99,14 +99,11 @@ class SweepFolder:
 
     def _holds_other_files(self) -> bool:
         """Whether there is any file but those that a sweep leaves if it is killed at its beginning."""
-        return any(not os.path.basename(path).startswith(UNFINISHED) for path in self._files.ls(self._root, detail=False))
+        return any(not os.path.basename(path).startswith(f".{UNFINISHED}") for path in self._files.ls(self._root, detail=False))
 
     def begin(self, description: dict[str, Any]) -> None:
-        """Write `sweep.json`, and remove unfinished files of a killed sweep."""
+        """Write `sweep.json`."""
         self._put(DESCRIPTION, json.dumps({"identity": self._identity, **description}, indent=1, default=str).encode())
-        if self._is_local:
-            for unfinished in Path(self._root).rglob(f"{UNFINISHED}*"):
-                unfinished.unlink(missing_ok=True)
 
     def write(self, number: int, first: int, last: int, table: pa.Table) -> None:
         """Write a part: the jobs from number `first` up to, not including, `last`."""
@@ -165,12 +162,13 @@ class SweepFolder:
                 return
             target = Path(path)
             target.parent.mkdir(parents=True, exist_ok=True)
-            unfinished = target.with_name(f"{UNFINISHED}{os.getpid()}-{target.name}")
-            with unfinished.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())  # so that a part with its name is complete even after a power cut
-            unfinished.replace(target)
+            with unfinished_folder(Path(self._root)) as folder:
+                unfinished = folder / "new"
+                with unfinished.open("wb") as file:
+                    file.write(content)
+                    file.flush()
+                    os.fsync(file.fileno())  # so that a part with its name is complete even after a power cut
+                unfinished.replace(target)
         except OSError as error:
             raise DropspinError(
                 f"{self.where}: is not writable: {error.strerror or error}; the parts written so far are complete."

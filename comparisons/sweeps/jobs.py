@@ -15,6 +15,7 @@ from comparisons.engines.base import Engine
 from comparisons.sweeps.axes import Drawn, Indices, SweepAxis
 from comparisons.sweeps.fields import content_of, path_of, set_field
 from scenarios import DropspinError, Scenario
+from scenarios.validation import shown
 
 OPTION = "engine."
 KEY_DIGITS = 20
@@ -155,7 +156,7 @@ def configured(engine: Engine, options: Iterable[tuple[str, Any]]) -> Engine:
     chosen = {}
     for name, value in options:
         if not isinstance(value, str | float):
-            raise DropspinError(f"got {value!r}; the value of an option is a word or a number.")
+            raise DropspinError(f"got {shown(value)}; the value of an option is a word or a number.")
         chosen[name.removeprefix(OPTION)] = value if isinstance(value, str) else repr(float(value))
     return type(engine)({**engine.options, **chosen}) if chosen else engine
 

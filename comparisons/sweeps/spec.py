@@ -17,8 +17,8 @@ from comparisons.sweeps.outcomes import STANDARD_METRICS
 from scenarios import DropspinError, Scenario, SceneError, load
 from scenarios.body import Number, Positive, Table
 from scenarios.errors import UnknownName
-from scenarios.loading import read_toml
-from scenarios.validation import validated
+from scenarios.loading import TOO_LARGE, read_toml
+from scenarios.validation import shown, validated
 
 MOST_JOBS = 10**15
 WHOLE_NUMBERS = frozenset({"ensemble.size", "ensemble.seed"})
@@ -151,7 +151,7 @@ def _grid_axes(where: str, table: Mapping[str, Any]) -> list[SweepAxis]:
             if len({repr(value) for value in values}) < len(values):
                 raise DropspinError(f"{here}: names a value twice; name each once.")
         else:
-            raise DropspinError(f"{here}: got {given!r}; must be a list of values, or {{from, to, count}}.")
+            raise DropspinError(f"{here}: got {shown(given)}; must be a list of values, or {{from, to, count}}.")
     return axes
 
 
@@ -163,11 +163,9 @@ def _canonical(here: str, name: str, value: Any) -> Any:
         try:
             value = float(value)
         except OverflowError:
-            raise DropspinError(
-                f"{here}: got a whole number of {len(str(value))} digits, which exceeds the range of floating-point numbers."
-            ) from None
+            raise DropspinError(f"{here}: got a whole number {TOO_LARGE}.") from None
     if not isinstance(value, int | float | str):
-        raise DropspinError(f"{here}: got {value!r}; a value is a number, a word, or a list of them.")
+        raise DropspinError(f"{here}: got {shown(value)}; a value is a number, a word, or a list of them.")
     if value == 0.0 and type(value) is float:
         return "none" if name == "floor.friction" else 0.0
     return value
@@ -181,7 +179,7 @@ def _random_axes(where: str, table: Mapping[str, Any]) -> list[SweepAxis]:
     for name, given in _flattened({key: value for key, value in table.items() if key not in ("count", "seed")}).items():
         here = f"{where}: random: {name}"
         if not isinstance(given, Mapping):
-            raise DropspinError(f"{here}: got {given!r}; must be a range to draw from, {{from, to}}.")
+            raise DropspinError(f"{here}: got {shown(given)}; must be a range to draw from, {{from, to}}.")
         span = validated(Range, here, given)
         axes.append(Drawn(name, span.first, span.last, draws.count, span.spacing, draws.seed))
     if not axes:
@@ -227,7 +225,7 @@ def _verify_sweep(where: str, sweep: Sweep) -> None:
 def _verify_value(sweep: Sweep, axis: SweepAxis, value: Any) -> None:
     if axis.name == "dt":
         if type(value) is not float or not 0.0 < value < math.inf:
-            raise DropspinError(f"got {value!r}; a time step is a number above 0, in s.")
+            raise DropspinError(f"got {shown(value)}; a time step is a number above 0, in s.")
     elif axis.name.startswith(OPTION):
         for chosen in sweep.engines:
             if axis.name.removeprefix(OPTION) in chosen.options:

@@ -3,6 +3,7 @@
 import click
 
 from reports.commands.options import as_json
+from reports.terminal.safe import echo
 
 BASELINE = "dropspin-baseline.toml"
 
@@ -51,8 +52,8 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
         raise DropspinError(f"{', '.join(runs)}: there is nothing to accept, because no engine was measured; {baseline} is not written.")
     write_baseline(new, baseline)
     if json_output:
-        click.echo(json_rows(pd.concat(changes)))
+        echo(json_rows(pd.concat(changes)))
         return
     for sentence in sentences:
-        click.echo(sentence)
-    click.echo(f"Written: {baseline}, {len(new.results):,} accepted results. Review the difference and commit it.")
+        echo(sentence)
+    echo(f"Written: {baseline}, {len(new.results):,} accepted results. Review the difference and commit it.")

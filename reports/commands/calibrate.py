@@ -7,6 +7,7 @@ import click
 
 from reports.commands.interrupts import stop_if_interrupted
 from reports.commands.options import as_json
+from reports.terminal.safe import echo
 
 
 @click.command("calibrate")
@@ -44,12 +45,12 @@ def calibrate_command(
     if language is not None:
         if language not in found.programs:
             raise UnknownName(f"{found.engine}'s language", language, found.programs)
-        click.echo(found.programs[language], nl=False)
+        echo(found.programs[language], nl=False)
         return
     if json_output:
-        click.echo(json.dumps(view.as_data(found), indent=1, ensure_ascii=False))
+        echo(json.dumps(view.as_data(found), indent=1, ensure_ascii=False))
         return
     print_rows(view.measured_rows(found), json_output=False)
     print_rows(view.setting_rows(found), json_output=False)
     for name, text in found.programs.items():
-        click.echo(f"To paste, as {name}:\n\n{text}")
+        echo(f"To paste, as {name}:\n\n{text}")

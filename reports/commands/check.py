@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from reports.commands.options import as_json, baseline_option, summary_option, write_text
+from reports.terminal.safe import echo
 
 if TYPE_CHECKING:
     from comparisons.regressions.checking import Checked
@@ -44,7 +45,7 @@ def check_command(run: str, baseline: str | None, junit: str | None, summary: st
     if summary is not None:
         write_text(summary, check_markdown(checked, file, found), append=True)
     if json_output:
-        click.echo(json_rows(checked.results.table))
+        echo(json_rows(checked.results.table))
     else:
         print_checked(checked, file, found)
     return checked.results.exit_code()
@@ -60,4 +61,4 @@ def print_checked(checked: "Checked", file: "BaselineFile | None", found: "list[
     print_failures(grouped(checked.results, found, None if file is None else file.path))
     print_sentences(view.sentences(checked, file))
     for command in view.annotations(found):
-        click.echo(command)
+        echo(command)

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from reports.commands.options import as_json, summary_option, write_text
+from reports.terminal.safe import echo
 
 
 @click.command("compare")
@@ -31,7 +32,7 @@ def compare_command(old: str, new: str, summary: str | None, json_output: bool) 
     if summary is not None:
         write_text(summary, compare_markdown(changes), append=True)
     if json_output:
-        click.echo(json.dumps(view.as_data(changes), indent=1, ensure_ascii=False, allow_nan=False))
+        echo(json.dumps(view.as_data(changes), indent=1, ensure_ascii=False, allow_nan=False))
     else:
         print_sentences([*view.listed(changes), *view.commands(changes, later), *view.sentences(changes)])
     return int(bool(len(changes.regressions)))

@@ -7,6 +7,7 @@ import click
 
 from reports.commands.interrupts import stop_if_interrupted
 from reports.commands.options import as_json, time_limit_option
+from reports.terminal.safe import echo
 
 if TYPE_CHECKING:
     from comparisons.conformance.outcomes import CheckResult
@@ -43,14 +44,14 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
         if not json_output:
             print_row([result.check, result.outcome, view.message(result, found)], [max(map(len, CHECKS)), len("timed_out")], console)
             if traceback and result.traceback:
-                click.echo(result.traceback)
+                echo(result.traceback)
         found.append(result)
 
-    click.echo(f"checking {chosen.label}", err=True)
+    echo(f"checking {chosen.label}", err=True)
     conform(chosen, checks, resources=ResourceLimits(processor_time=time_limit), on_result=show)
     if json_output:
         keys = ("check", "outcome", "message", *(["traceback"] if traceback else []))
-        click.echo(json.dumps([{key: getattr(one, key) for key in keys} for one in found], indent=1, ensure_ascii=False))
+        echo(json.dumps([{key: getattr(one, key) for key in keys} for one in found], indent=1, ensure_ascii=False))
     else:
         print_sentences(view.sentences(found))
     outcomes = {one.outcome for one in found}

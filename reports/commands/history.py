@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from reports.commands.options import as_json
+from reports.terminal.safe import echo
 
 
 @click.command("history")
@@ -32,11 +33,11 @@ def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> No
         with status("drawing"):
             write_history(found, folder)
     if json_output:
-        click.echo(json.dumps(view.rows(found), indent=1, ensure_ascii=False))
+        echo(json.dumps(view.rows(found), indent=1, ensure_ascii=False))
         return
     for line in [*view.listed(found), *view.sentences(found)]:
-        click.echo(line)
-    click.echo(f"Written: {os.path.join(output, 'history.md')}")
+        echo(line)
+    echo(f"Written: {os.path.join(output, 'history.md')}")
 
 
 def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:

@@ -6,7 +6,8 @@ import os
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, time_limit_option
+from reports.commands.options import POSITIVE, as_json, time_limit_option
+from reports.terminal.safe import echo
 
 
 @click.command("limits")
@@ -24,7 +25,7 @@ from reports.commands.options import as_json, time_limit_option
     "--within",
     default=0.1,
     show_default=True,
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=POSITIVE,
     metavar="TOLERANCE",
     help="The largest error that counts as sound: a ratio, or an angle in radians.",
 )
@@ -73,7 +74,7 @@ def limits_command(
                 found.append(find_limits(scene, engines, axes, dt=dt, within=within, on_progress=on_progress, resources=resources))
         write_limits(found, folder)
     if json_output:
-        click.echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
+        echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
         return
     for one in found:
         print_sentences([view.nominal(one)])
@@ -82,4 +83,4 @@ def limits_command(
         print_sentences(view.sentences(one))
     if rows := view.step_rows(found):
         print_rows(rows, json_output=False)
-    click.echo(f"Written: {os.path.join(output, 'limits.md')}")
+    echo(f"Written: {os.path.join(output, 'limits.md')}")

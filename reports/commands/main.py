@@ -65,7 +65,7 @@ def _run() -> int:
     """Run the command, and return the exit code."""
     try:
         for argument in sys.argv[1:]:
-            if not argument.replace("\n", "").isprintable() or len(argument) > LONGEST_ARGUMENT:
+            if not argument.isprintable() or len(argument) > LONGEST_ARGUMENT:
                 given = f"{argument!r:.60}"
                 raise click.UsageError(f"the argument {given} is not printable text of at most {LONGEST_ARGUMENT} characters.")
         return dropspin(prog_name="dropspin", standalone_mode=False) or 0
@@ -86,10 +86,10 @@ def _run() -> int:
 
 
 def _say(message: str) -> None:
-    """Print an error message, with unprintable characters escaped."""
-    from scenarios.text import printable
+    """Print an error message as one line."""
+    from reports.terminal.safe import echo
 
-    click.echo(f"dropspin: {printable(message)}", err=True)
+    echo(f"dropspin: {' '.join(message.splitlines())}", err=True)
 
 
 class _LazyGroup(click.Group):

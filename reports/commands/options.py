@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,28 +36,29 @@ def write_text(path: str, text: str, *, append: bool = False) -> None:
         raise DropspinError(f"{path}: cannot be written: {error.strerror}; choose another file.") from None
 
 
-MOST_SECONDS = 1e7
+class _Positive(click.FloatRange):
+    """A finite number above 0: click's own range accepts nan, and inf."""
+
+    def __init__(self, least: float = 0.0, most: float | None = None) -> None:
+        super().__init__(min=least, min_open=least == 0.0, max=most)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
 
 
-def _finite(context: click.Context, parameter: click.Parameter, value: float) -> float:
-    if not value <= MOST_SECONDS:
-        raise click.BadParameter(f"{value} is not a finite number of seconds of at most {MOST_SECONDS:g}.", context, parameter)
-    return value
+POSITIVE = _Positive()
 
 
-def seconds_option(name: str, default: float, of: str) -> Callable[[Command], Command]:
+def seconds_option(name: str, default: float, of: str, least: float = 0.0) -> Callable[[Command], Command]:
     """An option whose value is a processor time."""
     return click.option(
-        name,
-        type=click.FloatRange(min=0.0, min_open=True),
-        default=default,
-        show_default=True,
-        metavar="SECONDS",
-        callback=_finite,
-        help=f"Processor time {of}",
+        name, type=_Positive(least, most=1e7), default=default, show_default=True, metavar="SECONDS", help=f"Processor time {of}"
     )
 
 
 def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
     """The option `--time-limit` of an engine's process."""
-    return seconds_option("--time-limit", default, f"that {of}.")
+    return seconds_option("--time-limit", default, f"that {of}.", least=0.01)

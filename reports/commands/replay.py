@@ -6,19 +6,17 @@ from pathlib import Path
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import POSITIVE
+from reports.terminal.safe import echo
 
 
 @click.command("replay")
 @click.argument("run", metavar="RUN")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@click.option(
-    "--dt", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS", help="One of the run's time steps. [default: the coarsest]"
-)
+@click.option("--dt", type=POSITIVE, metavar="SECONDS", help="One of the run's time steps. [default: the coarsest]")
 @click.option("-o", "--output", metavar="FILE", help="The page to write. [default: replay.html in the run's folder]")
 @click.option("--gif", metavar="FILE", help="Write an animated GIF of one scene instead.")
-@click.option(
-    "--speed", default=0.25, show_default=True, type=click.FloatRange(min=0.0, min_open=True), help="Speed of the GIF: 1 is real time."
-)
+@click.option("--speed", default=0.25, show_default=True, type=POSITIVE, help="Speed of the GIF: 1 is real time.")
 @click.option("--open/--no-open", "opens", default=True, help="Show the page in a browser. [default: --open]")
 def replay_command(
     run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, speed: float, opens: bool
@@ -59,7 +57,7 @@ def replay_command(
                 progress("", share)
 
             write_clip(shown[0], gif, speed, on_progress)
-        click.echo(f"Written: {gif}")
+        echo(f"Written: {gif}")
         return
     charts = []
     for one in shown:
@@ -67,6 +65,6 @@ def replay_command(
         charts.append(time_charts(replace(results, trajectories=at_this_step), one.scene.name))
     with written_whole(file) as unfinished:
         unfinished.write_text(replay_page(shown, charts), encoding="utf-8")
-    click.echo(f"Written: {file}")
+    echo(f"Written: {file}")
     if opens:
         click.launch(str(file))

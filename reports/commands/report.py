@@ -5,6 +5,8 @@ from pathlib import Path
 
 import click
 
+from reports.terminal.safe import echo
+
 
 @click.command("report")
 @click.argument("run", metavar="RUN")
@@ -34,4 +36,4 @@ def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -
         replay = Path(run) / "replay.html"
         if replay.is_file() and not replay.is_symlink():  # the run may be somebody else's, and the link lead to a private file
             shutil.copy2(replay, unfinished)
-    click.echo(f"Report: {Path(run) / 'report.html'}")
+    echo(f"Report: {Path(run) / 'report.html'}")

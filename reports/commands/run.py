@@ -10,6 +10,7 @@ import click
 
 from reports.commands.interrupts import stop_if_interrupted
 from reports.commands.options import as_json, baseline_option, time_limit_option
+from reports.terminal.safe import echo
 
 if TYPE_CHECKING:
     from comparisons.regressions.checking import Checked
@@ -83,17 +84,17 @@ def run_command(
     if count is not None:
         drawn = {"draw": count, "seed": secrets.randbits(32) if seed is None else seed}
         loaded += draw(count, drawn["seed"])
-        click.echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
+        echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
     file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
     show = None if json_output else print_table if verbose else print_summary
     results = _run(loaded, drawn, engines, dts, output, time_limit, resume, show)
     checked = _checked(results, file, json_output)
     if json_output:
-        click.echo(json_rows(checked.results.table))
+        echo(json_rows(checked.results.table))
     else:
         if file is not None:
             print_checked(checked, file, [one for one in failures(checked.results, baseline) if one.accepted])
-        click.echo(f"Report: {os.path.join(output, 'report.html')}")
+        echo(f"Report: {os.path.join(output, 'report.html')}")
     return checked.results.exit_code()
 
 
@@ -129,7 +130,7 @@ def _run(
                 results = run(scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=earlier)
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
-                click.echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)
+                echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)
             asked = {**results.provenance["asked"], **drawn}
             named = sorted({name.strip() for name in engines})
             results = replace(results, provenance={**results.provenance, "asked": asked, "named": named})
@@ -156,7 +157,7 @@ def _checked(results: "Results", file: "BaselineFile | None", json_output: bool)
     except NothingAccepted as error:
         assert file is not None
         if json_output:
-            click.echo(json_rows(results.table))
+            echo(json_rows(results.table))
         raise DropspinError(f"{file.path}: {error} The run is written: {file.run}.") from None
 
 

@@ -6,6 +6,7 @@ import click
 
 from reports.commands.interrupts import stop_if_interrupted
 from reports.commands.options import as_json, time_limit_option
+from reports.terminal.safe import echo
 
 
 @click.command("sweep")
@@ -46,8 +47,8 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, t
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{count(output):,} of {asked.size:,} jobs are kept; --resume continues the sweep") from None
     if json_output:
-        click.echo(json.dumps(view.summary_rows(found), indent=1, ensure_ascii=False))
+        echo(json.dumps(view.summary_rows(found), indent=1, ensure_ascii=False))
     else:
         print_rows(view.formatted_rows(found), json_output=False, left_out_first=view.LEFT_OUT_FIRST)
-        click.echo(f"Written: {output}, {asked.size:,} jobs; from Python: dropspin.read_sweep({output!r})")
+        echo(f"Written: {output}, {asked.size:,} jobs; from Python: dropspin.read_sweep({output!r})")
     return view.exit_code(found)

@@ -6,7 +6,8 @@ import os
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, seconds_option
+from reports.commands.options import POSITIVE, as_json, seconds_option
+from reports.terminal.safe import echo
 
 
 @click.command("tradeoff")
@@ -16,7 +17,7 @@ from reports.commands.options import as_json, seconds_option
 @click.option(
     "--within",
     multiple=True,
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=POSITIVE,
     default=(1e-3,),
     show_default=True,
     metavar="TOLERANCE",
@@ -48,21 +49,21 @@ def tradeoff_command(
     from reports.views import tradeoff as view
     from scenarios import load
 
-    found = []
+    loaded, found = [load(name) for name in scenes or ("spin-asymmetric",)], []
     with folder_made(output) as folder:
-        for name in scenes or ("spin-asymmetric",):
-            with share_bar(name) as progress:
+        for scene in loaded:
+            with share_bar(scene.name) as progress:
 
                 def on_progress(what: str, share: float) -> None:
                     stop_if_interrupted()
                     progress(what, share)
 
-                found.append(tradeoff(load(name), engines, metric, budget=budget, on_progress=on_progress))
+                found.append(tradeoff(scene, engines, metric, budget=budget, on_progress=on_progress))
             if not json_output:
                 print_rows(view.pareto_front_rows(found[-1]), json_output=False, left_out_first=view.LEFT_OUT_FIRST)
                 print_sentences(view.sentences(found[-1], within))
         write_tradeoff(found, within, folder)
     if json_output:
-        click.echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
+        echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
     else:
-        click.echo(f"Written: {os.path.join(output, 'tradeoff.md')}")
+        echo(f"Written: {os.path.join(output, 'tradeoff.md')}")

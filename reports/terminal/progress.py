@@ -4,13 +4,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from rich.text import Text
 
 from comparisons.running.progress import OnProgress, Progress
+from reports.terminal.safe import echo, safe
 from reports.views.numbers import in_ms
 
 
@@ -25,7 +25,7 @@ def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
             if progress.scene not in seen:
                 seen.add(progress.scene)
                 elapsed = _duration(time.monotonic() - start)
-                click.echo(f"running {progress.scene} (scene {len(seen)} of {scenes}, {elapsed} elapsed)", err=True)
+                echo(f"running {progress.scene} (scene {len(seen)} of {scenes}, {elapsed} elapsed)", err=True)
 
         yield line
         return
@@ -37,7 +37,7 @@ def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
             nonlocal finished
             finished += progress.finished
             share = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
-            bar.update(task, completed=finished + share, description=_described(progress))
+            bar.update(task, completed=finished + share, description=safe(_described(progress)))
 
         yield advance
 
@@ -47,7 +47,7 @@ def status(text: str) -> Iterator[None]:
     """Show a text while the `with` block runs."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        click.echo(text, err=True)
+        echo(text, err=True)
         yield
         return
     with console.status(text):
@@ -59,13 +59,13 @@ def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
     """A progress bar on a terminal; elsewhere, one line."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        click.echo(f"running {title}", err=True)
+        echo(f"running {title}", err=True)
         yield lambda what, share: None
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(title, total=1.0)
-        yield lambda what, share: bar.update(task, completed=share, description=f"{title}: {what}")
+        task = bar.add_task(safe(title), total=1.0)
+        yield lambda what, share: bar.update(task, completed=share, description=safe(f"{title}: {what}"))
 
 
 EVERY = 5.0
@@ -98,7 +98,7 @@ def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
             if jobs and (now - last >= EVERY or done == total):
                 last = now
                 left = f", {_duration((total - done) / rate())} left" if rate() > 0.0 else ""
-                click.echo(f"{done:,} of {total:,} jobs, {rate():,.0f} per second{left}", err=True)
+                echo(f"{done:,} of {total:,} jobs, {rate():,.0f} per second{left}", err=True)
 
         yield line
         return

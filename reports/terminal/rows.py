@@ -6,12 +6,12 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-import click
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
+
+from reports.terminal.safe import echo, styled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +35,7 @@ def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Se
         left_out_first: The columns to leave out, in this order, if the table is wider than the terminal.
     """
     if json_output:
-        click.echo(json.dumps(rows, indent=1, ensure_ascii=False))
+        echo(json.dumps(rows, indent=1, ensure_ascii=False))
         return
     console, head = Console(), list(rows[0])
     has_head = head not in (["what", "is"], ["what", "found"])
@@ -44,6 +44,7 @@ def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Se
             print_sentence(line, console)
         return
     left_out: list[str] = []
+    left_out_first = [key for key in left_out_first if key in head]
     while _narrowest(rows, head) > console.width and len(left_out) < len(left_out_first):
         left_out.append(left_out_first[len(left_out)])
         head.remove(left_out[-1])
@@ -51,9 +52,9 @@ def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Se
     widths = _widths(cells, console.width)
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_header=has_head)
     for column, width in zip(cells[0], widths, strict=True):
-        table.add_column(Text(_wrapped(column, width)), overflow="fold")
+        table.add_column(styled(_wrapped(column, width)), overflow="fold")
     for row in cells[1:]:
-        table.add_row(*(Text(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
+        table.add_row(*(styled(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
     console.print(table)
     if left_out:
         print_sentence(f"Columns not shown at this width: {', '.join(left_out)}; use a wider terminal or --json.", console)
@@ -72,12 +73,12 @@ def print_row(cells: Sequence[str], widths: Sequence[int], console: Console) -> 
     text = " ".join(cells[-1].split())
     if console.is_terminal:
         text = _wrapped(text, max(console.width - len(head), NARROWEST)).replace("\n", "\n" + " " * len(head))
-    console.print(Text(head + text), soft_wrap=True)
+    console.print(styled(head + text), soft_wrap=True)
 
 
 def print_sentence(sentence: str, console: Console, style: str = "") -> None:
     """Print a sentence, with line breaks between words on a terminal and as one line elsewhere."""
-    console.print(Text(sentence, style=style), soft_wrap=not console.is_terminal)
+    console.print(styled(sentence, style=style), soft_wrap=not console.is_terminal)
 
 
 def print_sentences(sentences: Iterable[str]) -> None:

@@ -12,6 +12,7 @@ from comparisons.judging.agreement import NO_EVIDENCE
 from comparisons.judging.verdicts import MARKS
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.results import Results
+from reports.terminal.safe import styled
 from reports.terminal.summary import print_summary
 from reports.views.findings import orders
 from reports.views.numbers import formatted, trend, word
@@ -31,7 +32,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
     out = console or Console()
     at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
     for name, scene in results.scenes.items():
-        out.print(Text(name, style="bold").append(f"  {scene.summary}" if scene.summary else "", style="not bold"))
+        out.print(styled(name, style="bold").append(f"  {scene.summary}" if scene.summary else "", style="not bold"))
         for first in range(0, len(results.engines), at_once):
             out.print(_scene_table(results, name, results.engines[first : first + at_once]))
         _print_trends(results, name, out)
@@ -50,24 +51,24 @@ def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
     for engine in engines:
-        table.add_column(Text(engine, overflow="fold"), justify="right", width=NUMBER_WIDTH + 2)
+        table.add_column(styled(engine), overflow="fold", justify="right", width=NUMBER_WIDTH + 2)
     if not pairs.empty:
         table.add_column("spread", justify="right", width=NUMBER_WIDTH)
     for metric in own["metric"].unique():
         unit = METRICS[metric].unit
-        cells: list[Text] = [Text(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))]
+        cells: list[Text] = [styled(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))]
         for engine in engines:
             row = own[(own["metric"] == metric) & (own["engine"] == engine)]
-            cells.append(_cell(float(row["value"].iloc[0]), str(row["verdict"].iloc[0])) if len(row) else Text("–"))
+            cells.append(_cell(float(row["value"].iloc[0]), str(row["verdict"].iloc[0])) if len(row) else styled("–"))
         if not pairs.empty:
             spread = float(pairs.loc[pairs["metric"] == metric, "value"].abs().max())
-            cells.append(Text("" if math.isnan(spread) else formatted(spread)))
+            cells.append(styled("" if math.isnan(spread) else formatted(spread)))
         table.add_row(*cells)
     return table
 
 
 def _cell(value: float, verdict: str) -> Text:
-    return Text(f"{formatted(value)} {MARKS[verdict]}", style=STYLES.get(verdict, ""))
+    return styled(f"{formatted(value)} {MARKS[verdict]}", style=STYLES.get(verdict, ""))
 
 
 def _print_trends(results: Results, name: str, out: Console) -> None:
@@ -87,7 +88,7 @@ def _print_trends(results: Results, name: str, out: Console) -> None:
             for metric, value, cause in zip(wrong["metric"], wrong["value"], wrong["cause"], strict=True)
         ]
         if trends:
-            out.print(Text(f"as dt → 0, {engine}: {', '.join(trends)}", style="dim"))
+            out.print(styled(f"as dt → 0, {engine}: {', '.join(trends)}", style="dim"))
 
 
 def _print_ensemble(results: Results, name: str, out: Console) -> None:
@@ -99,10 +100,10 @@ def _print_ensemble(results: Results, name: str, out: Console) -> None:
         means = [f"{row.engine} {row.value:.3g} ± {row.upper - row.value:.1g}{unit}" for row in rows.itertuples()]
         spread = results.scenes[name].ensemble
         assert spread is not None
-        out.print(Text(f"over {spread.size} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
+        out.print(styled(f"over {spread.size} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
 
 
 def _print_remarks(results: Results, name: str, out: Console) -> None:
     frame = results.table[(results.table["scene"] == name) & (results.table["metric"] == "")]
     for row in frame.drop_duplicates(["engine", "verdict", "reason"]).to_dict("records"):
-        out.print(Text(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))
+        out.print(styled(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))

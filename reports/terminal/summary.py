@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from rich.cells import cell_len
 from rich.console import Console
-from rich.text import Text
 
 from comparisons.results.results import Results
 from reports.terminal.rows import aligned, print_sentence
+from reports.terminal.safe import styled
 from reports.views.failures import FailureGroup, grouped
 from reports.views.matrix import Matrix, matrix
 from reports.views.run import overview
@@ -36,7 +36,7 @@ def print_failures(groups: Sequence[FailureGroup], console: Console | None = Non
             print_sentence(f"✗ {group.engine} fails in {len(group.sentences) - MOST_SENTENCES} more scenes.", out, "red")
         if group.consistent_with:
             print_sentence(group.consistent_with, out)
-        out.print(Text(f"Reproduce: {group.reproduce}"), soft_wrap=True)  # a command is one line
+        out.print(styled(f"Reproduce: {group.reproduce}"), soft_wrap=True)  # a command is one line
 
 
 def _print_matrix(found: Matrix, engines: Sequence[str], out: Console) -> None:
@@ -52,6 +52,6 @@ def _print_matrix(found: Matrix, engines: Sequence[str], out: Console) -> None:
     ]
     notes, lines = next((form for form in forms if not out.is_terminal or max(map(cell_len, form[1])) <= out.width), forms[-1])
     for line, style in zip(lines, ["bold", *("red" if row.fails else "" for row in found.rows)], strict=True):
-        out.print(Text(line, style=style), soft_wrap=True)
+        out.print(styled(line, style=style), soft_wrap=True)
     for note in filter(None, [*notes, found.legend, found.left_out]):
         print_sentence(note, out, "dim")

@@ -175,12 +175,15 @@ def test_resuming_runs_only_the_missing_parts(tmp_path):
     shutil.copytree(tmp_path / "whole", tmp_path / "out")
     parts = sorted((tmp_path / "out").rglob("*.parquet"))
     assert len(parts) > 1
-    parts[0].rename(parts[0].with_name(f".unfinished-1-{parts[0].name}"))
+    left = tmp_path / "out" / ".unfinished-killed00"
+    left.mkdir()
+    parts[0].rename(left / "new")
     stamps = [part.stat().st_mtime_ns for part in parts[1:]]
     completed = []
     run_sweep(load_sweep(spec), str(tmp_path / "out"), resume=True, on_progress=completed.append)
     assert [part.stat().st_mtime_ns for part in parts[1:]] == stamps
     assert sorted((tmp_path / "out").rglob("*.parquet")) == parts
+    assert not left.exists()
     assert completed[0] == 8 - completed[-1]
     assert sum(completed) == 8
     assert_same(tmp_path / "out", tmp_path / "whole")

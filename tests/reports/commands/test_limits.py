@@ -49,9 +49,9 @@ def test_engine_that_is_not_accurate_at_the_nominal_step_is_tried_at_smaller_one
         (["--axis", "height"], "axis 'height': spin-principal does not have it; it has step, spin"),
         (["-e", "mujocoo"], "engine 'mujocoo' is unknown."),
         (["--dt", "7"], "dt: got 7.0 s"),
-        (["--within", "nan"], "within: got nan"),
+        (["--within", "nan"], "nan is not a finite number"),
         (["--pair", "spin,mass"], "No such option"),
-        (["--time-limit", "nan"], "is not a finite number of seconds"),
+        (["--time-limit", "nan"], "is not a finite number"),
         (["spin-principal"], "two scenes have the same name, which is that of the file; rename one of the files."),
     ],
 )

@@ -55,7 +55,7 @@ def test_budget_is_an_option_with_the_default_of_the_study(tmp_path):
     assert "because the budget of 1e-09 s of processor time was spent (option --budget): mujoco at 62.5 ms, pybullet at 62.5 ms." in output
     assert {row["dt"] for row in json.loads((tmp_path / "out/tradeoff.json").read_text())} == {0.0625}
     refused = dropspin("tradeoff", "short.toml", "--budget", "inf", cwd=tmp_path)
-    assert (refused.returncode, "is not a finite number of seconds" in refused.stderr) == (2, True)
+    assert (refused.returncode, "inf is not in the range" in refused.stderr) == (2, True)
 
 
 def test_a_scene_without_an_exact_solution_is_refused(tmp_path):

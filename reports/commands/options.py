@@ -1,6 +1,7 @@
 """Options that several commands share."""
 
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -30,10 +31,16 @@ def write_text(path: str, text: str, *, append: bool = False) -> None:
         return
     try:  # a summary grows, and /dev/stdout is written as it is
         target.parent.mkdir(parents=True, exist_ok=True)
-        with target.open("a" if append else "w", encoding="utf-8") as file:
+        with open(target, "a" if append else "w", encoding="utf-8", opener=_open_at_once) as file:
+            os.set_blocking(file.fileno(), True)
             file.write(text)
     except OSError as error:
         raise DropspinError(f"{path}: cannot be written: {error.strerror}; choose another file.") from None
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open a file; a pipe that no process reads is an error, and not a wait for one."""
+    return os.open(path, flags | os.O_NONBLOCK, 0o666)
 
 
 class _Positive(click.FloatRange):

@@ -55,7 +55,8 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
     shape = outline(replay.scene.body)
     title = figure.suptitle("")
     writer = PillowWriter(fps=FRAME_RATE)
-    with written_whole(file) as unfinished, writer.saving(figure, str(unfinished), 100):
+    with written_whole(file) as unfinished:
+        writer.setup(figure, str(unfinished), 100)  # its own context manager would encode all frames after an interrupt, too
         for number, time in enumerate(times):
             title.set_text(f"{replay.scene.name}, {time:.3f} s")
             drawn = [artist for motion in replay.motions for artist in _draw(axes, shape, replay, motion, time)]
@@ -63,6 +64,7 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
             for artist in drawn:
                 artist.remove()
             on_progress((number + 1) / len(times))
+        writer.finish()
 
 
 def _frame_times(replay: Replay, speed: float) -> Array:

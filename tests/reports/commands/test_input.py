@@ -28,7 +28,7 @@ FILES = {
     "digits-spec.toml": f'{SPEC}"body.mass" = [{DIGITS}]\n',
     "deep-spec.toml": f"{SPEC}{'.'.join('a' * 3000)} = [1.0]\n",
     "bracket.toml": f'"a[b" = 1\n{BALL}',
-    "member.toml": f'constrained-x = 1\n{BALL}',
+    "member.toml": f"constrained-x = 1\n{BALL}",
     "not.toml": "{",
 }
 RUN = ("run", "ball.toml", "-e", "document", "--dt", "0.01")

@@ -1,0 +1,83 @@
+"""Outputs of commands that are interrupted, or whose disk is full: the old output stays, and nothing else is left."""
+
+import resource
+import signal
+import subprocess
+import time
+from contextlib import contextmanager
+
+import pytest
+from support.cli import DROPSPIN, dropspin
+
+BALL = 'duration = 0.2\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n'
+LONG = [
+    (("report", "run", "--plots", "svg", "--plots", "png"), signal.SIGTERM),
+    (("replay", "run", "few", "--gif", "old.gif", "--speed", "0.001"), signal.SIGINT),
+    (("limits", "drop-ball", "-e", "document", "-e", "mujoco", "-o", "study"), signal.SIGTERM),
+    (("tradeoff", "drop-ball", "-o", "study"), signal.SIGINT),
+]
+"""Commands that take many seconds."""
+FULL = [
+    (("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "run"), 20_000, "run: cannot be written: File too large; the folder is "),
+    (("report", "run", "--plots", "svg"), 20_000, "run: cannot be written: File too large; the folder is unchanged."),
+    (("replay", "run", "--no-open"), 20_000, "run/replay.html: cannot be written: File too large; choose another file."),
+    (("replay", "run", "few", "--gif", "old.gif"), 5_000, "old.gif: cannot be written: File too large; choose another file."),
+    (("accept", "run", "--reason", "x", "--baseline", "old.toml"), 200, "old.toml: cannot be written: File too large"),
+    (("tradeoff", "ball.toml", "-e", "document", "--budget", "0.01", "-o", "study"), 10_000, "study: cannot be written: File too large"),
+    (("limits", "ball.toml", "-e", "document", "--axis", "mass", "--dt", "0.01", "-o", "study"), 500, "study: cannot be written: File"),
+    (("check", "run", "--junit", "old.xml"), 1_000, "old.xml: cannot be written: File too large; choose another file."),
+]
+"""Commands, a size of files [bytes] that is less than that of one of their outputs, and what they say."""
+
+
+@pytest.fixture
+def outputs(copied):
+    """A folder with a run, a scene and old outputs."""
+    folder = copied.parent
+    (folder / "ball.toml").write_text(BALL)
+    (folder / "study").mkdir()
+    for name in ("old.gif", "old.xml", "run/replay.html", "study/tradeoff.md", "study/limits.md", "study/section.json", "study/own.txt"):
+        (folder / name).write_text("old")
+    assert dropspin("accept", "run", "--reason", "first", "--baseline", "old.toml", cwd=folder).returncode == 0
+    return folder
+
+
+def contents(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@contextmanager
+def full_disk(size):
+    """A limit of the size of files [bytes] stands for a full disk."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+@pytest.mark.parametrize(("command", "kind"), LONG, ids=[command[0] for command, _ in LONG])
+def test_interrupted_commands_leave_the_old_output(command, kind, outputs):
+    before = contents(outputs)
+    process = subprocess.Popen([DROPSPIN, *command], cwd=outputs, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and not any(outputs.rglob(".*unfinished-*")):
+        time.sleep(0.01)
+    process.send_signal(kind)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert errors.splitlines()[-1] == "dropspin: interrupted; nothing was written."
+    assert "Traceback" not in errors
+    assert contents(outputs) == before
+
+
+@pytest.mark.parametrize(("command", "size", "message"), FULL, ids=[" ".join(command[:4]) for command, _, _ in FULL])
+def test_full_disks_leave_the_old_output(command, size, message, outputs):
+    """What a run has measured may stay for --resume."""
+    before = contents(outputs)
+    with full_disk(size):
+        done = dropspin(*command, cwd=outputs)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.splitlines()[-1].startswith(f"dropspin: {message}")
+    assert "Traceback" not in done.stderr
+    assert {name: content for name, content in contents(outputs).items() if not name.startswith(".run-measured/")} == before

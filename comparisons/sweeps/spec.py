@@ -159,11 +159,12 @@ def _canonical(here: str, name: str, value: Any) -> Any:
     """The canonical form of a value, so that equal jobs have equal keys: numbers are floats, and no friction is a word."""
     if isinstance(value, list):
         return [_canonical(here, name, part) for part in value]
-    if type(value) is int and name not in WHOLE_NUMBERS:
+    if type(value) is int:
         try:
-            value = float(value)
+            number = float(value)
         except OverflowError:
             raise DropspinError(f"{here}: got a whole number {TOO_LARGE}.") from None
+        value = value if name in WHOLE_NUMBERS else number
     if not isinstance(value, int | float | str):
         raise DropspinError(f"{here}: got {shown(value)}; a value is a number, a word, or a list of them.")
     if value == 0.0 and type(value) is float:

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from reports.commands.interrupts import handle_interrupts
+from reports.commands.interrupts import handle_interrupts, stop_if_interrupted
 
 COMMANDS = {
     "accept": "Accept a run's results as the new baseline.",
@@ -75,6 +75,7 @@ def _run() -> int:
     except SystemExit:  # click and Rich exit here only on a closed pipe, with code 1, which would mean a failed check
         raise BrokenPipeError from None
     except Exception as error:
+        stop_if_interrupted()  # compiled code, such as the import of an engine, may turn an interrupt into another exception
         from scenarios import DropspinError
 
         if not isinstance(error, DropspinError):

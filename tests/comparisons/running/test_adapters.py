@@ -88,6 +88,7 @@ CONSTRUCTED = [
     (constructor("(_ for _ in ()).throw(GeneratorExit())"), "GeneratorExit"),
     (constructor("1 / 0"), "cannot be constructed: ZeroDivisionError"),
     ("Mine.label = property(lambda self: 'other')", "its label is 'other'; it must be 'mine'"),
+    ("Mine.choices = {'a': ('b\\nc', 'd')}", "must be one line of printable text"),
     ("Mine.choices = {'a': 'bc'}", "choices.a: got 'bc'"),
     ("Mine.numbers = {'a': 3}", "numbers.a: got 3"),
 ]
@@ -102,6 +103,12 @@ def run(monkeypatch, folder, extra, name="mine"):
 
 def judged(found, engine):
     return {(row["verdict"], row["reason"]) for row in found.table.to_dict("records") if row["engine"] == engine}
+
+
+def test_texts_of_an_adapter_over_several_lines_become_one(tmp_path, monkeypatch):
+    """In a table, on a terminal and in a report each has one line."""
+    found = run(monkeypatch, tmp_path, "Mine.declines = lambda self, scene: 'has\\n  no\\tfloor'")
+    assert judged(found, "mine") == {("declined", "has no floor")}
 
 
 def test_sound_adapter_is_measured_and_leaves_nothing_in_this_process(tmp_path, monkeypatch):

@@ -197,7 +197,17 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
             {"grid": {"engine.law": ["note"]}, "engines": ["document[law=coulomb]"]},
             r"document\[law=coulomb\] sets this option as well; leave it out there or here",
         ),
-        ({"grid": {"body.mass": [10**400]}}, "a whole number of 401 digits, which exceeds the range"),
+        ({"grid": {"body.mass": [10**400]}}, "got a whole number that exceeds the range"),
+        *(
+            ({table: fields}, f"got (a whole number that exceeds|a{kind} too large to be shown)")
+            for kind, table, fields in (
+                ("n? int", "grid", {"body.mass": 10**5000}),
+                ("n? int", "grid", {"start.velocity": [[10**5000, 0, 0]]}),
+                ("n? int", "grid", {"ensemble.seed": [10**5000]}),
+                (" set", "grid", {"body.mass": [{10**5000}]}),
+                ("n? int", "random", {"count": 2, "seed": 1, "body.mass": 10**5000}),
+            )
+        ),
         ({"grid": {"body.mass": [{"a": 1}]}}, "a value is a number, a word, or a list of them"),
         (
             {"grid": {"body.mass": {"from": 1e-300, "to": 1e300, "count": 3, "spacing": "log"}}},

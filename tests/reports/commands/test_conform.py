@@ -101,6 +101,23 @@ def test_whole_traceback_of_an_adapter_is_printed_on_request(raising):
     assert row["message"] == ERROR
 
 
+@pytest.mark.parametrize("environment", [{}, TERMINAL], ids=["pipe", "terminal"])
+def test_texts_of_an_adapter_do_not_control_the_terminal(raising, environment):
+    """Neither its exceptions, nor the lines of its file in a traceback; JSON has the same text in escapes."""
+    hostile = "\x1b]0;title\x07\x1b[2J\u202e\x9b1m\u061c"
+    (raising / "support_of_mine.py").write_text(f"def deeper(state):\n    raise ValueError({hostile!r})  # {hostile}\n")
+    options = ("conform", "raising:Mine", "--check", "time", "--traceback")
+    done = dropspin(*options, cwd=raising, **environment)
+    assert "title" in done.stdout
+    assert not set(hostile) & set("\x07\u202e\x9b\u061c") & set(done.stdout + done.stderr)
+    assert "\x1b]" not in done.stdout
+    assert "\x1b[2J" not in done.stdout
+    printed = dropspin(*options, "--json", cwd=raising).stdout
+    assert printed.replace("\n", "").isprintable()
+    [row] = json.loads(printed)
+    assert f"# {hostile}" in row["traceback"]
+
+
 def test_checks_are_reported_as_they_finish():
     """Each with its result, in order."""
     reported = []

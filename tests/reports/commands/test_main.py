@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from unittest import mock
 
 import pytest
 import yaml
@@ -200,6 +201,14 @@ def test_an_interrupted_run_leaves_nothing(how, tmp_path):
     assert process.returncode == 130
     assert errors.lstrip() == "dropspin: interrupted; nothing was written.\n"
     assert os.listdir(tmp_path) == ["long.toml"]
+
+
+def test_an_interrupt_that_becomes_another_error_is_an_interrupt(monkeypatch, tmp_path):
+    """As in compiled code: `import mujoco` turns it into an ImportError."""
+    monkeypatch.setattr("reports.commands.interrupts._interrupts", [signal.SIGINT])
+    monkeypatch.setattr("comparisons.engines.registry.import_module", mock.Mock(side_effect=ImportError("initialization failed")))
+    done = dropspin("show", "drop-ball", "-e", "mujoco", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (130, "dropspin: interrupted; nothing was written.\n")
 
 
 @pytest.mark.parametrize("verb", ["run", "sweep"])

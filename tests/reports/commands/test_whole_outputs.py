@@ -1,5 +1,6 @@
 """Outputs of commands that are interrupted, or whose disk is full: the old output stays, and nothing else is left."""
 
+import os
 import resource
 import signal
 import subprocess
@@ -44,6 +45,40 @@ def outputs(copied):
 
 def contents(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (("check", "run", "--junit", "pipe"), "pipe: cannot be written: No such device or address"),
+        (("check", "run", "--summary", "pipe"), "pipe: cannot be written: No such device or address"),
+        (("accept", "run", "--reason", "x", "--baseline", "pipe"), "pipe: is a pipe or a device"),
+        (("replay", "run", "--no-open", "-o", "pipe"), "pipe: is not a regular file; choose another file."),
+        (("replay", "run", "few", "--gif", "pipe.gif"), "pipe.gif: is not a regular file; choose another file."),
+        (("report", "pipe"), "pipe"),
+        (("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "pipe"), "pipe: this is a file; choose a folder."),
+        (("limits", "ball.toml", "-e", "document", "-o", "pipe"), "pipe: cannot be written: File exists"),
+    ],
+    ids=lambda given: " ".join(given[:3]) if isinstance(given, tuple) else "",
+)
+def test_pipes_are_neither_replaced_nor_waited_for(option, message, outputs):
+    """A pipe stands for a device such as /dev/null, which root could replace by a file."""
+    for name in ("pipe", "pipe.gif"):
+        os.mkfifo(outputs / name)
+    before = contents(outputs)
+    done = dropspin(*option, cwd=outputs)
+    assert (done.returncode, message in done.stderr) == (2, True), done.stderr
+    assert contents(outputs) == before
+    assert (outputs / "pipe").is_fifo()
+    assert (outputs / "pipe.gif").is_fifo()
+
+
+def test_a_pipe_that_is_read_takes_a_summary(outputs):
+    done = subprocess.run(
+        [DROPSPIN, "check", "run", "--summary", "/dev/stdout"], cwd=outputs, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert "|" in done.stdout
 
 
 @contextmanager

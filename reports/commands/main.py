@@ -72,6 +72,8 @@ def _run() -> int:
     except click.ClickException as error:
         error.show()
         return 2
+    except click.Abort:  # an interrupt of a command, with its message
+        raise
     except SystemExit:  # click and Rich exit here only on a closed pipe, with code 1, which would mean a failed check
         raise BrokenPipeError from None
     except Exception as error:

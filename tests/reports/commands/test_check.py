@@ -167,7 +167,7 @@ def test_annotations_are_for_github(repository):
         (["check", "out/good", "--junit", "my_engine.py/x"], "my_engine.py"),
         (["accept", "out/good"], "Missing option '--reason'"),
         (["accept", "out/good", "--reason", " "], "--reason is empty; give the reason why these results are accepted."),
-        (["accept", "out/good", "--reason", "a\nb"], "contains control characters or more than one line; give one line of text."),
+        (["accept", "out/good", "--reason", "a\nb"], "is not printable text of at most 4096 characters."),
         (["accept", "--reason", "x"], "Missing argument 'RUN...'"),
         (["accept", "out/good", "--reason", "x", "--baseline", "my_engine.py"], "my_engine.py: not TOML"),
         (["accept", "out/good", "--reason", "x", "--baseline", "my_engine.py/b.toml"], "my_engine.py/b.toml: cannot be written"),

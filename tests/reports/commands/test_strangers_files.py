@@ -50,7 +50,7 @@ def test_settings_are_printed_without_control_characters(verb, small_folder, cop
     change_table(copied, lambda frame: frame.assign(value=frame["value"] + 1.0))
     done = dropspin(*verb, cwd=tmp_path)
     assert done.returncode in (0, 1), done.stderr
-    assert "\\x1b[2J" in done.stdout
+    assert "\\u001b[2J" in done.stdout
     assert not any("\x1b" in text for text in (done.stdout, done.stderr))
 
 
@@ -110,7 +110,7 @@ def test_names_of_runs_are_printed_without_control_characters(small_folder, tmp_
         shutil.copytree(small_folder, tmp_path / "runs" / os.fsdecode(name))
     done = dropspin("history", "runs", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "one\\x1b[2J" in (tmp_path / "out/history.csv").read_text(encoding="utf-8") + (tmp_path / "out/history.md").read_text(
+    assert "one\\u001b[2J" in (tmp_path / "out/history.csv").read_text(encoding="utf-8") + (tmp_path / "out/history.md").read_text(
         encoding="utf-8"
     )
     assert not any("\x1b" in text for text in (done.stdout, done.stderr, *map(bytes.decode, contents(tmp_path / "out").values())))

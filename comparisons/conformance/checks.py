@@ -1,5 +1,6 @@
 """The table of conformance checks, and `conform`, which runs them in the engine's own process."""
 
+import tempfile
 from collections.abc import Callable, Sequence
 from typing import cast
 
@@ -59,15 +60,21 @@ def conform(
         raise UnknownName("check", unknown, CHECKS)
     entry = present_entry(engine)
     found = []
-    with EngineProcesses(resources) as processes:
+    with tempfile.TemporaryDirectory() as folder, EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
             try:
-                found.append(processes.call(entry, run_check, check))
+                found.append(processes.call(entry, _run_check, check, folder))
             except Failed as failure:
                 found.append(CheckResult(check, cast(CheckOutcome, failure.verdict), failure.reason))
             if on_result is not None:
                 on_result(found[-1])
     return found
+
+
+def _run_check(entry: EngineEntry, check: str, folder: str) -> CheckResult:
+    """Run one check in the engine's process; temporary files go to a folder of the parent, because the engine may end this process."""
+    tempfile.tempdir = folder
+    return run_check(entry, check)
 
 
 def run_check(entry: EngineEntry, check: str) -> CheckResult:

@@ -148,6 +148,8 @@ class EngineProcesses:
         """
         if self._closed:
             raise Closed
+        if entry.label in self._pools and not self._pools[entry.label].active:  # the engine broke its process after its last work
+            self.renew(entry)
         if entry.label not in self._pools:
             self._pools[entry.label] = self._pool(entry)
         self._processes[entry.label].value = 0

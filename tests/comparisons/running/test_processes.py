@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from support import breaking
 from support import engines as made
 
 import dropspin as ds
-from comparisons.running.processes import ResourceLimits
+from comparisons.running.entries import engine_entry
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 
 BALL, SPIN, TIGHT = breaking.BALL, breaking.SPIN, breaking.TIGHT
 TESTS = Path(__file__).parents[2]
@@ -64,6 +66,25 @@ def test_output_of_an_engine_is_dropped(capfd):
     found = ds.run([BALL], [breaking.breaking(breaking.shout)], [4e-3]).table
     assert "garbage" not in "".join(capfd.readouterr())
     assert not found["verdict"].isin(["crashed", "failed"]).any()
+
+
+def leave_soon(entry):
+    threading.Timer(0.1, os._exit, [1]).start()
+
+
+def process_of(entry):
+    return os.getpid()
+
+
+def test_engine_that_ends_its_process_between_two_pieces_of_work_gets_another():
+    """As one does that closed the pipes to its parent."""
+    entry = engine_entry(made.Exact())
+    with EngineProcesses(TIGHT) as processes:
+        first = processes.call(entry, process_of)
+        processes.call(entry, leave_soon)
+        while processes._pools[entry.label].active:
+            time.sleep(0.05)
+        assert processes.call(entry, process_of) != first
 
 
 def test_processor_time_is_counted_per_piece_of_work():

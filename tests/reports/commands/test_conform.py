@@ -126,6 +126,16 @@ def test_checks_are_reported_as_they_finish():
     assert [one.check for one in found] == ["claims", "time"]
 
 
+def test_check_in_a_folder_of_its_own_leaves_no_file(tmp_path, monkeypatch):
+    """Not even if the engine ends the process, which then cannot remove the folder."""
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "breaking.py").write_text(f"import os\n{ADAPTER}\nFlight.advance = lambda *given: os.abort()\n")
+    done = dropspin("conform", "breaking:Flyer", "--check", "files", cwd=tmp_path)
+    assert done.returncode == 3, done.stderr
+    assert not list((tmp_path / "temporary").iterdir())
+
+
 def test_rows_fit_a_terminal_of_80_columns(raising):
     lines = dropspin("conform", "raising:Mine", "--check", "time", cwd=raising, **TERMINAL).stdout.splitlines()
     assert max(map(len, lines)) <= 80

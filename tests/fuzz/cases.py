@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 import signal
 import sys
 import tempfile
@@ -16,7 +17,7 @@ from support.cli import Done, dropspin, spawn
 
 CODES = {0, 1, 2, 3}
 """The allowed exit codes; 130 is that of an interrupt, and 70 that of an internal error, of which there is none here."""
-TIME = 60
+TIME = 300
 """After so many seconds a command counts as one that hangs."""
 LINES, LENGTH = 3, 2000
 """The largest message of exit code 2, besides what it repeats of the command line."""
@@ -33,6 +34,11 @@ def surroundings() -> Iterator[Path]:
         for name in ("work", "home", "temporary"):
             (Path(root) / name).mkdir()
         yield Path(root) / "work"
+
+
+def fill(work: Path, sound: Path) -> None:
+    """Copy sound inputs into a working directory."""
+    shutil.copytree(sound, work, dirs_exist_ok=True)
 
 
 def run(work: Path, *arguments: object, outputs: Iterable[str]) -> Done:
@@ -64,7 +70,8 @@ def _verified(call: Callable[[], Done], work: Path, arguments: tuple[object, ...
     with _alarm() as alarms:
         done = call()
     left = _left(processes)
-    written = {path for path, state in _files(work.parent).items() if files.get(path) != state} | files.keys() - _files(work.parent).keys()
+    after = _files(work.parent)
+    written = {path for path, _ in files.items() ^ after.items()}
     allowed = [os.path.normpath(work / output) for output in outputs]
     outside = {path for path in written if not any(f"{path}/".startswith(f"{one}/") or one.startswith(f"{path}/") for one in allowed)}
     problems = {
@@ -75,7 +82,7 @@ def _verified(call: Callable[[], Done], work: Path, arguments: tuple[object, ...
         "a long message": done.returncode == 2 and not _is_short(done.stderr, arguments),
         f"processes left: {left}": bool(left),
         f"files outside of the output: {sorted(outside)}": bool(outside),
-        "unfinished files left": any("unfinished-" in path for path in _files(work.parent)),
+        "unfinished files left": any("unfinished-" in path for path in after.keys() - files.keys()),
     }
     found = [problem for problem, is_one in problems.items() if is_one]
     command = " ".join(map(ascii, arguments))

@@ -6,8 +6,9 @@ import sys
 from unittest import mock
 
 import pytest
-from fuzz.inputs import ACCEPT, BALL_FILE, DRIFT_FILE, RUN, SPEC_FILE
 from support.cli import dropspin
+
+from fuzz.inputs import ACCEPT, BALL_FILE, DRIFT_FILE, RUN, SPEC_FILE
 
 PR_SET_CHILD_SUBREAPER = 36
 
@@ -31,7 +32,11 @@ def sound(shared):
         (folder / "spec.toml").write_text(SPEC_FILE)
         for output in ("run", "run2"):
             assert dropspin(*RUN, "-o", output, cwd=folder).returncode == 0
-        for command in (ACCEPT, ("sweep", "spec.toml", "-o", "sweep"), ("tradeoff", "drift.toml", "-e", "document", "--budget", "0.1", "-o", "study")):
+        for command in (
+            ACCEPT,
+            ("sweep", "spec.toml", "-o", "sweep"),
+            ("tradeoff", "drift.toml", "-e", "document", "--budget", "0.1", "-o", "study"),
+        ):
             done = dropspin(*command, cwd=folder)
             assert done.returncode == 0, done.stderr
 

@@ -1,10 +1,13 @@
 """Adapters that return, raise or do what the protocol does not have."""
 
+from unittest import mock
+
+from hypothesis import given
+from hypothesis import strategies as st
+
 from fuzz.campaign import cases
 from fuzz.cases import run, surroundings
 from fuzz.inputs import ADAPTER, BALL_FILE, DRIFT_FILE
-from hypothesis import given
-from hypothesis import strategies as st
 
 EVIL = '''
 def no(*given, **named):
@@ -24,27 +27,28 @@ cycles["itself"] = cycles
 deep = []
 for _ in range(100_000): deep = [deep]
 '''
-VALUES = st.sampled_from(
-    """None True False 0 1 -1 2.5 10**400 10**5000 -0.0 1e308 1e-320 float('nan') float('inf') 1j '' 'four' '\\ud800' '\\x1b[2J' 'x'*10**6 b'bytes'
-    [] () {} [1,2] ['a'] [None] {'a':1} {1:2} {(1,2):3} {'\\ud800':1} {'a':{'b':'\\ud800'}} {'a':float('nan')} {'x'*10**6:1} {'a':np.zeros(3)}
-    cycle cycles deep {'deep':deep} Evil() Evil [Evil()] {'a':Evil()} Word('four') Real(4.0) {'a':Word('b')} object object() type lambda:0 no
-    range(10) (x_for_x_in_[1,2]) iter([]) np np.float32 np.float64(1.0) np.float32(0.5) np.int64(3) np.bool_(True) np.nan np.ma.masked np.str_('x')
-    np.zeros(13) np.zeros(12) np.zeros((13,13)) np.full(13,np.nan) np.full(13,np.inf) np.zeros(13,complex) np.zeros(13,'f4') np.zeros(13,'O')
-    np.array(['x']*13) np.zeros((0,13)) np.zeros((5,13)) np.zeros((11,13)) np.ones((11,13)) np.zeros((41,13)) np.array(None) list(range(13)) [0.0]*13
-    np.ma.masked_all(13) np.zeros(13,'M8[s]') np.full(13,1e308) np.arange(13.0) AsBuilt(1.0,np.eye(3),np.zeros(3)) AsBuilt(None,None,None)
-    AsBuilt('a',np.eye(2),[0]) AsBuilt(np.nan,np.full((3,3),np.nan),np.zeros(4)) [KnownLimitation('x')] [KnownLimitation(b'x')] KnownLimitation('x')
-    [KnownLimitation('x',{'drift':'y'})] [KnownLimitation('x',{1:np.nan})] [KnownLimitation('x',{'energy_error':-1})] [KnownLimitation(Evil(),Evil())]
-    (NumericOption(1,2,3),) {'tolerance':NumericOption(None,'a',{})} {'tolerance':NumericOption(0.1,0.0,float('inf'))} {'method':()} {'method':('one',)}
-    {'method':'one'} {'method':(1,2)} {'tolerance':(0.1,0.2,0.3)} {'tolerance':(0.1,'x',None)} {'tolerance':(5.0,6.0,7.0)} {'a[b':('[','\\n')}
-    Drifting Simulation() BatchSimulation() sys.stdout threading.Lock() types.SimpleNamespace()""".split()
-).map(lambda text: text.replace("_for_", " for ").replace("_in_", " in ").replace("lambda:", "lambda *a, **k: "))
+ANSWERS = r"""
+None True False 0 1 -1 2.5 10**400 10**5000 -0.0 1e308 1e-320 float('nan') float('inf') 1j '' 'four' '\ud800' '\x1b[2J' 'x'*10**6
+b'bytes' [] () {} [1,2] ['a'] [None] {'a':1} {1:2} {(1,2):3} {'\ud800':1} {'a':{'b':'\ud800'}} {'a':float('nan')} {'x'*10**6:1}
+{'a':np.zeros(3)} cycle cycles deep {'deep':deep} Evil() Evil [Evil()] {'a':Evil()} Word('four') Real(4.0) {'a':Word('b')} object
+object() type no range(10) map(str,[1]) iter([]) np np.float32 np.float64(1.0) np.float32(0.5) np.int64(3) np.bool_(True)
+np.nan np.ma.masked np.str_('x') np.zeros(13) np.zeros(12) np.zeros((13,13)) np.full(13,np.nan) np.full(13,np.inf) np.zeros(13,complex)
+np.zeros(13,'f4') np.zeros(13,'O') np.array(['x']*13) np.zeros((0,13)) np.zeros((5,13)) np.zeros((11,13)) np.ones((11,13))
+np.zeros((41,13)) np.array(None) list(range(13)) [0.0]*13 np.ma.masked_all(13) np.zeros(13,'M8[s]') np.full(13,1e308) np.arange(13.0)
+AsBuilt(1.0,np.eye(3),np.zeros(3)) AsBuilt(None,None,None) AsBuilt('a',np.eye(2),[0]) AsBuilt(np.nan,np.full((3,3),np.nan),np.zeros(4))
+[KnownLimitation('x')] [KnownLimitation(b'x')] KnownLimitation('x') [KnownLimitation('x',{'drift':'y'})]
+[KnownLimitation('x',{1:np.nan})] [KnownLimitation('x',{'energy_error':-1})] [KnownLimitation(Evil(),Evil())] (NumericOption(1,2,3),)
+{'tolerance':NumericOption(None,'a',{})} {'tolerance':NumericOption(0.1,0.0,float('inf'))} {'method':()} {'method':('one',)}
+{'method':'one'} {'method':(1,2)} {'tolerance':(0.1,0.2,0.3)} {'tolerance':(0.1,'x',None)} {'tolerance':(5.0,6.0,7.0)}
+{'a[b':('[','\n')} Drifting Simulation() BatchSimulation() sys.stdout threading.Lock() types.SimpleNamespace()
+"""
+VALUES = st.sampled_from(ANSWERS.split())
 ACTIONS = st.sampled_from(
     [
         "os._exit(0)",
         "os._exit(7)",
         "os.abort()",
         "os.kill(os.getpid(), signal.SIGTERM)",
-        "os.kill(os.getpid(), signal.SIGSTOP)",
         "sys.exit(0)",
         "no()",
         "(_ for _ in ()).throw(KeyboardInterrupt)",
@@ -53,8 +57,6 @@ ACTIONS = st.sampled_from(
         "(_ for _ in ()).throw(StopIteration)",
         "[os.close(number) for number in range(3, 60)]",
         "subprocess.Popen(['sleep', '1000'])",
-        "threading.Thread(target=lambda: [None for _ in iter(int, 1)]).start()",
-        "[None for _ in iter(int, 1)]",
         "bytearray(2**40)",
         "print('\\x1b[2J', flush=True)",
         "os.write(2, b'Traceback (most recent call last)')",
@@ -65,20 +67,30 @@ ACTIONS = st.sampled_from(
         "os.chdir('/')",
         "os.rmdir(os.getcwd())",
         "setattr(np, 'asarray', None)",
-        "signal.signal(signal.SIGXCPU, signal.SIG_IGN)",
         "signal.alarm(1)",
         "os.fork()",
     ]
 )
-ATTRIBUTES = st.sampled_from(
-    "Mine.name Mine.label Mine.order Mine.precision Mine.choices Mine.numbers Mine.accuracy Mine.reasons Mine.options Mine.__doc__ Mine.__module__ "
-    "Drifting.settings Drifting.settings Drifting.known_limitations Drifting.known_limitations Drifting.velocity_lag".split()
+ENDLESS = st.sampled_from(
+    [
+        "os.kill(os.getpid(), signal.SIGSTOP)",
+        "threading.Thread(target=lambda: [None for _ in iter(int, 1)]).start()",
+        "[None for _ in iter(int, 1)]",
+        "signal.signal(signal.SIGXCPU, signal.SIG_IGN) and [None for _ in iter(int, 1)]",
+        "threading.Event().wait()",
+    ]
 )
-METHODS = st.sampled_from(
-    "Mine.__init__ Mine.__post_init__ Mine.order_in Mine.discretisation Mine.predicted_error Mine.declines Mine.programs Mine.prepare "
-    "Mine.prepare_batch Mine.record_batch Mine.option Mine.accuracy_levels Mine.refined Drifting.__init__ Drifting.advance Drifting.state "
-    "Drifting.state Drifting.record Drifting.as_built Drifting.close Drifting.__enter__ Drifting.__exit__".split()
-)
+NAMED = r"""
+Mine.name Mine.label Mine.order Mine.precision Mine.choices Mine.numbers Mine.accuracy Mine.reasons Mine.options Mine.__doc__
+Mine.__module__ Drifting.settings Drifting.settings Drifting.known_limitations Drifting.known_limitations Drifting.velocity_lag
+"""
+ATTRIBUTES = st.sampled_from(NAMED.split())
+CALLED_BY_DROPSPIN = r"""
+Mine.__init__ Mine.__post_init__ Mine.order_in Mine.discretisation Mine.predicted_error Mine.declines Mine.programs Mine.prepare
+Mine.prepare_batch Mine.record_batch Mine.option Mine.accuracy_levels Mine.refined Drifting.__init__ Drifting.advance Drifting.state
+Drifting.state Drifting.record Drifting.as_built Drifting.close Drifting.__enter__ Drifting.__exit__
+"""
+METHODS = st.sampled_from(CALLED_BY_DROPSPIN.split())
 CHANGES = st.one_of(
     st.tuples(ATTRIBUTES, VALUES).map(" = ".join),
     st.tuples(ATTRIBUTES, VALUES | ACTIONS).map(lambda pair: f"{pair[0]} = property(lambda self: {pair[1]})"),
@@ -87,26 +99,51 @@ CHANGES = st.one_of(
     st.tuples(METHODS, ACTIONS).map(lambda pair: f"{pair[0]} = lambda *given, **named: {pair[1]}"),
     ACTIONS,
 )
-COMMANDS = st.sampled_from(
-    [
-        ("run", "drift.toml", "-e", "mine:Mine", "-e", "document", "--dt", "0.02", "--time-limit", "1", "-o", "out"),
-        ("run", "ball.toml", "-e", "mine:Mine[method=two]", "--dt", "0.04", "--dt", "0.02", "--dt", "0.01", "--time-limit", "1", "-o", "out", "--json"),
-        ("show", "drift.toml", "-e", "mine:Mine"),
-        ("show", "drift.toml", "-e", "mine:Mine", "--json"),
-        ("sweep", "spec.toml", "--time-limit", "1", "-o", "out"),
-        ("conform", "mine:Mine", "--time-limit", "1"),
-        ("tradeoff", "drift.toml", "-e", "mine:Mine", "--budget", "0.1", "-o", "out"),
-        ("limits", "drift.toml", "-e", "mine:Mine", "--axis", "step", "--time-limit", "1", "-o", "out"),
-        ("calibrate", "-e", "mine:Mine", "--restitution", "0.5", "--dt", "0.02"),
-    ]
-)
+CHECKS = ("claims", "declines", "builds what is meant", "repeats", "settings", "files", "bouncing ball")
+CALLED = [
+    ("run", "drift.toml", "-e", "mine:Mine", "-e", "document", "--dt", "0.02", "--time-limit", "1", "-o", "out"),
+    (
+        "run",
+        "ball.toml",
+        "-e",
+        "mine:Mine[method=two]",
+        "--dt",
+        "0.04",
+        "--dt",
+        "0.02",
+        "--dt",
+        "0.01",
+        "--time-limit",
+        "1",
+        "-o",
+        "out",
+        "--json",
+    ),
+    ("show", "drift.toml", "-e", "mine:Mine"),
+    ("show", "drift.toml", "-e", "mine:Mine", "--json"),
+    ("sweep", "spec.toml", "--time-limit", "1", "-o", "out"),
+    ("conform", "mine:Mine", "--time-limit", "1", *(f"--check={check}" for check in CHECKS)),
+    ("tradeoff", "drift.toml", "-e", "mine:Mine", "--budget", "0.1", "-o", "out"),
+    ("limits", "drift.toml", "-e", "mine:Mine", "--axis", "step", "--time-limit", "1", "-o", "out"),
+    ("calibrate", "-e", "mine:Mine", "--restitution", "0.5", "--dt", "0.02"),
+]
+COMMANDS = st.sampled_from(CALLED)
 SPEC = 'scenes = ["drift.toml"]\nengines = ["mine:Mine", "document"]\ndts = [0.02]\n[grid]\n"body.mass" = [1.0, 2.0]\n'
 
 
-@cases(200)
-@given(st.lists(CHANGES, min_size=1, max_size=2), COMMANDS)
-def test_answers_of_an_adapter_are_used_or_cost_its_rows(changes, command):
-    with surroundings() as work:
+WITH_LIMIT = st.sampled_from([command for command in CALLED if command[0] == "run"])  # of import and construction too
+CALLS = st.one_of(
+    *[st.tuples(st.lists(CHANGES, min_size=1, max_size=2), COMMANDS)] * 9,
+    st.tuples(st.tuples(METHODS, ENDLESS).map(lambda pair: [f"{pair[0]} = lambda *given, **named: {pair[1]}"]), WITH_LIMIT),
+    st.tuples(st.lists(ENDLESS, min_size=1, max_size=1), WITH_LIMIT),
+)
+
+
+@cases(150)
+@given(CALLS)
+def test_answers_of_an_adapter_are_used_or_cost_its_rows(call):
+    changes, command = call
+    with surroundings() as work, mock.patch("comparisons.running.processes.WALL_TIME_FACTOR", 3.0):
         for name, text in {"drift.toml": DRIFT_FILE, "ball.toml": BALL_FILE, "spec.toml": SPEC}.items():
             (work / name).write_text(text)
         (work / "mine.py").write_text("\n".join([ADAPTER, EVIL, *changes, ""]))

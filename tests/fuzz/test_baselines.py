@@ -1,14 +1,14 @@
 """Baselines: changed ones of a run, and others."""
 
-import shutil
 import tomllib
 
-from fuzz.campaign import cases
-from fuzz.cases import run, surroundings
-from fuzz.inputs import BALL_FILE, toml
-from fuzz.strategies import KEYS, VALUES, damaged, edited
 from hypothesis import given
 from hypothesis import strategies as st
+
+from fuzz.campaign import cases
+from fuzz.cases import fill, run, surroundings
+from fuzz.inputs import toml
+from fuzz.strategies import KEYS, VALUES, damaged, edited
 
 COMMANDS = st.sampled_from(
     [
@@ -25,9 +25,11 @@ COMMANDS = st.sampled_from(
 def test_baselines_are_used_or_refused(sound, data, command):
     content = (sound / "dropspin-baseline.toml").read_bytes()
     tree = tomllib.loads(content.decode())
-    given_content = data.draw(edited(tree).map(toml) | damaged(content) | st.dictionaries(KEYS, VALUES, max_size=4).map(toml), label="baseline")
+    given_content = data.draw(
+        edited(tree).map(toml) | damaged(content) | st.dictionaries(KEYS, VALUES, max_size=4).map(toml), label="baseline"
+    )
     with surroundings() as work:
-        shutil.copytree(sound / "run", work / "run")
+        fill(work, sound)
         (work / "dropspin-baseline.toml").write_bytes(given_content)
         run(work, *command, outputs=["out"] if command[0] == "check" else ["dropspin-baseline.toml"])
 
@@ -38,6 +40,6 @@ def test_a_run_is_judged_by_a_baseline_or_refused(sound, data):
     content = (sound / "dropspin-baseline.toml").read_bytes()
     given_content = data.draw(edited(tomllib.loads(content.decode())).map(toml) | damaged(content), label="baseline")
     with surroundings() as work:
-        (work / "ball.toml").write_text(BALL_FILE)
+        fill(work, sound)
         (work / "baseline.toml").write_bytes(given_content)
         run(work, "run", "ball.toml", "-e", "document", "--dt", "0.02", "-o", "out", "--baseline", "baseline.toml", outputs=["out"])

@@ -1,13 +1,13 @@
 """Names of engines with options, such as `document[contact=sequential,rotation=exact]`, and of classes, such as `my_module:MyEngine`."""
 
-from fuzz.campaign import cases
-from fuzz.cases import run, surroundings
-from fuzz.inputs import ADAPTER, BALL_FILE, DRIFT_FILE, SPEC, toml
-from fuzz.strategies import NUMBERS, TEXTS
 from hypothesis import given
 from hypothesis import strategies as st
 
 from comparisons.engines.registry import BUILT_IN, engine
+from fuzz.campaign import cases
+from fuzz.cases import run, surroundings
+from fuzz.inputs import ADAPTER, BALL_FILE, DRIFT_FILE, SPEC, toml
+from fuzz.strategies import NUMBERS, TEXTS
 
 WITH_OPTIONS = ("document", "mujoco", "pybullet")
 SOUND = st.sampled_from(WITH_OPTIONS).flatmap(
@@ -24,11 +24,15 @@ SOUND = st.sampled_from(WITH_OPTIONS).flatmap(
     )
 )
 ODD = st.tuples(
-    st.sampled_from([*BUILT_IN, "Mujoco", "my_module:Mine", "my_module:Other", "my_module:", ":Mine", "my_module:Mine:x", "os:path", "os:system"])
+    st.sampled_from(
+        [*BUILT_IN, "Mujoco", "my_module:Mine", "my_module:Other", "my_module:", ":Mine", "my_module:Mine:x", "os:path", "os:system"]
+    )
     | st.sampled_from(["..my_module:Mine", "my_module.Mine", "absent:Mine", "spec:Mine", "my_module:Mine.name", "my_module:np.array"])
     | TEXTS,
     st.lists(
-        st.tuples(st.sampled_from(["method", "tolerance", "rotation", "contact", "integrator", "kappa"]) | TEXTS, TEXTS | NUMBERS.map(str)).map("=".join)
+        st.tuples(
+            st.sampled_from(["method", "tolerance", "rotation", "contact", "integrator", "kappa"]) | TEXTS, TEXTS | NUMBERS.map(str)
+        ).map("=".join)
         | TEXTS,
         max_size=3,
     ),

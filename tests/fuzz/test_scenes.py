@@ -2,12 +2,13 @@
 
 import tomllib
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from fuzz.campaign import cases
 from fuzz.cases import run, surroundings
 from fuzz.inputs import BALL, BALL_FILE, CATALOGUE_FILES, ENSEMBLE, RANDOM, SPEC, SPEC_FILE, toml
-from fuzz.strategies import KEYS, LEAVES, NUMBERS, VALUES, damaged, edited
-from hypothesis import given
-from hypothesis import strategies as st
+from fuzz.strategies import KEYS, LEAVES, NUMBERS, VALUES, damaged, edited, mostly
 
 FILES = st.one_of(
     st.sampled_from(sorted(CATALOGUE_FILES)).flatmap(lambda name: damaged(CATALOGUE_FILES[name])),
@@ -16,18 +17,24 @@ FILES = st.one_of(
     st.dictionaries(KEYS, VALUES, max_size=5).map(toml),
     st.binary(max_size=40),
 )
-VECTORS = st.lists(NUMBERS, min_size=3, max_size=3)
-BODIES = st.fixed_dictionaries({"shape": st.just("sphere"), "mass": NUMBERS, "radius": NUMBERS}, optional={"inertia": VECTORS}) | st.one_of(
-    st.fixed_dictionaries({"shape": st.just("box"), "mass": NUMBERS, "half_extents": VECTORS}),
-    st.fixed_dictionaries({"shape": st.just("vertices"), "mass": NUMBERS, "points": st.lists(VECTORS, min_size=2, max_size=6)}),
+NEAR_SOUND = mostly(st.floats(1e-3, 10.0), NUMBERS)
+VECTORS = st.lists(st.one_of(st.just(0.0), NEAR_SOUND), min_size=3, max_size=3)
+BODIES = st.one_of(
+    st.fixed_dictionaries({"shape": st.just("sphere"), "mass": NEAR_SOUND, "radius": NEAR_SOUND}, optional={"inertia": VECTORS}),
+    st.fixed_dictionaries({"shape": st.just("box"), "mass": NEAR_SOUND, "half_extents": st.lists(NEAR_SOUND, min_size=3, max_size=3)}),
+    st.fixed_dictionaries({"shape": st.just("vertices"), "mass": NEAR_SOUND, "points": st.lists(VECTORS, min_size=3, max_size=6)}),
 )
 WELL_TYPED = st.fixed_dictionaries(
-    {"duration": st.just(0.2) | NUMBERS, "body": BODIES},
+    {"duration": mostly(st.just(0.2), NUMBERS), "body": BODIES},
     optional={
-        "start": st.fixed_dictionaries({}, optional={"position": VECTORS, "velocity": VECTORS, "angular_velocity": VECTORS}),
+        "start": st.fixed_dictionaries({"position": VECTORS}, optional={"velocity": VECTORS, "angular_velocity": VECTORS}),
         "gravity": st.fixed_dictionaries({"acceleration": VECTORS}),
-        "floor": st.fixed_dictionaries({"restitution": st.floats(0.0, 1.0), "friction": NUMBERS | st.sampled_from(["none", "infinite"])}),
-        "damping": st.fixed_dictionaries({}, optional={"linear": NUMBERS, "angular": NUMBERS}),
+        "floor": st.fixed_dictionaries(
+            {"restitution": st.floats(0.0, 1.0), "friction": NEAR_SOUND | st.sampled_from(["none", "infinite"])},
+            optional={"rest_speed": NEAR_SOUND},
+        ),
+        "damping": st.fixed_dictionaries({}, optional={"linear": NEAR_SOUND, "angular": NEAR_SOUND}),
+        "ensemble": st.fixed_dictionaries({"size": st.integers(2, 20), "seed": st.integers(0, 9)}, optional={"turn": NEAR_SOUND}),
     },
 ).map(toml)
 NAMES = st.sampled_from(["scene.toml", "a[b].toml", "[red].toml", "x" * 200 + ".toml", "é 日.toml", "-x.toml", "drop-ball.toml", "scene"])
@@ -50,7 +57,10 @@ def test_scenes_are_run_or_refused(content, name, engine):
 
 
 @cases(50)
-@given(edited(BALL | ENSEMBLE).map(toml) | WELL_TYPED, st.sampled_from([("limits", "--axis", "spin", "--time-limit", "1"), ("tradeoff", "--budget", "0.1")]))
+@given(
+    edited(BALL | ENSEMBLE).map(toml) | WELL_TYPED,
+    st.sampled_from([("limits", "--axis", "spin", "--time-limit", "5"), ("tradeoff", "--budget", "0.1")]),
+)
 def test_scenes_are_studied_or_refused(content, command):
     with surroundings() as work:
         (work / "scene.toml").write_bytes(content)
@@ -58,7 +68,9 @@ def test_scenes_are_studied_or_refused(content, command):
 
 
 @cases(150)
-@given(edited(SPEC).map(toml) | edited(RANDOM).map(toml) | damaged(SPEC_FILE.encode()) | st.dictionaries(KEYS, LEAVES, max_size=3).map(toml))
+@given(
+    edited(SPEC).map(toml) | edited(RANDOM).map(toml) | damaged(SPEC_FILE.encode()) | st.dictionaries(KEYS, LEAVES, max_size=3).map(toml)
+)
 def test_specs_of_sweeps_are_run_or_refused(content):
     with surroundings() as work:
         (work / "ball.toml").write_text(BALL_FILE)

@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 IS_NEW := -c 'import sys; sys.exit(sys.version_info < (3, 11))'
 PYTHON ?= $(shell for python in python3.11 python3; do "$$python" $(IS_NEW) 2> /dev/null && echo "$$python" && break; done)
 
-.PHONY: report test test-browser test-all faults coverage bench examples docs lint clean
+.PHONY: report test test-browser test-all fuzz faults coverage bench examples docs lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
@@ -18,6 +18,9 @@ test-browser: $(VENV)/.installed-browser  ## the report and the replay in a real
 
 test-all: lint test test-browser docs ## everything, and the studies that take minutes
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+
+fuzz: $(VENV)/.installed-dev          ## commands with damaged files, wrong adapters and odd options: FUZZ_CASES=2000 FUZZ_SEED=0
+	FUZZ_CASES=$(or $(FUZZ_CASES),2000) $(BIN)/python -m pytest -n 2 --dist worksteal tests/fuzz
 
 faults: $(VENV)/.installed-dev        ## engines with one planted fault each against the core catalogue: docs/faults.md
 	$(BIN)/python tests/support/fault_suite.py

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from hypothesis import HealthCheck, seed, settings
+from hypothesis import HealthCheck, Phase, seed, settings
 
 CASES = int(os.environ.get("FUZZ_CASES", "60"))
 SEED = int(os.environ.get("FUZZ_SEED", "0"))
@@ -15,5 +15,6 @@ IN_ALL = 2000
 def cases(of_all: int) -> Callable[[Any], Any]:
     """Run a test of hypothesis with this many cases of the 2,000, or with its share of fewer or more."""
     count = max(1, round(of_all * CASES / IN_ALL))
-    chosen = settings(max_examples=count, database=None, suppress_health_check=list(HealthCheck), print_blob=False)
+    # Without shrinking: cases are small, and a command takes up to seconds.
+    chosen = settings(max_examples=count, phases=[Phase.generate], database=None, suppress_health_check=list(HealthCheck))
     return lambda test: seed(SEED)(chosen(test))

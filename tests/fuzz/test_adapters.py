@@ -100,51 +100,45 @@ CHANGES = st.one_of(
     ACTIONS,
 )
 CHECKS = ("claims", "declines", "builds what is meant", "repeats", "settings", "files", "bouncing ball")
-CALLED = [
-    ("run", "drift.toml", "-e", "mine:Mine", "-e", "document", "--dt", "0.02", "--time-limit", "1", "-o", "out"),
-    (
-        "run",
-        "ball.toml",
-        "-e",
-        "mine:Mine[method=two]",
-        "--dt",
-        "0.04",
-        "--dt",
-        "0.02",
-        "--dt",
-        "0.01",
-        "--time-limit",
-        "1",
-        "-o",
-        "out",
-        "--json",
-    ),
-    ("show", "drift.toml", "-e", "mine:Mine"),
-    ("show", "drift.toml", "-e", "mine:Mine", "--json"),
-    ("sweep", "spec.toml", "--time-limit", "1", "-o", "out"),
-    ("conform", "mine:Mine", "--time-limit", "1", *(f"--check={check}" for check in CHECKS)),
-    ("tradeoff", "drift.toml", "-e", "mine:Mine", "--budget", "0.1", "-o", "out"),
-    ("limits", "drift.toml", "-e", "mine:Mine", "--axis", "step", "--time-limit", "1", "-o", "out"),
-    ("calibrate", "-e", "mine:Mine", "--restitution", "0.5", "--dt", "0.02"),
-]
-COMMANDS = st.sampled_from(CALLED)
+OUTPUT = ("--time-limit", "1", "-o", "out")
+RUN = ("run", "drift.toml", "-e", "mine:Mine", "-e", "document", "--dt", "0.02", *OUTPUT)
+SEVERAL_STEPS = ("run", "ball.toml", "-e", "mine:Mine[method=two]", "--dt", "0.04", "--dt", "0.02", "--dt", "0.01", "--json", *OUTPUT)
+SHOW = ("show", "drift.toml", "-e", "mine:Mine")
+COMMANDS = st.sampled_from([RUN, SEVERAL_STEPS, SHOW, (*SHOW, "--json"), ("sweep", "spec.toml", *OUTPUT)])
+STUDIES = st.sampled_from(
+    [
+        ("conform", "mine:Mine", "--time-limit", "1", *(f"--check={check}" for check in CHECKS)),
+        ("tradeoff", "drift.toml", "-e", "mine:Mine", "--budget", "0.1", "-o", "out"),
+        ("limits", "drift.toml", "-e", "mine:Mine", "--axis", "step", *OUTPUT),
+        ("calibrate", "-e", "mine:Mine", "--restitution", "0.5", "--dt", "0.02"),
+    ]
+)
 SPEC = 'scenes = ["drift.toml"]\nengines = ["mine:Mine", "document"]\ndts = [0.02]\n[grid]\n"body.mass" = [1.0, 2.0]\n'
 
 
-WITH_LIMIT = st.sampled_from([command for command in CALLED if command[0] == "run"])  # of import and construction too
-CALLS = st.one_of(
-    *[st.tuples(st.lists(CHANGES, min_size=1, max_size=2), COMMANDS)] * 9,
-    st.tuples(st.tuples(METHODS, ENDLESS).map(lambda pair: [f"{pair[0]} = lambda *given, **named: {pair[1]}"]), WITH_LIMIT),
-    st.tuples(st.lists(ENDLESS, min_size=1, max_size=1), WITH_LIMIT),
-)
-
-
-@cases(150)
-@given(CALLS)
-def test_answers_of_an_adapter_are_used_or_cost_its_rows(call):
-    changes, command = call
+def run_with(changes, command):
+    """Run a command with an adapter that is changed."""
     with surroundings() as work, mock.patch("comparisons.running.processes.WALL_TIME_FACTOR", 3.0):
         for name, text in {"drift.toml": DRIFT_FILE, "ball.toml": BALL_FILE, "spec.toml": SPEC}.items():
             (work / name).write_text(text)
         (work / "mine.py").write_text("\n".join([ADAPTER, EVIL, *changes, ""]))
         run(work, *command, outputs=["out"])
+
+
+@cases(80)
+@given(st.lists(CHANGES, min_size=1, max_size=2), COMMANDS)
+def test_answers_of_an_adapter_are_used_or_cost_its_rows(changes, command):
+    run_with(changes, command)
+
+
+@cases(50)
+@given(st.lists(CHANGES, min_size=1, max_size=2), STUDIES)
+def test_answers_of_an_adapter_are_used_or_end_its_study(changes, command):
+    run_with(changes, command)
+
+
+@cases(20)
+@given(METHODS.map(lambda method: f"{method} = lambda *given, **named: ") | st.just(""), ENDLESS)
+def test_adapters_that_never_answer_cost_their_rows(place, action):
+    """In a run, whose limit of time is that of the import and the construction too."""
+    run_with([f"{place}{action}"], RUN)

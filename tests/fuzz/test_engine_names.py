@@ -44,7 +44,6 @@ COMMANDS = st.sampled_from(
         ("show", "drift.toml", "--json"),
         ("run", "ball.toml", "--dt", "0.02", "--time-limit", "1", "-o", "out"),
         ("run", "drift.toml", "--dt", "0.05", "--time-limit", "1", "-o", "out", "--json"),
-        ("calibrate", "--restitution", "0.5", "--dt", "0.02"),
     ]
 )
 

@@ -200,9 +200,12 @@ class Vertices(_Body):
         centred = self.vertices - self.vertices.mean(axis=0)
         if np.linalg.matrix_rank(centred, tol=1e-9 * self.size) < 3:
             return 0.0
-        from scipy.spatial import ConvexHull
+        from scipy.spatial import ConvexHull, QhullError
 
-        return float(np.min(np.abs(ConvexHull(self.vertices).equations[:, 3])))
+        try:
+            return float(np.min(np.abs(ConvexHull(self.vertices).equations[:, 3])))
+        except QhullError:  # thinner than Qhull resolves
+            return 0.0
 
 
 def hull_corners(points: Array) -> NDArray[np.intp]:

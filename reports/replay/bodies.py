@@ -1,6 +1,7 @@
 """The surface of a body: the faces of the convex hull of its vertices, or a sphere."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,14 +36,17 @@ def outline(body: Body) -> Outline:
     """The convex hull of the vertices of a body, or its sphere."""
     if body.rounding:
         return Outline(body.vertices, [], body.rounding)
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, QhullError
 
     points = body.vertices
     centre, (_, spread, axes) = points.mean(axis=0), np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    if spread[2] < IN_ONE_PLANE * body.size * np.sqrt(len(points)):
+    hull = None
+    if spread[2] >= IN_ONE_PLANE * body.size * np.sqrt(len(points)):
+        with suppress(QhullError):  # thinner than Qhull resolves
+            hull = ConvexHull(points)
+    if hull is None:
         corners = ConvexHull((points - centre) @ axes[:2].T).vertices
         return Outline(points[corners], [list(range(len(corners)))], is_flat=True)
-    hull = ConvexHull(points)
     # Qhull splits faces into triangles; triangles of one plane form one face.
     planes: dict[tuple[float, ...], set[int]] = {}
     for plane, corners in zip(hull.equations, hull.simplices, strict=True):

@@ -42,3 +42,13 @@ def test_plane_body_is_one_face():
     [face] = shape.faces
     sides = np.linalg.norm(np.diff(shape.vertices[[*face, face[0]]], axis=0), axis=1)
     np.testing.assert_allclose(sides, 2.0, rtol=1e-12)
+
+
+def test_body_thinner_than_qhull_resolves_is_plane():
+    """Points within a few metres of a triangle of a thousand kilometres."""
+    points = [[1.0, 1.0, 0.0], [3.0, 1e-3, 1e6], [1e-5, 2.0, 3.0], [1e-3, 0.0, 1e4], [1e4, 0.0, 1e4], [0.0, 2.0, 3.0]]
+    body = ds.load({"duration": 1.0, "body": {"shape": "vertices", "points": points, "mass": 1.0}}).body
+    shape = outline(body)
+    assert shape.is_flat
+    assert len(shape.faces) == 1
+    assert body.resting_height == 0.0

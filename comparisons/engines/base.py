@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from scenarios import Scenario, Truth
 from scenarios.errors import DropspinError, UnknownName
+from scenarios.validation import shown
 
 Array = NDArray[np.float64]
 
@@ -219,7 +220,7 @@ class Engine:
                 raise UnknownName(f"{self.name}'s accuracy option", option, [*self.choices, *self.numbers])
             if len(set(values)) < FEWEST_VALUES:
                 raise DropspinError(
-                    f"{self.name}.accuracy[{option!r}]: got {values!r}; give at least {FEWEST_VALUES} values, coarsest first."
+                    f"{self.name}.accuracy[{option!r}]: got {shown(values)}; give at least {FEWEST_VALUES} values, coarsest first."
                 )
 
     def _default(self, option: str) -> str:

@@ -12,6 +12,7 @@ from typing import NamedTuple, cast
 from comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from comparisons.engines.exceptions import described
 from scenarios.errors import DropspinError, UnknownName
+from scenarios.validation import shown
 
 
 class _Home(NamedTuple):
@@ -156,7 +157,8 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
     given = getattr(adapter, "name", "")
     if not isinstance(given, str) or not re.fullmatch(r"[A-Za-z][\w-]*", given, re.ASCII):
         raise DropspinError(
-            f"engine {name!r}: {attribute}.name is {given!r}; give it a name for results, of letters, digits, - and _, such as 'my-engine'."
+            f"engine {name!r}: {attribute}.name is {shown(given)}; "
+            "give it a name for results, of letters, digits, - and _, such as 'my-engine'."
         )
     if given in BUILT_IN:
         raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is a built-in engine; results need another name.")

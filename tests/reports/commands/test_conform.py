@@ -149,6 +149,7 @@ ENGINE = "from dropspin import Engine\nclass Mine(Engine):"
     ("text", "code", "message"),
     [
         ("", 2, "my_module's engine 'Mine' is unknown"),
+        (f"{ENGINE} name = 'x y' * 1000", 2, "Mine.name is 'x yx yx"),
         ("Mine = 3", 2, "Mine is not an engine; an engine is a class that inherits from dropspin.Engine"),
         (f"{ENGINE} pass", 2, "Mine.name is ''; give it a name for results"),
         ("import no_such_engine", 3, "needs the module no_such_engine, which is not installed"),
@@ -166,6 +167,7 @@ def test_what_is_not_an_engine_is_refused_in_one_line(text, code, message, tmp_p
     assert done.returncode == code
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == 1
+    assert len(done.stderr) < 400
 
 
 def test_an_engine_of_another_package(tmp_path):

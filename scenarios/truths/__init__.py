@@ -11,6 +11,7 @@ from scenarios.truths.coulomb_turn import coulomb_turn
 from scenarios.truths.flight import flight
 from scenarios.truths.impact_laws import LAWS, Law
 from scenarios.truths.rocking import rocking
+from scenarios.truths.rolling import rolling
 from scenarios.truths.slipping import slipping
 from scenarios.truths.truth import Impact, Truth
 
@@ -37,7 +38,7 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
         raise DropspinError(f"scene: got {scene!r} ({type(scene).__name__}); give a Scenario, as load() returns it.")
     if law is not None:
         return corner_impact(scene, law)
-    for problem in (flight, bounce_ladder, rocking, slipping, corner_impact, coulomb_slide, coulomb_turn):
+    for problem in (flight, bounce_ladder, rocking, slipping, corner_impact, coulomb_slide, rolling, coulomb_turn):
         truth = problem(scene)
         if truth is not None:
             return truth

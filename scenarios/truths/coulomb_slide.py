@@ -1,51 +1,66 @@
-"""A box slides flat over a rough floor: friction decelerates it uniformly until it stops.
+"""A body lies or slides flat on a rough floor, level or sloped: friction acts against its velocity until it stops.
 
-    v(t) = (v₀ - f g t) d,   x(t) = x₀ + (v₀ t - f g t²/2) d   until it stops at t = v₀/(f g), after v₀²/(2 f g)
+    dv/dt = g_t - f g_n v/|v|        g_t, g_n: gravity along the floor and into it
 
-The box stays flat if the normal force can act ahead of the centre of mass by f times its height, a point that must lie within the base.
+It stays where it stops if |g_t| <= f g_n, as does one that starts at rest. On a level floor it stops at t = |v₀|/(f g), after |v₀|²/(2 f g).
+The body stays flat if the normal force can act ahead of the centre of mass by f times its height; at rest, down the slope by |g_t|/g_n times
+its height. These points must lie within the base.
 
-Source: C. A. de Coulomb, Théorie des machines simples (1785).
-Valid for: a box or other body on at least three vertices, lying on the floor at the start, without spin, moving horizontally; a Coulomb
-coefficient above 0; gravity straight down, no damping. Restitution has no effect, because no contact separates.
+Source: C. A. de Coulomb, Théorie des machines simples (1785); `dry_friction` for the motion on a slope.
+Valid for: a box or other body on at least three vertices, lying on the floor at the start, without spin, at rest or moving along the floor;
+a Coulomb coefficient above 0, or infinite friction at rest; gravity into the floor, which may be sloped, no damping. Restitution has no
+effect, because no contact separates.
 """
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.body import Sphere
 from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import rotate
 from scenarios.state import POSITION, SPIN, VELOCITY
+from scenarios.truths.dry_friction import dry_friction
 from scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 
+LEVEL = np.array([1.0, 0.0, 1.0])
+
 
 def coulomb_slide(scene: Scenario) -> Truth | None:
-    """The exact solution of a flat slide."""
+    """The exact solution of a flat slide, or of rest on a slope."""
     floor, start, g = scene.floor, scene.initial_state, scene.acceleration
-    if floor is None or isinstance(floor.friction, str) or scene.damping is not None:
+    if floor is None or floor.friction == "none" or scene.damping is not None or isinstance(scene.body, Sphere):
         return None
-    straight_down = g[1] < 0.0 and g[0] == 0.0 and g[2] == 0.0
-    if not straight_down or start[8] != 0.0 or start[SPIN].any() or not start[[7, 9]].any():
+    if g[1] >= 0.0 or start[8] != 0.0 or start[SPIN].any():
         return None
-    speed = float(np.linalg.norm(start[VELOCITY]))
-    direction = start[VELOCITY] / speed
-    slowing = floor.friction * -float(g[1])
-    if not _slides_flat(scene, direction, floor.friction):
+    pull, into = g * LEVEL, -float(g[1])
+    friction = math.inf if floor.friction == "infinite" else float(floor.friction)
+    velocity = start[VELOCITY]
+    if not velocity.any() and not pull.any() or velocity.any() and math.isinf(friction):
+        return None
+    motion, stops = dry_friction(velocity, pull, friction * into)
+    if not _stays_flat(scene, velocity, pull / into, friction):
         return None
 
     def states(t: Array) -> Array:
         rows = np.tile(start, (len(t), 1))
-        moving = np.minimum(t, speed / slowing)[:, None]
-        rows[:, POSITION] += (speed * moving - 0.5 * slowing * moving**2) * direction
-        rows[:, VELOCITY] = (speed - slowing * moving) * direction
+        rows[:, VELOCITY], way = motion(t)
+        rows[:, POSITION] += way
         return rows
 
-    return Truth("coulomb-slide", "uniform deceleration by friction, v0 - f g t, until it stops (Coulomb)", states, horizon=scene.duration)
+    statement = "deceleration f g against the velocity until it stops (Coulomb)"
+    return Truth("coulomb-slide", statement, states, horizon=scene.duration)
 
 
-def _slides_flat(scene: Scenario, direction: Array, friction: float) -> bool:
-    """Whether the normal force can act ahead of the centre of mass by friction coefficient times height, within the base."""
+def _stays_flat(scene: Scenario, velocity: Array, slope: Array, friction: float) -> bool:
+    """Whether the normal force can act where it must within the base.
+
+    Its distance from the centre of mass is height times friction coefficient, in the direction of the velocity, which turns from that of
+    the start towards the slope; at rest it is height times slope.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     offsets = rotate(np.array(scene.start.orientation), scene.body.vertices)
@@ -56,5 +71,17 @@ def _slides_flat(scene: Scenario, direction: Array, friction: float) -> bool:
         hull = ConvexHull(base[:, [0, 2]])
     except QhullError:  # collinear
         return False
-    ahead = -friction * offsets[:, 1].min() * direction[[0, 2]]
-    return bool((hull.equations[:, :2] @ ahead + hull.equations[:, 2]).max() < 0.0)
+    height, steepness = -float(offsets[:, 1].min()), float(np.linalg.norm(slope))
+    outward, reach = hull.equations[:, :2], -hull.equations[:, 2]
+    needed = outward @ slope[[0, 2]]
+    if velocity.any() or friction < steepness:
+        first = (velocity if velocity.any() else slope)[[0, 2]]
+        last = slope[[0, 2]] if steepness else first
+        needed = np.maximum(needed, min(friction, 1e9) * _farthest(outward, first / np.linalg.norm(first), last / np.linalg.norm(last)))
+    return bool((height * needed < reach).all())
+
+
+def _farthest(outward: Array, first: Array, last: Array) -> Array:
+    """The largest component along each unit vector, shape (n, 2), of the directions between two directions."""
+    between = (outward @ (first + last) > 0.0) & (np.minimum(outward @ first, outward @ last) >= first @ last)
+    return np.where(between, 1.0, np.maximum(outward @ first, outward @ last))

@@ -1,0 +1,126 @@
+"""A ball on a rough floor, level or sloped: it slides until its contact point is at rest, and rolls from then on.
+
+With r the radius, I the moment of inertia, k = 1 + M r²/I, and s = v + ω × (-r Y) the velocity of the contact point:
+
+    ds/dt = g_t - k f g_n s/|s|                    sliding; g_t, g_n: gravity along the floor and into it
+    s = 0 from then on, if |g_t| <= k f g_n        rolling
+    v = v₀ + g_t t - (s₀ + g_t t - s)/k            of both, because friction changes v and s in the ratio 1 : k
+    ω = ω₀ + (k - 1)/r Y × (s₀ + g_t t - s)/k      of both, by the torque of the same friction
+
+A solid ball, k = 7/2, that is thrown without spin rolls at 5/7 of its speed; on a slope it rolls with 5/7 of g_t. The component of ω along Y
+is constant. The angle of the rotation is an integral of ω where its direction is constant; else the orientation is integrated numerically.
+
+Source: G. G. de Coriolis, Théorie mathématique des effets du jeu de billard (1835); `dry_friction` for the velocity of the contact point.
+Valid for: a ball of equal moments that touches the floor at the start, with any velocity along the floor and any spin; any friction, but
+infinite friction only without slip; gravity into the floor, which may be sloped, no damping. Restitution has no effect, because the
+contact does not separate.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.body import Sphere
+from scenarios.model import TOUCHING, Scenario
+from scenarios.rotations import about, multiply
+from scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
+from scenarios.truths.coulomb_slide import LEVEL
+from scenarios.truths.dry_friction import Motion, dry_friction
+from scenarios.truths.truth import Truth
+
+Array = NDArray[np.float64]
+
+NO_SLIP = 1e-14
+"""Speed of a contact point that counts as rest, relative to the ball's speed."""
+ONE_AXIS = 1e-14
+"""Largest part of an angular velocity across the largest one, relative to it, up to which the axis counts as constant."""
+SAMPLES = 50
+"""Times at which the axis is compared."""
+STEP = 0.05
+"""Largest rotation in a step of the numerical integration [rad]."""
+
+
+def rolling(scene: Scenario) -> Truth | None:
+    """The exact solution of a ball that slides and rolls."""
+    floor, start, g, body = scene.floor, scene.initial_state, scene.acceleration, scene.body
+    if floor is None or scene.damping is not None or not isinstance(body, Sphere) or g[1] >= 0.0 or start[8] != 0.0:
+        return None
+    moments = np.diag(body.inertia_tensor)
+    if abs(scene.clearance) > TOUCHING * body.size or np.ptp(moments) > 0.0:
+        return None
+    velocity, spin, pull = start[VELOCITY], start[SPIN], g * LEVEL
+    slip = velocity + body.radius * np.cross(UP, spin)
+    if np.linalg.norm(slip) <= NO_SLIP * np.linalg.norm(velocity):
+        slip = np.zeros(3)
+    if floor.friction == "infinite" and slip.any():
+        return None
+    friction = {"none": 0.0, "infinite": math.inf}[floor.friction] if isinstance(floor.friction, str) else floor.friction
+    share = 1.0 + body.mass * body.radius**2 / float(moments[0])  # k
+    contact, stops = dry_friction(slip, pull, share * friction * -float(g[1]))
+
+    def lost(t: Array) -> tuple[Array, Array]:
+        """Changes of velocity by friction, with the sign reversed, and their integrals, each of shape (n, 3)."""
+        slipping, way = contact(t)
+        t = t[:, None]
+        return (slip + pull * t - slipping) / share, (slip * t + 0.5 * pull * t**2 - way) / share
+
+    def spins(t: Array) -> tuple[Array, Array]:
+        return tuple(spin * power + (share - 1.0) / body.radius * np.cross(UP, one) for power, one in zip((1.0, t[:, None]), lost(t), strict=True))
+
+    orientations = _orientations(scene, spins, stops)
+
+    def states(t: Array) -> Array:
+        (change, way), t_ = lost(t), t[:, None]
+        position = start[POSITION] + velocity * t_ + 0.5 * pull * t_**2 - way
+        return np.hstack([position, orientations(t), velocity + pull * t_ - change, spins(t)[0]])
+
+    statement = "friction f g on the contact point until it is at rest, then rolling (Coriolis 1835)"
+    return Truth("rolling", statement, states, horizon=scene.duration)
+
+
+def _orientations(scene: Scenario, spins: Motion, kink: float) -> Callable[[Array], Array]:
+    """Orientations at times [s], from the angular velocity and its integral; the angular acceleration jumps at the time `kink`."""
+    start = scene.initial_state
+    samples, turns = spins(np.linspace(0.0, scene.duration, SAMPLES))
+    largest = samples[np.argmax(np.linalg.norm(samples, axis=1))]
+    size = float(np.linalg.norm(largest))
+    axis = largest / size if size else UP
+    if np.linalg.norm(np.cross(axis, samples), axis=1).max() <= ONE_AXIS * size:
+        return lambda t: multiply(about(axis, spins(t)[1] @ axis), start[ORIENTATION])
+    return _integrated(start[ORIENTATION], spins, min(kink, scene.duration), scene.duration)
+
+
+def _integrated(start: Array, spins: Motion, kink: float, end: float) -> Callable[[Array], Array]:
+    """Orientations by Magnus's expansion of order 6, in short steps on each side of the kink."""
+    fastest = float(np.linalg.norm(spins(np.linspace(0.0, end, SAMPLES))[0], axis=1).max())
+    sides = [(first, last) for first, last in ((0.0, kink), (kink, end)) if last > first]
+    grids = [np.linspace(first, last, 2 + math.ceil((last - first) * fastest / STEP)) for first, last in sides]
+    nodes = np.concatenate([grids[0], *(grid[1:] for grid in grids[1:])])
+    orientations = [start]
+    for turn in _turns(spins, nodes[:-1], nodes[1:]):
+        orientations.append(multiply(turn, orientations[-1]))
+    at_nodes = np.array(orientations)
+
+    def orientations_at(t: Array) -> Array:
+        before = np.clip(np.searchsorted(nodes, t, side="left") - 1, 0, len(nodes) - 2)
+        return multiply(_turns(spins, nodes[before], t), at_nodes[before])
+
+    return orientations_at
+
+
+def _turns(spins: Motion, first: Array, last: Array) -> Array:
+    """Rotations between two times each [s], as quaternions, shape (n, 4).
+
+    Source: S. Blanes, F. Casas, J. A. Oteo & J. Ros, The Magnus expansion and some of its applications, Phys. Rep. 470 (2009), eq 257.
+    """
+    h, middle = last - first, 0.5 * (first + last)
+    early, central, late = (spins(middle + offset * h)[0] for offset in (-math.sqrt(0.15), 0.0, math.sqrt(0.15)))
+    h = h[:, None]
+    a1, a2, a3 = h * central, math.sqrt(15.0) / 3.0 * h * (late - early), 10.0 / 3.0 * h * (late - 2.0 * central + early)
+    c1 = np.cross(a1, a2)
+    c2 = -np.cross(a1, 2.0 * a3 + c1) / 60.0
+    turn = a1 + a3 / 12.0 + np.cross(-20.0 * a1 - a3 + c1, a2 + c2) / 240.0
+    half = 0.5 * np.linalg.norm(turn, axis=1)[:, None]
+    return np.hstack([0.5 * np.sinc(half / math.pi) * turn, np.cos(half)])

@@ -18,7 +18,7 @@ _SCENES = {
         "turn-box-flat",
     ),
     "corner-impact": ("drop-box-anyhow", "drop-box-corner", "drop-box-heavy", "drop-box-sticking", "drop-box-tumble"),
-    "coulomb-slide": ("slide-box",),
+    "coulomb-slide": ("slide-box", "slide-box-askew", "slope-box-hold", "slope-box-slide"),
     "coulomb-turn": ("turn-box-rough",),
     "damped-free-rotor": ("spin-damped",),
     "damped-parabola": ("fall-damped",),
@@ -26,6 +26,7 @@ _SCENES = {
     "free-rotor": ("fall-tilted", "spin-asymmetric", "spin-coin", "spin-dzhanibekov", "spin-needle"),
     "principal-spin": ("fall-spin", "spin-principal", "spin-principal-50", "spin-principal-500"),
     "rocking": ("rest-long", "rock-block"),
+    "rolling": ("roll-ball", "roll-ball-back", "roll-ball-side", "roll-slope"),
     "slipping": ("slip-stick",),
     "tipping": ("tip-box",),
 }

@@ -51,6 +51,11 @@ class Floor(Table):
     friction: Literal["none", "infinite"] | NotNegative
     rest_speed: NotNegative = 0.0
 
+    @property
+    def coefficient(self) -> float:
+        """The Coulomb coefficient: 0 without friction, inf for infinite friction."""
+        return {"none": 0.0, "infinite": math.inf}[self.friction] if isinstance(self.friction, str) else self.friction
+
     @model_validator(mode="after")
     def _no_friction_is_none(self) -> Self:
         if self.friction == 0.0:

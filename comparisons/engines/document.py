@@ -1,6 +1,5 @@
 """The engine `document`: the reference implementation of Wang's lecture note, and of the methods beside it."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import ClassVar
@@ -153,10 +152,6 @@ def reference_world(scene: Scenario) -> reference_impl.World:
     floor = scene.floor
     return reference_impl.World(
         gravity=None if scene.gravity is None else scene.acceleration,
-        floor=None if floor is None else reference_impl.Floor(floor.restitution, _coefficient(floor.friction), floor.rest_speed),
+        floor=None if floor is None else reference_impl.Floor(floor.restitution, floor.coefficient, floor.rest_speed),
         damping=None if scene.damping is None else (scene.damping.linear, scene.damping.angular),
     )
-
-
-def _coefficient(friction: str | float) -> float:
-    return {"none": 0.0, "infinite": math.inf}[friction] if isinstance(friction, str) else friction

@@ -73,15 +73,23 @@ def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: flo
     added = friction * slip
     late = 2.0 * friction * added
     hop = 2.0 * (e * fastest + added) / g if g > 0.0 else 0.0
+    body, inertia = scene.body, scene.body.inertia_tensor
+    # The normal force of a ball has no torque, and its friction turns it; other bodies stay flat.
+    turning = body.mass * body.rounding * late / np.min(np.diag(inertia)) if body.rounding else (late + added) / body.size
+    lifted = body.mass * (e * fastest * added + 0.5 * added**2)
+    spins = unrotate(states[:, ORIENTATION], states[:, SPIN]) @ inertia
+    height = scene.clearance if scene.starts_above_floor else body.size
+    moving = 0.5 * (body.mass * float(states[0, VELOCITY] @ states[0, VELOCITY]) + float(spins[0] @ np.linalg.solve(inertia, spins[0])))
+    energy = max(body.mass * abs(g) * height, moving)
     sizes = {
         "position_error": (late + added) * hop,
-        "orientation_error": (late + added) * hop / scene.body.size,
-        "energy_error": (2.0 * slip * late + added**2) / slip**2,
-        "energy_gain": (added / slip) ** 2,
+        "orientation_error": turning * hop,
+        "energy_error": (body.mass * slip * late + lifted) / energy,
+        "energy_gain": lifted / energy,
     }
-    spin = float(np.linalg.norm(scene.body.inertia_tensor @ unrotate(states[0, ORIENTATION], states[0, SPIN])))
+    spin = float(length(spins).max())
     if spin > 0.0:
-        turned = scene.body.mass * scene.body.size * (late + added) / spin
+        turned = body.mass * body.size * (late + (0.0 if body.rounding else added)) / spin
         sizes |= {"angular_momentum_error": turned, "angular_momentum_direction_error": 0.5 * np.pi * turned}
     if approach > 0.0:
         sizes["restitution_error"] = added / approach

@@ -2,9 +2,9 @@
 
     dv/dt = g_t - f g_n v/|v|        g_t, g_n: gravity along the floor and into it
 
-It stays where it stops if |g_t| <= f g_n, as does one that starts at rest. On a level floor it stops at t = |v₀|/(f g), after |v₀|²/(2 f g).
-The body stays flat if the normal force can act ahead of the centre of mass by f times its height; at rest, down the slope by |g_t|/g_n times
-its height. These points must lie within the base.
+It stays where it stops if |g_t| <= f g_n, as does one that starts at rest. On a level floor it stops at t = |v₀|/(f g), after
+|v₀|²/(2 f g). The body stays flat if the normal force can act ahead of the centre of mass by f times its height; at rest, down the slope by
+|g_t|/g_n times its height. These points must lie within the base.
 
 Source: C. A. de Coulomb, Théorie des machines simples (1785); `dry_friction` for the motion on a slope.
 Valid for: a box or other body on at least three vertices, lying on the floor at the start, without spin, at rest or moving along the floor;
@@ -37,12 +37,12 @@ def coulomb_slide(scene: Scenario) -> Truth | None:
     if g[1] >= 0.0 or start[8] != 0.0 or start[SPIN].any():
         return None
     pull, into = g * LEVEL, -float(g[1])
-    friction = math.inf if floor.friction == "infinite" else float(floor.friction)
     velocity = start[VELOCITY]
-    if not velocity.any() and not pull.any() or velocity.any() and math.isinf(friction):
+    moves = velocity.any()
+    if math.isinf(floor.coefficient) if moves else not pull.any():
         return None
-    motion, stops = dry_friction(velocity, pull, friction * into)
-    if not _stays_flat(scene, velocity, pull / into, friction):
+    motion, _ = dry_friction(velocity, pull, floor.coefficient * into)
+    if not _stays_flat(scene, velocity, pull / into, floor.coefficient):
         return None
 
     def states(t: Array) -> Array:

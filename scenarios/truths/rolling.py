@@ -4,11 +4,12 @@ With r the radius, I the moment of inertia, k = 1 + M r²/I, and s = v + ω × (
 
     ds/dt = g_t - k f g_n s/|s|                    sliding; g_t, g_n: gravity along the floor and into it
     s = 0 from then on, if |g_t| <= k f g_n        rolling
-    v = v₀ + g_t t - (s₀ + g_t t - s)/k            of both, because friction changes v and s in the ratio 1 : k
+    v = v₀ + g_t t - (s₀ + g_t t - s)/k            of both, because friction changes v and s as 1 : k
     ω = ω₀ + (k - 1)/r Y × (s₀ + g_t t - s)/k      of both, by the torque of the same friction
 
-A solid ball, k = 7/2, that is thrown without spin rolls at 5/7 of its speed; on a slope it rolls with 5/7 of g_t. The component of ω along Y
-is constant. The angle of the rotation is an integral of ω where its direction is constant; else the orientation is integrated numerically.
+A solid ball, k = 7/2, that is thrown without spin rolls at 5/7 of its speed; on a slope it rolls with 5/7 of g_t. The component of ω
+along Y is constant. The angle of the rotation is an integral of ω where its direction is constant; else the orientation is integrated
+numerically.
 
 Source: G. G. de Coriolis, Théorie mathématique des effets du jeu de billard (1835); `dry_friction` for the velocity of the contact point.
 Valid for: a ball of equal moments that touches the floor at the start, with any velocity along the floor and any spin; any friction, but
@@ -54,11 +55,10 @@ def rolling(scene: Scenario) -> Truth | None:
     slip = velocity + body.radius * np.cross(UP, spin)
     if np.linalg.norm(slip) <= NO_SLIP * np.linalg.norm(velocity):
         slip = np.zeros(3)
-    if floor.friction == "infinite" and slip.any():
+    if math.isinf(floor.coefficient) and slip.any():
         return None
-    friction = {"none": 0.0, "infinite": math.inf}[floor.friction] if isinstance(floor.friction, str) else floor.friction
     share = 1.0 + body.mass * body.radius**2 / float(moments[0])  # k
-    contact, stops = dry_friction(slip, pull, share * friction * -float(g[1]))
+    contact, stops = dry_friction(slip, pull, share * floor.coefficient * -float(g[1]))
 
     def lost(t: Array) -> tuple[Array, Array]:
         """Changes of velocity by friction, with the sign reversed, and their integrals, each of shape (n, 3)."""
@@ -66,8 +66,11 @@ def rolling(scene: Scenario) -> Truth | None:
         t = t[:, None]
         return (slip + pull * t - slipping) / share, (slip * t + 0.5 * pull * t**2 - way) / share
 
+    lever = (share - 1.0) / body.radius
+
     def spins(t: Array) -> tuple[Array, Array]:
-        return tuple(spin * power + (share - 1.0) / body.radius * np.cross(UP, one) for power, one in zip((1.0, t[:, None]), lost(t), strict=True))
+        change, way = lost(t)
+        return spin + lever * np.cross(UP, change), spin * t[:, None] + lever * np.cross(UP, way)
 
     orientations = _orientations(scene, spins, stops)
 
@@ -83,7 +86,7 @@ def rolling(scene: Scenario) -> Truth | None:
 def _orientations(scene: Scenario, spins: Motion, kink: float) -> Callable[[Array], Array]:
     """Orientations at times [s], from the angular velocity and its integral; the angular acceleration jumps at the time `kink`."""
     start = scene.initial_state
-    samples, turns = spins(np.linspace(0.0, scene.duration, SAMPLES))
+    samples = spins(np.linspace(0.0, scene.duration, SAMPLES))[0]
     largest = samples[np.argmax(np.linalg.norm(samples, axis=1))]
     size = float(np.linalg.norm(largest))
     axis = largest / size if size else UP

@@ -46,11 +46,13 @@ def test_box_stops_where_friction_has_done_its_work(velocity):
         sliding(height=0.2),
         sliding(velocity=(0.0, 0.0, 0.0)),
         sliding(damping={"linear": 0.1}),
-        sliding(gravity={"acceleration": [1.0, -9.8, 0.0]}),
+        sliding(gravity={"acceleration": [1.0, 9.8, 0.0]}),
+        sliding(velocity=(0.0, 0.0, 0.0), gravity={"acceleration": [0.0, -1.0, 2.01]}, friction=9.0),  # rolls over its lower edge
+        sliding(velocity=(1.0, 0.0, 0.0), gravity={"acceleration": [0.0, -1.0, 5.0]}, friction=2.1),  # at its end it would slide that way
     ],
 )
 def test_slide_is_limited_to_its_range_of_validity(scene):
-    """Not with tipping, sticking, spin, a fall, rest, damping or a slope."""
+    """Not with tipping, sticking, spin, a fall, rest on a level floor, damping or gravity away from the floor."""
     truth = truth_for(scene)
     assert truth is None or truth.name != "coulomb-slide"
 
@@ -68,3 +70,29 @@ def test_body_whose_base_is_not_below_its_centre_of_mass_tips():
     feet = -load({"name": "feet", "duration": 1.0, "body": body}).body.vertices[:, 1].min()
     truth = truth_for(sliding(body=body, height=float(feet)))
     assert truth is None or truth.name != "coulomb-slide"
+
+
+@pytest.mark.parametrize("friction", [0.51, "infinite"])
+def test_box_stays_on_a_slope_that_is_less_steep_than_its_friction(friction):
+    """At any slope up to f, here 1/2, and where its height, 0.1 m, is less than its reach down the slope times 2."""
+    scene = sliding(velocity=(0.0, 0.0, 0.0), gravity={"acceleration": [3.0, -10.0, -4.0]}, friction=friction)
+    np.testing.assert_array_equal(truth_for(scene)([0.0, 1.0, 2.0]).states, [scene.initial_state] * 3)
+
+
+def test_box_slides_down_a_steeper_slope():
+    """With g_t - f g_n, here 5 - 4 m/s²."""
+    scene = sliding(velocity=(0.0, 0.0, 0.0), gravity={"acceleration": [3.0, -10.0, -4.0]}, friction=0.4)
+    motion = truth_for(scene)([1.0])
+    np.testing.assert_allclose(motion.velocity[0], [0.6, 0.0, -0.8], rtol=1e-15)
+
+
+def test_box_pushed_across_a_slope_stops_or_turns_down():
+    """It stops after |v₀| (f g_n + g_t cos ψ₀)/((f g_n)² - g_t²); on a steeper slope its velocity turns towards the slope."""
+    across = sliding(velocity=(4.0, 0.0, -3.0), gravity={"acceleration": [1.5, -10.0, 2.0]}, friction=0.3)
+    stops = 5.0 * 3.0 / (9.0 - 6.25)
+    motion = truth_for(across.model_copy(update={"duration": 6.0}))([0.99 * stops, 1.01 * stops])
+    assert motion.velocity[0].any()
+    assert not motion.velocity[1].any()
+    steep = sliding(velocity=(4.0, 0.0, -3.0), gravity={"acceleration": [3.0, -10.0, 4.0]}, friction=0.2)
+    end = truth_for(steep.model_copy(update={"duration": 1e4}))([1e4])
+    np.testing.assert_allclose(end.velocity[0] / np.linalg.norm(end.velocity), [0.6, 0.0, 0.8], atol=1e-3)

@@ -1,4 +1,4 @@
-"""The errors that MuJoCo's known limitations explain, in drawn scenes and of a sliding ball: as large as the errors that are measured, and not much larger."""
+"""The errors that known limitations of MuJoCo explain: as large as those measured, or little larger."""
 
 import pytest
 

@@ -14,14 +14,7 @@ Array = NDArray[np.float64]
 LARGEST = 1e50
 """Largest magnitude of a number of a scene: energies and inertias, products of up to five of them, stay finite."""
 
-
-def _not_too_large(number: float) -> float:
-    if abs(number) > LARGEST:
-        raise ValueError(f"must be between {-LARGEST:g} and {LARGEST:g}; scale the units")
-    return number
-
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False), AfterValidator(_not_too_large)]
+Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Vector = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from scenarios.text import Prose, Text
+from scenarios.text import Prose, Text, joined, verify_line
 
 TOUCHING = 1e-9
 """Height above the floor, relative to the size of the body, up to which the body counts as touching the floor."""
@@ -132,11 +132,11 @@ class Scenario(Table):
         expect: Bounds on metrics, each with a reason.
     """
 
-    name: Annotated[Text, Field(json_schema_extra={"hidden": "in files"})]
+    name: Annotated[str, Field(json_schema_extra={"hidden": "in files"})]
     origin: Annotated[str, Field(exclude=True, json_schema_extra={"hidden": "always"})] = ""
-    summary: Prose = ""
-    source: Prose = ""
-    tags: tuple[Text, ...] = ()
+    summary: str = ""
+    source: str = ""
+    tags: tuple[str, ...] = ()
     duration: Positive
     body: Body
     start: Start = Start()
@@ -145,6 +145,19 @@ class Scenario(Table):
     damping: Damping | None = None
     ensemble: Ensemble | None = None
     expect: tuple[Expectation, ...] = ()
+
+    # Validators rather than the types `Text` and `Prose`, whose functions the signature would show.
+    @field_validator("summary", "source", mode="before")
+    @classmethod
+    def _is_joined(cls, given: object) -> object:
+        return joined(given)
+
+    @field_validator("name", "summary", "source", "tags")
+    @classmethod
+    def _is_printable(cls, given: str | tuple[str, ...]) -> str | tuple[str, ...]:
+        for text in [given] if isinstance(given, str) else given:
+            verify_line(text)
+        return given
 
     @model_validator(mode="after")
     def _has_an_inertia(self) -> Self:

@@ -11,7 +11,7 @@ def printable(text: str) -> str:
     return "".join(one if one.isprintable() else json.dumps(one)[1:-1] for one in text)
 
 
-def _verified(text: str) -> str:
+def verify_line(text: str) -> str:
     """Return the text unchanged.
 
     Raises:
@@ -22,11 +22,12 @@ def _verified(text: str) -> str:
     return text
 
 
-def _joined(text: object) -> object:
+def joined(text: object) -> object:
+    """A text with its lines joined to one; anything else unchanged."""
     return " ".join(text.split()) if isinstance(text, str) else text
 
 
-Text = Annotated[str, AfterValidator(_verified)]
+Text = Annotated[str, AfterValidator(verify_line)]
 """A field of a model whose value is printable text."""
-Prose = Annotated[Text, BeforeValidator(_joined)]
+Prose = Annotated[Text, BeforeValidator(joined)]
 """A field of a model whose value may be written over several lines, which are joined to one."""

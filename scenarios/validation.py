@@ -2,10 +2,12 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from scenarios.body import LARGEST
 from scenarios.errors import DropspinError, did_you_mean
 
 Kind = TypeVar("Kind", bound=BaseModel)
@@ -100,6 +102,7 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
             example = f", such as [{key}] with its keys below" if key and not root else ""
             return f"{prefix}got {given}; must be a {'mapping' if root else 'table'}{example}."
     message = re.sub("a (tuple|array)", "a list", problem["msg"].replace("Input should", "must").replace("valid ", ""))
+    message = message.replace(f"{Decimal(repr(LARGEST)):f}", f"{LARGEST:g}")  # pydantic writes all of its zeros
     dotted = _key(path, "")
     return f"{prefix}got {given}; {message}{alternatives.get((dotted, problem['type']), alternatives.get((dotted, '*'), ''))}."
 

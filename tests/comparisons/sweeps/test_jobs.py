@@ -210,7 +210,7 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ),
         ({"grid": {"body.mass": [{"a": 1}]}}, "a value is a number, a word, or a list of them"),
         (
-            {"grid": {"body.mass": {"from": 1e-300, "to": 1e300, "count": 3, "spacing": "log"}}},
+            {"grid": {"body.mass": {"from": 1e-300, "to": 1e30, "count": 3, "spacing": "log"}}},
             "exceeds the range of floating-point numbers",
         ),
         ({"grid": {"start.position[01]": [2.0]}}, "is not a valid field name"),

@@ -24,6 +24,8 @@ def folder_made(folder: str) -> Iterator[Path]:
     Raises:
         DropspinError: The folder or a file in it cannot be written.
     """
+    if not folder:
+        raise DropspinError("-o: got an empty name; give the name of a folder.")
     path = Path(folder)
     made: list[Path] = []
     try:

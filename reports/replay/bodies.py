@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Body
+from scenarios.body import Body, hull_corners
 
 Array = NDArray[np.float64]
 
@@ -39,13 +39,14 @@ def outline(body: Body) -> Outline:
     from scipy.spatial import ConvexHull, QhullError
 
     points = body.vertices
-    centre, (_, spread, axes) = points.mean(axis=0), np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    centre = points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(np.pad(points - centre, ((0, 1), (0, 0))), full_matrices=False)  # three, also of two points
     hull = None
     if spread[2] >= IN_ONE_PLANE * body.size * np.sqrt(len(points)):
         with suppress(QhullError):  # thinner than Qhull resolves
             hull = ConvexHull(points)
     if hull is None:
-        corners = ConvexHull((points - centre) @ axes[:2].T).vertices
+        corners = _around(points, hull_corners((points - centre) @ axes[:2].T).tolist(), axes[2])
         return Outline(points[corners], [list(range(len(corners)))], is_flat=True)
     # Qhull splits faces into triangles; triangles of one plane form one face.
     planes: dict[tuple[float, ...], set[int]] = {}

@@ -44,11 +44,22 @@ def test_plane_body_is_one_face():
     np.testing.assert_allclose(sides, 2.0, rtol=1e-12)
 
 
-def test_body_thinner_than_qhull_resolves_is_plane():
-    """Points within a few metres of a triangle of a thousand kilometres."""
-    points = [[1.0, 1.0, 0.0], [3.0, 1e-3, 1e6], [1e-5, 2.0, 3.0], [1e-3, 0.0, 1e4], [1e4, 0.0, 1e4], [0.0, 2.0, 3.0]]
-    body = ds.load({"duration": 1.0, "body": {"shape": "vertices", "points": points, "mass": 1.0}}).body
+THIN = {
+    "points within a few metres of a triangle of a thousand kilometres": {
+        "shape": "vertices",
+        "points": [[1.0, 1.0, 0.0], [3.0, 1e-3, 1e6], [1e-5, 2.0, 3.0], [1e-3, 0.0, 1e4], [1e4, 0.0, 1e4], [0.0, 2.0, 3.0]],
+        "mass": 1.0,
+    },
+    "a rod of a light year": {"shape": "box", "half_extents": [9e15, 1.0, 5e-3], "mass": 1.0},
+    "points on a line": {"shape": "vertices", "points": [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], "mass": 1.0, "inertia": [0.1, 1.0, 1.0]},
+}
+
+
+@pytest.mark.parametrize("name", THIN)
+def test_body_thinner_than_qhull_resolves_is_plane(name):
+    body = ds.load({"duration": 1.0, "body": THIN[name]}).body
     shape = outline(body)
     assert shape.is_flat
-    assert len(shape.faces) == 1
-    assert body.resting_height == 0.0
+    [face] = shape.faces
+    assert sorted(face) == list(range(len(shape.vertices)))
+    assert body.resting_height < 0.01

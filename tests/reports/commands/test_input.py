@@ -50,6 +50,7 @@ CASES = [
     (("limits", "pipe"), NOT_A_FILE),
     (("run", "/dev/zero"), NOT_A_FILE),
     ((*RUN, "-o", "/"), "cannot be replaced; choose a folder inside it."),
+    (("tradeoff", "ball.toml", "-e", "document", "-o", ""), "-o: got an empty name; give the name of a folder."),
     ((*RUN, "-o", ""), "cannot be replaced; choose a folder inside it."),
     ((*RUN, "-o", os.fsdecode(b"\xff\xfe")), r"the argument '\udcff\udcfe' is not printable text"),
     ((*RUN, "-o", "x" * 5000), "is not printable text of at most 4096 characters"),

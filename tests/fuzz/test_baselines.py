@@ -20,7 +20,7 @@ COMMANDS = st.sampled_from(
 )
 
 
-@cases(300)
+@cases(200)
 @given(st.data(), COMMANDS)
 def test_baselines_are_used_or_refused(sound, data, command):
     content = (sound / "dropspin-baseline.toml").read_bytes()

@@ -93,7 +93,7 @@ def outputs(line: tuple[str, ...]) -> list[str]:
     return written + {"accept": ["dropspin-baseline.toml"], "report": list(line[1:]), "replay": list(line[1:])}.get(line[0], [])
 
 
-@cases(350)
+@cases(300)
 @given(command_lines())
 def test_command_lines_are_done_or_refused(sound, line):
     with surroundings() as work:

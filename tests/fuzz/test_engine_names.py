@@ -48,7 +48,7 @@ COMMANDS = st.sampled_from(
 )
 
 
-@cases(220)
+@cases(150)
 @given(ENGINES, COMMANDS)
 def test_engines_are_found_or_refused(name, command):
     with surroundings() as work:

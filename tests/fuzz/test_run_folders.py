@@ -140,7 +140,7 @@ def forge(draw: st.DrawFn, folder: Path) -> None:
     replace_file(folder, name, draw((tables if kind == "table" else arrays)((folder / name).read_bytes())))
 
 
-@cases(250)
+@cases(230)
 @given(st.data(), COMMANDS)
 def test_forged_runs_are_loaded_or_refused(sound, data, command):
     with surroundings() as work:

@@ -40,7 +40,7 @@ WELL_TYPED = st.fixed_dictionaries(
 NAMES = st.sampled_from(["scene.toml", "a[b].toml", "[red].toml", "x" * 200 + ".toml", "é 日.toml", "-x.toml", "drop-ball.toml", "scene"])
 
 
-@cases(300)
+@cases(200)
 @given(FILES | WELL_TYPED, NAMES, st.booleans())
 def test_scenes_are_shown_or_refused(content, name, as_json):
     with surroundings() as work:
@@ -67,7 +67,7 @@ def test_scenes_are_studied_or_refused(content, command):
         run(work, *command, "-e", "document", "-o", "out", "scene.toml", outputs=["out"])
 
 
-@cases(150)
+@cases(120)
 @given(
     edited(SPEC).map(toml) | edited(RANDOM).map(toml) | damaged(SPEC_FILE.encode()) | st.dictionaries(KEYS, LEAVES, max_size=3).map(toml)
 )

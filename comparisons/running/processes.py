@@ -247,7 +247,7 @@ class EngineProcesses:
 
 
 _busy: list["ctypes.c_long"] = []
-"""The shared number in which this process writes its process id while it works."""
+"""The shared number in which this process, the leader of its group, writes its process id while it works."""
 _counts: list["ctypes.Array[ctypes.c_long]"] = []
 """The shared numbers of simulations that this process has done and is to do."""
 _entry: list[EngineEntry] = []
@@ -295,7 +295,7 @@ def _end_with_parent() -> None:
 
 
 def _call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
-    _busy[0].value = os.getpid()
+    _busy[0].value = os.getpgrp() if hasattr(os, "getpgrp") else os.getpid()  # not a child that the engine forked
     if sys.platform == "linux":
         import resource
 

@@ -9,6 +9,7 @@ import threading
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 from support import breaking
 from support import engines as made
@@ -85,6 +86,31 @@ def test_engine_that_ends_its_process_between_two_pieces_of_work_gets_another():
         while processes._pools[entry.label].active:
             time.sleep(0.05)
         assert processes.call(entry, process_of) != first
+
+
+def go_on_in_a_child(entry):
+    if os.fork():
+        time.sleep(1000.0)
+
+
+def leave_a_child(entry):
+    child = os.fork()
+    if not child:
+        time.sleep(1000.0)
+    return child
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the engine forks")
+def test_children_that_an_engine_forks_end_with_it():
+    """Also those of a child that has taken the place of the process that was started for the engine."""
+    entry = engine_entry(made.Exact())
+    with EngineProcesses(TIGHT) as processes:
+        processes.call(entry, go_on_in_a_child)
+        child = psutil.Process(processes.call(entry, leave_a_child))
+    _, alive = psutil.wait_procs([child], timeout=10.0)
+    for one in alive:
+        one.kill()
+    assert not alive
 
 
 def test_processor_time_is_counted_per_piece_of_work():

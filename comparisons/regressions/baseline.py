@@ -27,7 +27,7 @@ from scenarios.body import Table
 from scenarios.errors import did_you_mean
 from scenarios.loading import read_toml
 from scenarios.text import Text
-from scenarios.validation import validated
+from scenarios.validation import shown, validated
 
 FORMAT = 3
 """Format 1 grouped results under headings, from which a merge could separate them; in format 2 the list of results had another name."""
@@ -120,8 +120,8 @@ def load_baseline(path: str | Path) -> Baseline:
     content = read_toml(Path(path), where, "baseline", LARGEST_FILE)
     if content.get("format", FORMAT) != FORMAT:
         raise DropspinError(
-            f"{where}: format {content['format']!r}, written by {_writer(content)}, cannot be read; this version reads format {FORMAT}. "
-            "Accept the results again into a new file."
+            f"{where}: format {shown(content['format'])}, written by {_writer(content)}, cannot be read; "
+            f"this version reads format {FORMAT}. Accept the results again into a new file."
         )
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}

@@ -33,6 +33,7 @@ CITATION = """To cite: The dropspin authors, dropspin, version {version};
 for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
 """The text to cite; a test compares it with CITATION.cff."""
 LONGEST_ARGUMENT = 4096
+LONGEST_MESSAGE = 1500
 INTERRUPTED = 130  # 128 + SIGINT, as in shells
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor a usage error
 
@@ -89,10 +90,13 @@ def _run() -> int:
 
 
 def _say(message: str) -> None:
-    """Print an error message as one line."""
+    """Print an error message as one line. Names in a file may have any length: of a longer line, the middle is left out."""
     from reports.terminal.safe import echo
 
-    echo(f"dropspin: {' '.join(message.splitlines())}", err=True)
+    line = " ".join(message.splitlines())
+    if len(line) > LONGEST_MESSAGE:
+        line = f"{line[: LONGEST_MESSAGE // 2]} ... {line[-LONGEST_MESSAGE // 2 :]}"
+    echo(f"dropspin: {line}", err=True)
 
 
 class _LazyGroup(click.Group):

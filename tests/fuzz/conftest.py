@@ -13,13 +13,16 @@ from fuzz.inputs import ACCEPT, BALL_FILE, DRIFT_FILE, RUN, SPEC_FILE
 PR_SET_CHILD_SUBREAPER = 36
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def _surroundings(tmp_path_factory):
     """Orphaned processes become children of this one, where `cases.run` looks for them; matplotlib has its cache of fonts."""
-    if sys.platform == "linux":
+    is_linux = sys.platform == "linux"
+    if is_linux:
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1)
     with mock.patch.dict(os.environ, {"MPLCONFIGDIR": str(tmp_path_factory.mktemp("matplotlib"))}):
         yield
+    if is_linux:
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 0)
 
 
 @pytest.fixture(scope="session")

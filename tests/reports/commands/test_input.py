@@ -29,6 +29,7 @@ FILES = {
     "deep-spec.toml": f"{SPEC}{'.'.join('a' * 3000)} = [1.0]\n",
     "bracket.toml": f'"a[b" = 1\n{BALL}',
     "member.toml": f"constrained-x = 1\n{BALL}",
+    "long.toml": f"{'x' * 5000} = 1\n{BALL}",
     "not.toml": "{",
 }
 RUN = ("run", "ball.toml", "-e", "document", "--dt", "0.01")
@@ -41,6 +42,7 @@ CASES = [
     (("run", "deep.toml"), "nested too deeply"),
     (("run", "nested.toml"), "nested too deeply"),
     (("sweep", "deep-spec.toml"), "nested too deeply"),
+    (("show", "long.toml"), "xxx ... xxx"),
     (("show", "colour.toml"), r"summary: got 'red \x1b[31m'; must be one line of printable text"),
     (("run", "turned.toml"), r"summary: got 'turned \u202e'; must be one line of printable text"),
     (("show", "bell\a.toml"), r"the argument 'bell\x07.toml' is not printable text"),

@@ -18,7 +18,8 @@ class Leading:
         unit: Unit of the errors.
         dt: Time step [s].
         sizes: The size of the error, by engine; NaN where it is undefined.
-        levels: The decade of the error relative to its scale, by engine, from 0 (1e-8 or less) to 8 (1 or more); None if undefined.
+        levels: The decade of the error relative to its scale, by engine, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1); None if
+            undefined.
         least: The engines whose error is within 1 % of the smallest error, or is within rounding.
     """
 
@@ -57,7 +58,7 @@ def step_costs(results: Results) -> dict[str, float]:
 
 
 def _level(error: float) -> int | None:
-    """The decade of a relative error, from 0 (1e-8 or less) to 8 (1 or more)."""
+    """The decade of a relative error, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1)."""
     if math.isnan(error):
         return None
     return 0 if error <= 1e-8 else min(8, 8 + math.ceil(math.log10(error) - 1e-9))

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from comparisons.engines.base import Array, KnownLimitation
 from comparisons.engines.mujoco_contact import IMPEDANCE
 from scenarios import Scenario
+from scenarios.mechanics import angular_momentum, kinetic_energy
 from scenarios.rotations import cross, length, rotate, unrotate
 from scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from scenarios.trajectory import Trajectory
 
 AT_REST = 1e-3  # m/s; a slip that friction has stopped, and a body that rests, may still have this speed
 
@@ -73,21 +75,20 @@ def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: flo
     added = friction * slip
     late = 2.0 * friction * added
     hop = 2.0 * (e * fastest + added) / g if g > 0.0 else 0.0
-    body, inertia = scene.body, scene.body.inertia_tensor
+    body = scene.body
     # The normal force of a ball has no torque, and its friction turns it; other bodies stay flat.
-    turning = body.mass * body.rounding * late / np.min(np.diag(inertia)) if body.rounding else (late + added) / body.size
+    turning = body.mass * body.rounding * late / np.min(np.diag(body.inertia_tensor)) if body.rounding else (late + added) / body.size
     lifted = body.mass * (e * fastest * added + 0.5 * added**2)
-    spins = unrotate(states[:, ORIENTATION], states[:, SPIN]) @ inertia
+    motion = Trajectory.from_states(dt * np.arange(len(states), dtype=float), states)
     height = scene.clearance if scene.starts_above_floor else body.size
-    moving = 0.5 * (body.mass * float(states[0, VELOCITY] @ states[0, VELOCITY]) + float(spins[0] @ np.linalg.solve(inertia, spins[0])))
-    energy = max(body.mass * abs(g) * height, moving)
+    energy = max(body.mass * abs(g) * height, float(kinetic_energy(scene, motion)[0]))
     sizes = {
         "position_error": (late + added) * hop,
         "orientation_error": turning * hop,
         "energy_error": (body.mass * slip * late + lifted) / energy,
         "energy_gain": lifted / energy,
     }
-    spin = float(length(spins).max())
+    spin = float(length(angular_momentum(scene, motion)).max())
     if spin > 0.0:
         turned = body.mass * body.size * (late + (0.0 if body.rounding else added)) / spin
         sizes |= {"angular_momentum_error": turned, "angular_momentum_direction_error": 0.5 * np.pi * turned}

@@ -106,9 +106,9 @@ def _inverse(time: Callable[[Array], Array], pace: Callable[[Array], Array], t: 
         high[short] *= 2.0
     turned = 0.5 * (low + high)
     for _ in range(NEWTON_STEPS):
-        late = time(turned) > t
-        low, high = np.where(late, low, turned), np.where(late, turned, high)
-        newton = turned - (time(turned) - t) / pace(turned)
+        excess = time(turned) - t
+        low, high = np.where(excess > 0.0, low, turned), np.where(excess > 0.0, turned, high)
+        newton = turned - excess / pace(turned)
         following = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
         if (np.abs(following - turned) <= 1e-16 * turned).all():
             break

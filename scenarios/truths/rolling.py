@@ -68,16 +68,20 @@ def rolling(scene: Scenario) -> Truth | None:
 
     lever = (share - 1.0) / body.radius
 
+    def spun(free: Array, change: Array) -> Array:
+        found: Array = free + lever * np.cross(UP, change)
+        return found
+
     def spins(t: Array) -> tuple[Array, Array]:
         change, way = lost(t)
-        return spin + lever * np.cross(UP, change), spin * t[:, None] + lever * np.cross(UP, way)
+        return spun(spin, change), spun(spin * t[:, None], way)
 
     orientations = _orientations(scene, spins, stops)
 
     def states(t: Array) -> Array:
         (change, way), t_ = lost(t), t[:, None]
         position = start[POSITION] + velocity * t_ + 0.5 * pull * t_**2 - way
-        return np.hstack([position, orientations(t), velocity + pull * t_ - change, spins(t)[0]])
+        return np.hstack([position, orientations(t), velocity + pull * t_ - change, spun(spin, change)])
 
     statement = "friction f g on the contact point until it is at rest, then rolling (Coriolis 1835)"
     return Truth("rolling", statement, states, horizon=scene.duration)

@@ -3,6 +3,7 @@
 from typing import Any
 
 import tomlkit
+from support.adapters import DRIFTING
 
 from scenarios.loading import CATALOGUE, names
 
@@ -28,28 +29,14 @@ RANDOM = {key: value for key, value in SPEC.items() if key != "grid"} | {
 }
 RUN = ("run", "ball.toml", "-e", "document", "-e", "mujoco", "--dt", "0.02", "--dt", "0.01", "--dt", "0.005")
 ACCEPT = ("accept", "run", "--reason", "measured", "--known-failures")
-ADAPTER = '''
-import os, sys, signal, subprocess, threading, types
-import numpy as np
-from dropspin import AsBuilt, BatchSimulation, Engine, KnownLimitation, NumericOption, Simulation
-
-class Drifting(Simulation):
-    settings = {"version": "1"}
-    def __init__(self, scene, dt):
-        self.now, self.dt = scene.initial_state.copy(), dt
-    def advance(self, steps):
-        self.now[:3] += steps * self.dt * self.now[7:10]
-    def state(self):
-        return self.now.copy()
-
-class Mine(Engine):
-    """An engine whose answers are changed below."""
-    name = "mine"
-    choices = {"method": ("one", "two")}
-    numbers = {"tolerance": NumericOption(0.1, 0.0, 1.0)}
-    def prepare(self, scene, dt):
-        return Drifting(scene, dt)
-'''
+ADAPTER = (
+    "import os, sys, signal, subprocess, threading, types\nimport numpy as np\n"
+    "from dropspin import AsBuilt, BatchSimulation, KnownLimitation, NumericOption\n"
+    f"{DRIFTING}"
+    '    choices = {"method": ("one", "two")}\n'
+    '    numbers = {"tolerance": NumericOption(0.1, 0.0, 1.0)}\n'
+)
+"""An engine whose answers the tests change."""
 DRIFT = {"duration": 0.2, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}, "start": {"velocity": [1.0, 0.0, 0.0]}}
 
 

@@ -7,31 +7,14 @@ import time
 from pathlib import Path
 
 import pytest
+from support.adapters import DRIFTING
 
 import dropspin as ds
 from comparisons.running.processes import ResourceLimits
 
 DRIFT = {"name": "drift", "duration": 0.1, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}, "start": {"velocity": [1.0, 0.0, 0.0]}}
 LIMITS = ResourceLimits(processor_time=1.0, memory=2**30)
-SOUND = """
-import os, sys, time
-import numpy as np
-from dropspin import Engine, KnownLimitation, Simulation
-
-class Drifting(Simulation):
-    settings = {"version": "1"}
-    def __init__(self, scene, dt):
-        self.now, self.dt = scene.initial_state.copy(), dt
-    def advance(self, steps):
-        self.now[:3] += steps * self.dt * self.now[7:10]
-    def state(self):
-        return self.now.copy()
-
-class Mine(Engine):
-    name = "mine"
-    def prepare(self, scene, dt):
-        return Drifting(scene, dt)
-"""
+SOUND = "import os, sys, time\nimport numpy as np\nfrom dropspin import KnownLimitation\n" + DRIFTING
 DEEP = "settings = []\nfor _ in range(100_000): settings = [settings]\nDrifting.settings = {'deep': settings}"
 CYCLE = "settings = {}\nsettings['itself'] = settings\nDrifting.settings = settings"
 PRINTED = """

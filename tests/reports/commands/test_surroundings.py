@@ -4,6 +4,7 @@ import json
 import sys
 
 import pytest
+from support.adapters import DRIFTING
 from support.cli import dropspin, spawn
 
 STRAYS = ("bottleneck", "numexpr", "cloudpickle", "yaml", "colorama", "lxml", "click", "numpy", "matplotlib", "scenarios", "_pytest")
@@ -97,24 +98,7 @@ def test_broken_engine_costs_its_own_row(tmp_path):
         assert len(done.stderr.splitlines()) == 1
 
 
-ADAPTER = """
-import helper_of_drifting
-from dropspin import Engine, Simulation
-
-class Drifting(Simulation):
-    settings = {"version": "1"}
-    def __init__(self, scene, dt):
-        self.now, self.dt = scene.initial_state.copy(), dt
-    def advance(self, steps):
-        self.now[:3] += steps * self.dt * self.now[7:10]
-    def state(self):
-        return self.now.copy()
-
-class Mine(Engine):
-    name = "mine"
-    def prepare(self, scene, dt):
-        return Drifting(scene, dt)
-"""
+ADAPTER = "import helper_of_drifting\n" + DRIFTING
 SPEC = 'scenes = ["ball.toml"]\nengines = ["drifting:Mine"]\ndts = [0.01]\n[grid]\n"body.mass" = [1.0, 2.0, 3.0]\n'
 
 

@@ -248,5 +248,5 @@ class _StatesOfOne:
 
 
 def at_rows(values: Array, rows: RowNumbers | int) -> Array:
-    """The value of each motion at a given row of this motion: shapes (..., n) and (...) to (...)."""
+    """One value of each motion: values of shape (..., n) at row numbers of shape (...) give shape (...)."""
     return np.take_along_axis(values, np.asarray(rows)[..., None], axis=-1)[..., 0]

@@ -1,4 +1,4 @@
-"""`run.json`: what a run's folder must say of itself, verified before anything uses it."""
+"""`run.json`: the metadata of a run folder, validated on loading."""
 
 import json
 import re

@@ -84,7 +84,7 @@ def verified_limitations(limitations: Any) -> tuple[KnownLimitation, ...]:
     Raises:
         BuildMismatch: They are not a sequence of sentences and `KnownLimitation`s.
     """
-    allowed = "must be a sequence of sentences, or of dropspin.KnownLimitation with a sentence and errors by metric"
+    allowed = "must be a sequence of strings, of dropspin.KnownLimitation(message, explained_errors), or of both"
     if isinstance(limitations, str) or not isinstance(limitations, Iterable):
         raise BuildMismatch(f"known_limitations is {shown(limitations)}; it {allowed}")
     found = []

@@ -192,7 +192,7 @@ def _verify_names(where: str, names: list[str]) -> None:
     """Raise `DropspinError` if two axes set the same field, or one sets a part of the field that another sets."""
     for name in names:
         if names.count(name) > 1:
-            raise DropspinError(f"{where}: {name}: is in [grid] and in [random]; it can be in one of them.")
+            raise DropspinError(f"{where}: {name}: is in both [grid] and [random]; remove it from one of them.")
         for part in names:
             if part.startswith((f"{name}.", f"{name}[")):
                 raise DropspinError(f"{where}: {part}: is a part of {name}, which is swept as well; leave one of them out.")

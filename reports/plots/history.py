@@ -1,4 +1,4 @@
-"""Results as functions of the run."""
+"""Results plotted over successive runs."""
 
 from typing import TYPE_CHECKING
 

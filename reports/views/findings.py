@@ -29,6 +29,7 @@ class Counts:
         passed: Number of passed checks.
         failed: Number of failed checks.
         known: Number of checks that show a fault that the scene expects of the engine by name.
+        known_scenes: Number of scenes with such checks.
         fixed: Number of passed checks for which such a fault is expected.
         limited: Number of checks whose failure is explained by a known limitation of the engine.
         of_studies: Number of passed and failed checks of orders and asymptotic errors.
@@ -38,6 +39,7 @@ class Counts:
     passed: int
     failed: int
     known: int
+    known_scenes: int
     fixed: int
     limited: int
     of_studies: int
@@ -52,7 +54,16 @@ def counts(results: Results) -> Counts:
     limited = (verdicts == "limited") & (results.table["metric"] != "")
     of_studies = (passed | failed) & results.table["kind"].isin(STUDIES)
     broken = verdicts.isin(BREAKDOWNS)
-    return Counts(*(int(rows.sum()) for rows in (passed, failed, known, fixed, limited, of_studies, broken)))
+    return Counts(
+        passed=int(passed.sum()),
+        failed=int(failed.sum()),
+        known=int(known.sum()),
+        known_scenes=results.table.loc[known, "scene"].nunique(),
+        fixed=int(fixed.sum()),
+        limited=int(limited.sum()),
+        of_studies=int(of_studies.sum()),
+        broken=int(broken.sum()),
+    )
 
 
 def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
@@ -152,8 +163,10 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
 
 
 def _known(tally: Counts) -> str:
-    """The end of a sentence: how many results show known faults or are within limitations, how many expected faults do not occur."""
-    known = f"; {tally.known} {'result shows' if tally.known == 1 else 'results show'} known faults" if tally.known else ""
+    """The end of a sentence: how many values show known faults or are within limitations, how many expected faults do not occur."""
+    scenes = _scenes(tally.known_scenes)
+    known = f"; {tally.known} {'value' if tally.known == 1 else 'values'} in {scenes} show{'s' * (tally.known == 1)} known faults"
+    known = known if tally.known else ""
     limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} within known limitations" if tally.limited else ""
     return (
         known + limited + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not occur" if tally.fixed else "")
@@ -180,7 +193,7 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
             continue
         remain = {scene for cause in ("model", "setting") for scene in lasting[cause][engine]}
         errors = results.table[(results.table["kind"] == "asymptotic_error") & (results.table["engine"] == engine)]
-        opened = errors[is_undecided(errors) & ~errors["scene"].isin(remain)]
+        opened = errors[is_undecided(errors) & ~errors["metric"].isin(JUMPING)]
         parts = [
             _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
             *_breakdowns(results, engine),
@@ -218,7 +231,7 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(shown["scene"], shown["unit"], strict=True)]
     largest = (shown["value"].abs() / scales).sort_values(ascending=False, kind="stable").index[:1]
     worst = [
-        f"largest: {quantity(row['metric'])} {size(row['value'], row['unit'])} in {row['scene']}"
+        f"largest such error: {quantity(row['metric'])} {size(row['value'], row['unit'])} in {row['scene']}"
         for row in shown.loc[largest].to_dict("records")
     ]
     return f"{converges}{''.join(f' ({one})' for one in worst)}"
@@ -242,7 +255,7 @@ def _cost(results: Results, engine: str, costs: Mapping[str, float]) -> list[str
         return []
     fastest = min(timed, key=timed.__getitem__)
     if engine != fastest:
-        return [f"a time step takes {float(f'{timed[engine]:.2g}'):g} times as long"]
+        return [f"a time step takes {float(f'{timed[engine]:.2g}'):g} times as long as the fastest engine's"]
     seconds = results.table.loc[results.table["engine"] == engine, "time_per_step"].median()
     return [f"a time step takes {duration(float(seconds))}{', the shortest' if len(timed) > 1 else ''}"]
 

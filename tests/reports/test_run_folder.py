@@ -309,7 +309,7 @@ def studied():
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
     """Orders in a column of their own, with window and limit; model errors named above and on a chip."""
     _, text = studied
-    assert "converges in 0 of 1 scene; known model error in 1 (largest: orientation 2.67 rad in spin-asymmetric); " in text
+    assert "converges in 0 of 1 scene; known model error in 1 (largest such error: orientation 2.67 rad in spin-asymmetric); " in text
     assert "mujoco: converges in 1 of 1 scene; " in text
     assert len(re.findall(r'<span class="status known">≠<span class="words"> known model error</span></span>', text)) == 1
     assert len(re.findall(r">order 1\.0[012]</td>", text)) >= 4

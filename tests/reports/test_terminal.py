@@ -106,7 +106,7 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     assert [len(some) for some in of.values()] == [1, 1, 1]
     known = core.table[(core.table["verdict"] == "known") & (core.table["unit"] == "rad")]
     row = known.loc[known["value"].abs().idxmax()]
-    assert f"(largest: {row['metric'].split('_')[0]} {row['value']:.3g} rad in {row['scene']})" in of["document"][0]
+    assert f"(largest such error: {row['metric'].split('_')[0]} {row['value']:.3g} rad in {row['scene']})" in of["document"][0]
     for engine in core.engines:
         words = [by_engine[engine].words for by_engine in core.statuses().values()]
         studied = len(words) - words.count("declined")
@@ -114,7 +114,7 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
         for status in set(words) - {"converges", "declined"}:
             assert f"{status} in {words.count(status)}" in of[engine][0]
     assert of["document"][0].endswith(" ns, the shortest.")
-    assert all(of[engine][0].endswith(" times as long.") for engine in ("mujoco", "pybullet"))
+    assert all(of[engine][0].endswith(" times as long as the fastest engine's.") for engine in ("mujoco", "pybullet"))
 
 
 def test_piped_list_has_one_line_for_each_scene(tmp_path):

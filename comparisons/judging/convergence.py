@@ -69,6 +69,11 @@ class ConvergenceStudy:
     is_open: bool = False
     """Whether more time steps may decide the cause."""
 
+    @property
+    def fails(self) -> bool:
+        """Whether the asymptotic error fails as a model error."""
+        return self.cause == "model" and self.asymptotic_error is not None and self.asymptotic_error.verdict == "failed"
+
 
 def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> ConvergenceStudy:
     """The observed order and the asymptotic error of one metric of an engine, judged.

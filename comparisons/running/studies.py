@@ -1,6 +1,6 @@
 """The convergence of each metric of one engine in one scene; where the steps leave it open, with further steps and refined options."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -37,7 +37,10 @@ def study_engine(
     processes: EngineProcesses,
     on_progress: OnProgress = lambda progress: None,
 ) -> Studies:
-    """The convergence of each metric of one engine; with coarser steps where those asked for leave it open.
+    """The convergence of each metric of one engine, with further time steps where they are needed.
+
+    Coarser ones are added if those asked for leave a cause open. A finer one is added before a model error in contact fails, because a
+    contact solver can be unstable above some time step, which looks like an error that no time step removes.
 
     Args:
         own: The scene, and its exact solution.
@@ -48,16 +51,24 @@ def study_engine(
         on_progress: Called while an engine works on these.
     """
     series = _series(measured)
+    if not series:
+        return {}
     dts = sorted({point.dt for point in chain(*series.values())})
     studies = {name: study_convergence(own.scene, claim, METRICS[name], points) for name, points in series.items()}
-    if any(study.is_open for study in studies.values()):
-        added = [factor * dts[-1] for factor in ADDED_STEPS]
-        coarser = _series([one for dt in added for one in _measured_at(own, entry, dt, processes, on_progress)])
-        for name, points in coarser.items():
-            if name in studies and studies[name].is_open:
+
+    def at_steps(added: Sequence[float], names: Collection[str]) -> Iterator[tuple[str, ConvergenceStudy]]:
+        """The studies of some metrics with further time steps."""
+        measured = [one for dt in added for one in _measured_at(own, entry, dt, processes, on_progress)] if names else []
+        for name, points in _series(measured).items():
+            if name in names:
                 longer = study_convergence(own.scene, claim, METRICS[name], [*points, *series[name]])
-                if studies[name].cause == "unresolved" or longer.cause == "model":
-                    studies[name] = _with_remark(longer, f"with {' and '.join(f'{point.dt:g}' for point in points)} s added")
+                yield name, _with_remark(longer, f"with {' and '.join(f'{point.dt:g}' for point in points)} s added")
+
+    for name, longer in at_steps([factor * dts[-1] for factor in ADDED_STEPS], [name for name in studies if studies[name].is_open]):
+        if studies[name].cause == "unresolved" or longer.cause == "model":
+            studies[name] = longer
+    failing = [name for name, study in studies.items() if own.scene.floor is not None and study.fails]
+    studies |= {name: longer for name, longer in at_steps([dts[0] / 2.0], failing) if longer.cause != "model"}
     if entry.engine is not None and entry.engine.accuracy and any(study.cause in ("model", "unresolved") for study in studies.values()):
         return _with_accuracy_options(studies, own, claim, entry.engine, dts, processes, on_progress)
     return studies

@@ -78,6 +78,25 @@ def test_small_restitution_fault_is_a_model_error(more):
     assert limit["upper"] - limit["lower"] < 1e-4  # measured 5.5e-5, with two steps added to the three
 
 
+def test_error_that_a_finer_step_removes_is_no_model_error():
+    """A contact solver that is unstable above 0.8 ms has the same error at 4, 2 and 1 ms; half of the finest is tried."""
+
+    class Unstable(made.Exact):
+        name = "unstable"
+        order = 1.0
+
+        def prepare(self, scene, dt):
+            restitution = scene.floor.restitution * (1.0 if dt < 0.8e-3 else 1.1) + 1e-2 * dt
+            floor = scene.floor.model_copy(update={"restitution": restitution})
+            return made.ExactSimulation(scene.model_copy(update={"floor": floor}), dt)
+
+    found = run("drop-ball", Unstable(), ds.DEFAULT_DTS)
+    limit = study(found, "bounce_height_error", "asymptotic_error")
+    assert limit["cause"] == "unresolved"
+    assert limit["reason"].endswith("(with 0.0005 s added)")
+    assert limit["verdict"] == "measured"
+
+
 def test_restitution_that_vanishes_with_dt_is_a_model_error():
     """An engine that loses its bounce as the step shrinks."""
 

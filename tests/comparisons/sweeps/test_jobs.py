@@ -237,7 +237,7 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"random": {"count": 2, "seed": 1, "body.mass": {"from": 1, "to": 2, "count": 3}}}, "body.mass: count: unknown key"),
         (
             {"grid": {"body.mass": [1.0]}, "random": {"count": 2, "seed": 1, "body.mass": {"from": 1, "to": 2}}},
-            r"body.mass: is in \[grid\] and in \[random\]",
+            r"body.mass: is in both \[grid\] and \[random\]",
         ),
         ({"random": {"count": 10**16, "seed": 1, "body.mass": {"from": 1, "to": 2}}}, "count: got 10000000000000000"),
         (

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from comparisons.regressions.attribution import Attribution, attribute, surroundings
+from comparisons.regressions.motions import EqualMotions, equal_motions
 from comparisons.regressions.speed import SpeedChange, speed_changes
 from comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed
 from comparisons.results.results import Results
@@ -23,6 +24,7 @@ class Changes:
         other_scenes: Scenes that are different in the later run, so that their results are not compared.
         in_one_only: Scenes, engines and time steps that were requested in only one of the runs, as text.
         speed: The change of each engine's speed relative to the others.
+        motions: How many motions of each engine are equal bit for bit; empty if the runs were loaded without trajectories.
     """
 
     results: pd.DataFrame
@@ -31,6 +33,7 @@ class Changes:
     other_scenes: list[str]
     in_one_only: list[str]
     speed: list[SpeedChange]
+    motions: list[EqualMotions]
 
     def of(self, *kinds: str) -> pd.DataFrame:
         """The results with the given kinds of change."""
@@ -53,7 +56,8 @@ def compare(old: Results, new: Results) -> Changes:
 
     Returns:
         The changes: `results`, a table with `value` and `before` in `unit`, and the `change` (same, better, worse, moved, new or gone);
-        `attributions`, the cause to which the changes of each engine are attributed; and `speed`, the change of the time per step.
+        `attributions`, the cause to which the changes of each engine are attributed; `speed`, the change of the time per step; and
+        `motions`, how many motions are equal bit for bit.
 
     Raises:
         DropspinError: The runs have no scene, engine and time step in common.
@@ -70,7 +74,8 @@ def compare(old: Results, new: Results) -> Changes:
     unmoved = [str(engine) for engine, moved in changed.items() if not moved]
     stamps = old.provenance, new.provenance
     attributions = {str(engine): attribute(*stamps, str(engine), unmoved) for engine, moved in changed.items() if moved}
-    return Changes(found, attributions, surroundings(*stamps), other, _in_one_only(old, new), speed_changes(old, new))
+    in_one_only, speed, motions = _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other)
+    return Changes(found, attributions, surroundings(*stamps), other, in_one_only, speed, motions)
 
 
 def _in_one_only(old: Results, new: Results) -> list[str]:

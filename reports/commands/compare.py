@@ -17,7 +17,8 @@ from reports.terminal.safe import echo
 def compare_command(old: str, new: str, summary: str | None, json_output: bool) -> int:
     """Show which results changed between two runs, and the cause: the engine, its settings, dropspin, or the machine.
 
-    OLD and NEW are folders that dropspin run -o wrote. Accuracy is judged; speed is reported, not gated.
+    OLD and NEW are folders that dropspin run -o wrote, on one machine or on two. Accuracy is judged. Speed, and whether motions are equal
+    bit for bit, are reported, not gated.
 
     Exit code: 0 nothing is worse, 1 a result is worse, moved or gone, 2 bad input.
     """
@@ -27,8 +28,8 @@ def compare_command(old: str, new: str, summary: str | None, json_output: bool) 
     from reports.terminal.rows import print_sentences
     from reports.views import compare as view
 
-    later = load_results(Path(new), arrays=False)
-    changes = compare(load_results(Path(old), arrays=False), later)
+    later = load_results(Path(new))
+    changes = compare(load_results(Path(old)), later)
     if summary is not None:
         write_text(summary, compare_markdown(changes), append=True)
     if json_output:

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from comparisons.regressions.comparing import Changes
+from comparisons.regressions.motions import EqualMotions
 from comparisons.regressions.speed import SpeedChange
 from comparisons.results.results import Results
 from reports.views.failures import reproduce_scenes
@@ -57,6 +58,8 @@ def sentences(changes: Changes) -> list[str]:
     if changes.in_one_only:
         found.append(f"In one of the runs only: {', '.join(changes.in_one_only)}.")
     found += [_speed(change) for change in changes.speed]
+    if changes.motions:
+        found.append(f"Motions equal bit for bit: {'; '.join(map(_motions, changes.motions))}.")
     regressed = changes.regressions
     total = _count(len(changes.results))
     verdict = f"{len(regressed):,} of {total} are worse, moved or gone" if len(regressed) else f"None of {total} is worse"
@@ -80,6 +83,7 @@ def as_data(changes: Changes) -> dict[str, Any]:
         "surroundings": changes.surroundings,
         "other_scenes": changes.other_scenes,
         "in_one_only": changes.in_one_only,
+        "motions": [one._asdict() for one in changes.motions],
         "speed": [{key: _plain(value) for key, value in change._asdict().items()} for change in changes.speed],
     }
 
@@ -116,6 +120,11 @@ def _speed(change: SpeedChange) -> str:
         f"Speed (reported, not gated): {change.engine} relative to {change.other} takes {change.ratio:.2f} times as long as before "
         f"(median of {change.cases} cases, 95 % interval {between})."
     )
+
+
+def _motions(one: EqualMotions) -> str:
+    first = f", the first difference in {one.scene} at {1e3 * one.dt:g} ms in step {one.step:,}" if one.equal < one.compared else ""
+    return f"{one.engine} {one.equal:,} of {one.compared:,}{first}"
 
 
 def _count(count: int) -> str:

@@ -11,7 +11,7 @@ report: $(VENV)/.installed            ## set up, run the core catalogue, say whe
 	$(BIN)/dropspin run
 
 test: $(VENV)/.installed-dev          ## set up, run the test suite
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 test-browser: $(VENV)/.installed-browser  ## the report and the replay in a real browser; needs Chromium
 	$(BIN)/python -m pytest tests/browser

@@ -299,6 +299,7 @@ def test_all_results_of_a_scene_are_in_a_table_made_on_demand(opened, results):
     rows = section.locator("table.results tbody tr")
     kinds = ["truth", "invariant", "order", "asymptotic_error"]
     mine = results.table[(results.table["scene"] == "drop-box-corner") & results.table["kind"].isin(kinds)]
+    rows.nth(len(mine) - 1).wait_for()
     assert rows.count() == len(mine)
     reasons = set(section.locator("table.results td:last-child").all_inner_texts())
     assert set(mine["reason"]) - {""} <= reasons

@@ -255,7 +255,8 @@ def _cost(results: Results, engine: str, costs: Mapping[str, float]) -> list[str
         return []
     fastest = min(timed, key=timed.__getitem__)
     if engine != fastest:
-        return [f"a time step takes {float(f'{timed[engine]:.2g}'):g} times as long as the fastest engine's"]
+        ratio = f"{timed[engine]:.2g}"
+        return [f"a time step takes {'' if ratio == '1' else f'{float(ratio):g} times '}as long as the fastest engine's"]
     seconds = results.table.loc[results.table["engine"] == engine, "time_per_step"].median()
     return [f"a time step takes {duration(float(seconds))}{', the shortest' if len(timed) > 1 else ''}"]
 

@@ -106,7 +106,7 @@ def test_model_error_is_known_if_its_interval_meets_the_expected_one(cause, inte
     limit = Judgement(sum(interval) / 2, "measured", *interval, cause, "extrapolated")
     found = judge_asymptotic_error(scene_that_expects(FAULT, FOR_ALL), "faulty", 1e-3, METRICS["energy_error"], limit)
     assert found.verdict == expected
-    assert found.reason.startswith(HOLDS_AGAIN) == (expected == "passed")
+    assert HOLDS_AGAIN not in found.reason  # a discretisation error that is a known fault occurs at every time step
     assert judge_asymptotic_error(scene_that_expects(FAULT), "mine", 1e-3, METRICS["energy_error"], limit).verdict != "known"
 
 

@@ -146,7 +146,9 @@ class Comparison:
             contact = self.first_contact
             return [rows if contact is None else rows[: contact[0] + 1]]
         edges = [0.0, *self.impacts, times[-1]]
-        shortest = max(SHORTEST_FLIGHT * self.dt, SHORT * float(np.max(np.diff(edges))))
+        # After the last impact the body may lie on the floor, so the time until the end is not the length of a flight.
+        lengths = np.diff(edges)
+        shortest = max(SHORTEST_FLIGHT * self.dt, SHORT * float(np.max(lengths[:-1], initial=0.0)))
         inner = []
         for number, (start, end) in enumerate(pairwise(edges)):
             # The scene's end may cut the last flight short; the uncertainty of its impact scales with the flight before.

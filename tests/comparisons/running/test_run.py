@@ -44,6 +44,17 @@ def test_catalogue_passes(core):
     assert (core.table["verdict"] == "passed").sum() > 200
 
 
+def test_long_rest_after_the_bounces_is_no_flight():
+    """The bounce height of a ball that lies on the floor for most of the scene is the same as in a scene that ends with the bounces."""
+    short = ds.load("drop-ball")
+    heights = [
+        table.loc[(table["metric"] == "bounce_height_error") & (table["kind"] == "truth"), "value"].item()
+        for scene in (short, short.model_copy(update={"duration": 20.0}))
+        for table in [ds.run(scene, ["document"], 1e-3).table]
+    ]
+    assert heights[0] == heights[1] == pytest.approx(1.9e-5, rel=0.05)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", made.SLOW)
 def test_slow_scenes_pass_too(name):

@@ -49,7 +49,7 @@ def test_long_rest_after_the_bounces_is_no_flight():
     short = ds.load("drop-ball")
     heights = [
         table.loc[(table["metric"] == "bounce_height_error") & (table["kind"] == "truth"), "value"].item()
-        for scene in (short, short.model_copy(update={"duration": 20.0}))
+        for scene in (short, short.model_copy(update={"duration": 12.0}))
         for table in [ds.run(scene, ["document"], 1e-3).table]
     ]
     assert heights[0] == heights[1] == pytest.approx(1.9e-5, rel=0.05)

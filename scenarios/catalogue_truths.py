@@ -10,8 +10,6 @@ _SCENES = {
         "bounce-95",
         "bounce-99",
         "bounce-9999",
-        "bounce-elastic",
-        "bounce-gentle",
         "drop-ball",
         "drop-ball-brisk",
         "drop-ball-dull",

@@ -110,12 +110,13 @@ def _with_components(length: ErrorBudget, vector: ErrorBudget, finest: float) ->
     """The error budget of a length, corrected by that of its components; `finest` is the error at the finest time step."""
     if vector.cause == "model" and length.cause in ("discretisation", "unresolved"):
         # The length is largest at another time than that of the components, so it may be larger than they are.
-        return replace(vector, upper=max(vector.upper, length.upper), reason=f"{vector.reason}, in a component")
+        return replace(vector, upper=max(length.upper, vector.upper), reason=f"{vector.reason}, in a component")
     if length.cause == "model" and length.lower > finest and vector.cause != "model":
         # A length that passes a minimum and grows at finer steps does so in a component; an irregular one only seems to.
         reason = "the length seems to grow at finer time steps, but no component grows"
-        return ErrorBudget("unresolved", reason, length.asymptotic_error, 0.0, length.upper)
-    return length
+        return ErrorBudget("unresolved", reason, length.asymptotic_error, 0.0, max(length.upper, vector.upper))
+    # The length is at least that of the components at their time.
+    return length if length.cause == "model" else replace(length, upper=max(length.upper, vector.upper))
 
 
 def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:

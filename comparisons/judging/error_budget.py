@@ -10,8 +10,8 @@ interval; docs/coverage.md counts how often the interval contains the true value
     rounding         no error is larger than rounding
     unresolved       all other cases: the time steps do not determine the cause
 
-The interval excludes 0 if the cause is `model`, and contains 0 otherwise; if it is `discretisation`, the interval contains no value above
-the allowed error.
+The interval excludes 0 if the cause is `model`, and contains 0 otherwise. It is computed as if the asymptotic error were not 0; so if the
+cause is `discretisation`, it may extend beyond the allowed error.
 """
 
 from __future__ import annotations  # help() then shows ArrayLike, not all that it stands for
@@ -206,7 +206,6 @@ def _attributed(e: Array, found: Posterior, floor: float, noise: float, judged_t
     is_small = all(sum(found.beyond(reach)) < risk for reach, risk in risks)
     if not is_small or allowed < noise:
         return "unresolved", median, lower, upper
-    lower, upper = max(lower, -allowed), min(upper, allowed)
     return "discretisation", median, lower, upper
 
 

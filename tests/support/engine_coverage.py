@@ -31,7 +31,7 @@ FINER = (8.0, 16.0)
 """The wrong scene's exact solution is measured at the finest step over these, and extrapolated."""
 WHOLE = 0.04
 """Durations are a multiple of this [s], and so of every time step."""
-RUNS = 40
+RUNS = 120
 """Of each kind of fault; each gives a series for each metric that the fault changes."""
 SMALLEST_FAULT, LARGEST_FAULT = 1e-3, 0.1
 

@@ -224,12 +224,24 @@ def test_most_series_of_powers_are_decided(family, steps):
     assert unresolved <= (1 / 3 if steps == 3 else 0.1)
 
 
+def test_intervals_of_maxima_contain_the_asymptotic_error():
+    """Although a part that is smaller at all three time steps does not show."""
+    found = interval_coverage.outcomes("maxima", 400, 3, interval_coverage.COMPARABLE)
+    assert np.mean([one.is_covered for one in found]) >= 0.95
+
+
 def test_wrong_parameters_of_engines_are_found():
     """Intervals contain the error of the wrong inertia, known from the exact solution of the wrong body; no large one is missed."""
     found = [one for _, one in engine_coverage.outcomes("inertia", 4)]
     assert len(found) > 8
     assert np.mean([one.is_covered for one in found]) >= 0.88
     assert any(one.cause == "model" for one in found)
+
+
+def test_intervals_contain_the_largest_error_over_time_of_wrong_friction():
+    """The largest error over time is at another time at finer steps; the components at one time show that it may be larger."""
+    found = [one for _, one in engine_coverage.outcomes("friction", 30)]
+    assert np.mean([one.is_covered for one in found]) >= 0.95
 
 
 def test_discretisation_reaches_no_farther_than_the_finest_error():

@@ -5,10 +5,10 @@ that of a given law.
 
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
 Valid for: impacts of one corner, or of the two corners of an edge that strike the floor at once and have equal velocities before and after;
-a ball with any
-spin; a Coulomb coefficient for a ball of equal moments only, or by a given law; no damping. Valid up to the first of these events: the
-tenth impact; an impact that is not of this kind, or after which the body stays on the floor; a time at which rounding determines whether
-the body touches the floor or when it turns over; growth of an initial disturbance of 1e-10 rad/s to 1e-6.
+a ball with any spin; a Coulomb coefficient for a ball of equal moments only, or by a given law; no damping. Valid up to the first of these
+events: the tenth impact; an impact that is not of this kind, in which the floor would have to pull (as eq 17 may demand of a corner that
+slides fast), or after which the body stays on the floor; a time at which rounding determines whether the body touches the floor or when it
+turns over; growth of an initial disturbance of 1e-10 rad/s to 1e-6.
 """
 
 import math
@@ -113,7 +113,8 @@ def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
         touching = _touching(scene, before)
         after = before.copy()
         after[RATES] = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor, law)
-        if not (_have_one_velocity(touching, before) and _have_one_velocity(touching, after)):
+        pushes = after[VELOCITY] @ UP > before[VELOCITY] @ UP
+        if not (pushes and _have_one_velocity(touching, before) and _have_one_velocity(touching, after)):
             return _Course(tuple(flights), tuple(events), now, ends_at_impact=True)
         events.append(Impact(now, before, after))
         flights.append(flight_states(after, inertia, g))

@@ -173,6 +173,22 @@ def test_corner_impact_is_limited_to_its_range_of_validity():
     assert truth_for(load(content | {"duration": 0.3})).events == ()
 
 
+def test_floor_does_not_pull():
+    """The upward kick of eq 17 is linear in the sideways speed of the corner, and pulls beyond the speed at which it is 0."""
+
+    def at_speed(speed):
+        content = dropped_from_rest("infinite").model_dump(exclude_none=True)
+        content["start"] = content["start"] | {"velocity": [0.0, 0.0, speed]}
+        return truth_for(load(content))
+
+    kicks = [at_speed(speed).events[0] for speed in (0.0, 1.0)]
+    at_rest, at_one = (kick.after[8] - kick.before[8] for kick in kicks)
+    none = at_rest / (at_rest - at_one)
+    assert 1.0 < abs(none) < 100.0
+    assert at_speed(0.999 * none).events[0].after[8] > at_speed(0.999 * none).events[0].before[8]
+    assert at_speed(1.001 * none) is None
+
+
 def box_at(clearance, velocity):
     """The published box with its corner at this height above the floor."""
     content = dropped_from_rest("none").model_dump(exclude_none=True)

@@ -17,6 +17,7 @@ from reports.views.numbers import duration, quantity, size, word
 CONVERGING = frozenset({"passed", "measured", "no_truth"})
 """Verdicts that are no finding."""
 MOST_NAMED = 2
+MOST_METRICS = 3
 ENGINE_NAMES = {"document": "document (Wang's method)"}
 """Descriptive names of engines, by label, where the label is not descriptive."""
 
@@ -202,10 +203,10 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
         ]
         sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
         if len(opened):
-            undecided.append(
-                f"{engine} in {_named(list(opened['scene'].unique()))} ({', '.join(map(quantity, opened['metric'].unique()))})"
-            )
-    return [*sentences, *([f"Undecided at these time steps: {'; '.join(undecided)}."] if undecided else [])]
+            names = [quantity(metric) for metric in opened["metric"].unique()]
+            more = [f"{len(names) - MOST_METRICS} more"] if len(names) > MOST_METRICS else []
+            undecided.append(f"{engine} in {_named(list(opened['scene'].unique()))} ({', '.join(names[:MOST_METRICS] + more)})")
+    return [*sentences, *([f"Undecided: {'; '.join(undecided)}."] if undecided else [])]
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.measuring.differences import differences
 from comparisons.robustness.axes import Axis
 from comparisons.robustness.failure_modes import SOUND, Diagnosis, ExtendedMotion, FailureMode, clamped, diagnose, held_speeds, worst
 from comparisons.robustness.operating_point import OperatingPoint
@@ -16,8 +17,7 @@ from comparisons.running.processes import EngineProcesses, Failed
 from comparisons.running.recording import Breakdown, Recording, try_record
 from comparisons.running.start_phases import start_phases
 from scenarios import DropspinError, Scenario, Trajectory, truth_for
-from scenarios.rotations import angle_between_orientations
-from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
+from scenarios.state import RATES
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ class _Unscaled:
         for truth, times in ((truth_for(scene), own.t[:rows]), (truth_for(moved.scene), other.t[:rows])):
             if truth is not None:
                 rows = min(rows, int(np.count_nonzero(truth.covers(times))))
-        difference = _difference(own.states[:rows], found[:rows], scene.body.size, float(np.linalg.norm(scene.acceleration)))
+        difference = float(differences(scene, own.states[:rows], found[:rows]).max())
         if difference <= SAME_MOTION:
             return SOUND
         message = f"the motion differs from the one at the nominal {self._axis.name} by {difference:.1e} of its sizes and speeds"
@@ -152,18 +152,6 @@ def _extended(scene: Scenario, dt: float, recording: Recording) -> ExtendedMotio
     own, more = recording.motion, recording.continuation
     times, states = np.concatenate([own.t, more.t]), np.concatenate([own.states, more.states])
     return ExtendedMotion(scene, dt, own, Trajectory.from_states(times, states, own.velocity_lag), truth_for(scene))
-
-
-def _difference(first: Array, second: Array, size: float, g: float) -> float:
-    """The largest difference of two motions, relative to sizes and speeds; infinite if one is not finite."""
-    if not (np.isfinite(first).all() and np.isfinite(second).all()):
-        return math.inf
-    turned = float(angle_between_orientations(first[:, ORIENTATION], second[:, ORIENTATION]).max())
-    # Relative to the speeds that the body or gravity gives: a speed of rounding errors is not a scale.
-    speed = max(float(np.abs(first[:, VELOCITY]).max()), size * float(np.abs(first[:, SPIN]).max()), math.sqrt(g * size))
-    scales = ((POSITION, size), (VELOCITY, speed), (SPIN, speed / size))
-    ratios = [float(np.abs(first[:, part] - second[:, part]).max()) / scale for part, scale in scales if scale > 0.0]
-    return max(turned, *ratios)
 
 
 def _without_value(mode: FailureMode, reason: str) -> Diagnosis:

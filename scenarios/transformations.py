@@ -1,0 +1,139 @@
+"""Transformations of a scene to another with the same motion, seen from elsewhere or in other units; and other changes of its tables."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.body import Vertices
+from scenarios.loading import load
+from scenarios.mechanics import is_diagonal
+from scenarios.model import Scenario
+from scenarios.rotations import conjugate, multiply, rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+
+Array = NDArray[np.float64]
+
+NEXT_AXES = np.array([0.5, 0.5, 0.5, 0.5])
+"""The rotation that takes the x axis to the y axis, y to z, and z to x."""
+REFLECTED = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
+"""The signs of a state that is mirrored at the plane x = 0; rotations and angular velocities are axial."""
+
+
+def changed(scene: Scenario, duration: float | None = None, **tables: Mapping[str, Any]) -> Scenario:
+    """The scene with some keys of some tables, or its duration, replaced, and without expectations and ensemble."""
+    content = scene.model_dump(exclude={"expect", "ensemble"}, exclude_none=True)
+    for table, keys in tables.items():
+        content[table] = {**content[table], **keys}
+    return load({**content, "duration": scene.duration if duration is None else duration})
+
+
+def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Scenario:
+    """The scene with its numbers in other units, of which so many are a metre, a second and a kilogram."""
+    start, speed = scene.start, length / time
+    tables: dict[str, Mapping[str, Any]] = {
+        "body": body_times(scene, length, mass),
+        "start": {
+            "position": _times(length, start.position),
+            "velocity": _times(speed, start.velocity),
+            "angular_velocity": _times(1.0 / time, start.angular_velocity),
+        },
+    }
+    if scene.gravity is not None:
+        tables["gravity"] = {"acceleration": _times(length / time**2, scene.gravity.acceleration)}
+    if scene.floor is not None:
+        tables["floor"] = {"rest_speed": speed * scene.floor.rest_speed}
+    if scene.damping is not None:
+        tables["damping"] = {"linear": scene.damping.linear / time, "angular": scene.damping.angular / time}
+    return changed(scene, time * scene.duration, **tables)
+
+
+def units_of_states(length: float = 1.0, time: float = 1.0) -> Array:
+    """The numbers of a state with 1 for each, in other units, shape (13,): states in these units over it are in SI units."""
+    units = np.ones(13)
+    units[POSITION], units[VELOCITY], units[SPIN] = length, length / time, 1.0 / time
+    return units
+
+
+def body_times(scene: Scenario, length: float, mass: float) -> dict[str, Any]:
+    """Keys of the body table, with lengths and masses multiplied by factors."""
+    given = scene.body.model_dump(exclude_none=True)
+    keys: dict[str, Any] = {"mass": mass * given["mass"]}
+    for name in {"radius", "half_extents", "points"} & given.keys():
+        keys[name] = _times(length, given[name])
+    if "masses" in given:
+        keys["masses"] = _times(mass, given["masses"])
+    if given["inertia"] == "note" and is_diagonal(scene.body.inertia_tensor):  # it has unit masses for a body of any mass
+        given["inertia"] = tuple(float(moment) for moment in np.diag(scene.body.inertia_tensor))
+    if not isinstance(given["inertia"], str):
+        keys["inertia"] = _times(mass * length**2, given["inertia"])
+    return keys
+
+
+def _times(factor: float, values: Any) -> Any:
+    return tuple(_times(factor, value) for value in values) if isinstance(values, tuple) else factor * values
+
+
+def turned_states(states: Array, rotation: Array) -> Array:
+    """States, shape (..., 13), turned by a rotation, a unit quaternion."""
+    parts = [rotate(rotation, states[..., part]) for part in (POSITION, VELOCITY, SPIN)]
+    return np.concatenate([parts[0], multiply(rotation, states[..., ORIENTATION]), *parts[1:]], axis=-1)
+
+
+def turned(scene: Scenario, rotation: Array) -> Scenario:
+    """The scene, gravity included, turned about the vertical by a rotation."""
+    found = scene.starting_at(turned_states(scene.initial_state, rotation))
+    if scene.gravity is None:
+        return found
+    return changed(found, gravity={"acceleration": tuple(map(float, rotate(rotation, scene.acceleration)))})
+
+
+def mirrored(scene: Scenario) -> Scenario:
+    """The scene, body and gravity included, mirrored at the plane x = 0."""
+    tables: dict[str, Mapping[str, Any]] = {}
+    if scene.gravity is not None:
+        x, y, z = scene.gravity.acceleration
+        tables["gravity"] = {"acceleration": (-x, y, z)}
+    if isinstance(scene.body, Vertices):
+        tables["body"] = {"points": tuple((-x, y, z) for x, y, z in scene.body.points)}
+    return changed(scene.starting_at(REFLECTED * scene.initial_state), **tables)
+
+
+def with_next_axes(scene: Scenario) -> Scenario:
+    """The same motion with other names of the body's axes: its x axis becomes y, y becomes z, and z becomes x."""
+    given, tables = scene.body.model_dump(exclude_none=True), {}
+    for name in ("half_extents", "inertia"):
+        if isinstance(given.get(name), tuple):
+            tables[name] = (given[name][2], *given[name][:2])
+    if "points" in given:
+        tables["points"] = tuple((z, x, y) for x, y, z in given["points"])
+    state = scene.initial_state
+    state[ORIENTATION] = multiply(state[ORIENTATION], conjugate(NEXT_AXES))
+    return changed(scene.starting_at(state), body=tables)
+
+
+def with_previous_axes(states: Array) -> Array:
+    """States of `with_next_axes`, shape (n, 13), by the original names of the axes."""
+    found = states.copy()
+    found[:, ORIENTATION] = multiply(states[:, ORIENTATION], NEXT_AXES)
+    return found
+
+
+def moving(scene: Scenario, offset: Array, velocity: Array) -> Scenario:
+    """The scene from a frame of reference: moved by an offset [m], and with an additional velocity [m/s]."""
+    state = scene.initial_state
+    state[POSITION] += offset
+    state[VELOCITY] += velocity
+    return scene.starting_at(state)
+
+
+def is_sliding_free(scene: Scenario) -> bool:
+    """Whether a horizontal velocity has no effect on the motion: no friction and no damping."""
+    return scene.damping is None and (scene.floor is None or scene.floor.coefficient == 0.0)
+
+
+def whole_steps(scene: Scenario, dt: float, steps: int) -> Scenario:
+    """The scene for a number of time steps of dt [s]."""
+    return changed(scene, math.nextafter(steps * dt, math.inf))

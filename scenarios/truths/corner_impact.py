@@ -58,7 +58,7 @@ def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
     law = law or law_of(floor)
     course = _follow(scene, scene.initial_state, law)
     if len(course.events) > 1:
-        course = _until_sensitive(course, _follow(scene, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION, law))
+        course = _until_sensitive(scene, course, _follow(scene, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION, law))
     if course.horizon == 0.0 or (not course.events and course.ends_at_impact):
         return None  # the body stays in contact from the start, or the first impact is not of this kind
     if not course.events:
@@ -122,12 +122,13 @@ def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
             return _Course(tuple(flights), tuple(events), now)
 
 
-def _until_sensitive(course: _Course, disturbed: _Course) -> _Course:
+def _until_sensitive(scene: Scenario, course: _Course, disturbed: _Course) -> _Course:
     """The flights and impacts up to the impact after which a disturbance of the initial state has grown by more than `MAX_GROWTH`."""
+    per_radian = np.array([scene.body.size] * 3 + [1.0] * 3)  # speeds, m/s, to rates of rotation
     for number, event in enumerate(course.events):
         difference = math.inf
         if number < len(disturbed.events):
-            difference = float(np.abs(disturbed.events[number].after[RATES] - event.after[RATES]).max())
+            difference = float(np.abs((disturbed.events[number].after[RATES] - event.after[RATES]) / per_radian).max())
         if number > 0 and difference > MAX_GROWTH * DISTURBANCE:
             return _Course(course.flights[: number + 1], course.events[:number], event.time)
     return course

@@ -8,6 +8,7 @@ from scenarios.mechanics import angular_momentum, energy, lowest_height
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, RATES, SPIN, VELOCITY
 from scenarios.trajectory import Trajectory
+from scenarios.transformations import in_units
 from scenarios.truths.flight import flight_states
 
 UP = np.array([0.0, 1.0, 0.0])
@@ -286,3 +287,12 @@ def test_flat_box_with_some_descending_corners_does_not_sink_into_the_floor(spin
     if truth is not None:
         motion = truth(np.linspace(0.0, min(1.0, truth.horizon), 1000))
         assert lowest_height(scene, motion).min() >= -1e-9
+
+
+def test_solution_ends_at_the_same_time_in_other_units():
+    """A tumble with ten impacts, in millimetres and in grams."""
+    scene = load("drop-box-anyhow")
+    horizon = truth_for(scene).horizon
+    assert horizon < scene.duration
+    for units in ({"length": 1e3}, {"mass": 1e3}):
+        assert truth_for(in_units(scene, **units)).horizon == pytest.approx(horizon, rel=1e-12)

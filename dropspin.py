@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from comparisons.sweeps.running import read_sweep_parts as read_sweep_parts
     from comparisons.sweeps.running import run_sweep as run_sweep
     from comparisons.sweeps.spec import load_sweep as load_sweep
+    from comparisons.symmetries.study import symmetries as symmetries
     from comparisons.tradeoff.points import TradeOff as TradeOff
     from comparisons.tradeoff.study import tradeoff as tradeoff
     from reports.run_folder import write_report as write_report
@@ -103,6 +104,7 @@ _HOMES = {
     "comparisons.running.run": ("DEFAULT_DTS", "measure", "run"),
     "comparisons.sweeps.running": ("read_sweep", "read_sweep_parts", "run_sweep"),
     "comparisons.sweeps.spec": ("load_sweep",),
+    "comparisons.symmetries.study": ("symmetries",),
     "comparisons.tradeoff.points": ("TradeOff",),
     "comparisons.tradeoff.study": ("tradeoff",),
     "reports.run_folder": ("write_report",),

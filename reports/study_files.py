@@ -6,13 +6,14 @@ from pathlib import Path
 from comparisons.regressions.history import History
 from comparisons.results.stored_files import file_name
 from comparisons.robustness.study import RobustnessStudy
+from comparisons.symmetries.study import Finding
 from comparisons.tradeoff.points import TradeOff
 from reports.markdown import history_markdown
 from reports.output import write_table
 from reports.plots.figures import history_figure, limits_charts, tradeoff_charts
 from reports.plots.svg import save_svg
 from reports.sections import Section
-from reports.views import history, limits, tradeoff
+from reports.views import history, limits, symmetries, tradeoff
 
 
 def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
@@ -42,6 +43,16 @@ def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: P
         section.add_table(tradeoff.pareto_front_rows(one))
         section.add_list(tradeoff.sentences(one, within))
     section.write(folder, "tradeoff")
+
+
+def write_symmetries(found: Sequence[Finding], folder: Path) -> None:
+    """Write `symmetries.csv`, `symmetries.json` and `symmetries.md`."""
+    write_table(folder, "symmetries", symmetries.COLUMNS, symmetries.rows(found))
+    section = Section("Symmetries and repeated runs")
+    section.add_table(symmetries.worst_rows(found))
+    section.add_text(symmetries.legend(found))
+    section.add_list(symmetries.sentences(found))
+    section.write(folder, "symmetries")
 
 
 def write_history(found: History, folder: Path) -> None:

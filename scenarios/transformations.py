@@ -98,7 +98,7 @@ def mirrored(scene: Scenario) -> Scenario:
         tables["gravity"] = {"acceleration": (-x, y, z)}
     if isinstance(scene.body, Vertices):
         tables["body"] = {"points": tuple((-x, y, z) for x, y, z in scene.body.points)}
-    return changed(scene.starting_at(REFLECTED * scene.initial_state), **tables)
+    return changed(scene.starting_at(REFLECTED * scene.initial_state), scene.duration, **tables)
 
 
 def with_next_axes(scene: Scenario) -> Scenario:

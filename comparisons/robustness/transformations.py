@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.robustness.operating_point import OperatingPoint, fall_time, spin
-from scenarios.mechanics import is_diagonal
 from scenarios.transformations import body_times, changed, in_units, units_of_states
 
 Array = NDArray[np.float64]

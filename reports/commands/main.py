@@ -26,6 +26,7 @@ COMMANDS = {
     "run": "Run scenes with several engines, and write the report.",
     "show": "Show a scene, or the settings of an engine for the scene.",
     "sweep": "Run every job of a grid or random sample.",
+    "symmetries": "Test whether engines keep symmetries and repeat their results.",
     "tradeoff": "Measure what accuracy costs.",
 }
 """The commands, each in `reports/commands/NAME.py`, with the line shown for each in the help."""

@@ -1,0 +1,208 @@
+"""The study of the command `dropspin symmetries`: whether engines keep the symmetries of a scene, and repeat their results.
+
+Rounding breaks every symmetry a little, and a sensitive motion amplifies that. So the initial state of the transformed scene is perturbed
+by a few ulp, and the nominal scene is run from there: a difference is attributed to rounding as long as it is not larger than the largest
+effect of the perturbations so far, times a factor that allows for a rounding error in each time step. Repeated runs must be equal bit for
+bit.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.engines.base import Engine
+from comparisons.measuring.differences import differences
+from comparisons.measuring.tolerances import FEW_DRAWS, MATTERS, PERTURBATION, ULPS_PER_STEP, perturbed
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import Breakdown, classify, record_batch, try_record
+from comparisons.symmetries.catalogue import SYMMETRIES
+from scenarios import DropspinError, Scenario
+from scenarios.state import RATES
+from scenarios.transformations import whole_steps
+
+Array = NDArray[np.float64]
+Status = Literal["kept", "sensitive", "nearly kept", "lost", "not run"]
+STATUSES: tuple[Status, ...] = get_args(Status)
+"""From the best to the worst. Kept: up to rounding. Sensitive: the difference is above 1e-5 of the motion's sizes and speeds, but so is the
+effect of perturbing the initial state by a few ulp. Nearly kept: the difference is not due to rounding, and up to 1e-5. Lost: it is larger.
+Not run: the engine does not run the transformed scene, or breaks down in it.
+"""
+
+SCENES = ("spin-asymmetric", "drop-ball-backspin", "drop-box-anyhow", "drop-box-sticking", "roll-ball", "slide-box", "turn-box-rough")
+"""A free rotation, a ball with backspin, boxes that strike a smooth and a rough floor, a rolling ball, a sliding and a turning box."""
+ENGINES = ("document", "mujoco", "pybullet")
+DT = 1e-3  # s
+RESOURCES = ResourceLimits(processor_time=60.0)
+AGAIN, BATCH, HALVES, NEW_PROCESS = "again", "in a batch", "in two halves", "in a new process"
+REPEATS = (AGAIN, BATCH, NEW_PROCESS, HALVES)
+"""Runs of the same scene: after others in the same process, together with two others, in a new process, and stopped and continued."""
+NAMES = (*SYMMETRIES, *REPEATS)
+FASTER = (1.001, 1.002)
+"""Factors on the initial velocities of the other simulations of a batch."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Whether an engine keeps one symmetry, or repeats its result, in one scene.
+
+    Attributes:
+        scene: Name of the scene.
+        engine: Label of the engine.
+        symmetry: The symmetry, or the way in which the run was repeated.
+        status: One of `STATUSES`.
+        difference: The largest difference of the two motions, of angles [rad] and relative to sizes and speeds; NaN if there is none.
+        step: The first time step at which rounding does not explain the difference; None if it does at all steps.
+        time: The time of this step [s]; NaN if there is none.
+        reason: Why there is no motion to compare; otherwise empty.
+    """
+
+    scene: str
+    engine: str
+    symmetry: str
+    status: Status
+    difference: float = float("nan")
+    step: int | None = None
+    time: float = float("nan")
+    reason: str = ""
+
+
+def symmetries(
+    scenes: SceneLike | Iterable[SceneLike] = (),
+    engines: Engine | str | Iterable[Engine | str] = (),
+    *,
+    dt: float = DT,
+    on_progress: Callable[[str, float], None] = ignore,
+    resources: ResourceLimits = RESOURCES,
+) -> list[Finding]:
+    """Run scenes and scenes that have the same motion, and compare the motions.
+
+    Args:
+        scenes: One scene or several: scenes, catalogue names, paths of files, or mappings; by default seven of different kinds.
+        engines: One engine or several: engines, or names with options; by default `document`, `mujoco` and `pybullet`.
+        dt: Time step [s].
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one scene.
+
+    Returns:
+        One finding for each scene, engine and symmetry that the scene has.
+
+    Raises:
+        DropspinError: A scene or an engine does not exist, or a time step does not fit a scene.
+    """
+    chosen = [as_scene(one) for one in several("scenes", scenes) or SCENES]
+    entries = list({one.label: one for one in map(engine_entry, several("engines", engines) or ENGINES)}.values())
+    for scene in chosen:
+        verify_time_step(scene, dt)
+    found: list[Finding] = []
+    with EngineProcesses(resources) as processes:
+        for number, (scene, entry) in enumerate((scene, entry) for scene in chosen for entry in entries):
+            on_progress(f"{scene.name}, {entry.label}", number / (len(chosen) * len(entries)))
+            found += _of_engine(processes, entry, scene, dt)
+    return found
+
+
+def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float) -> list[Finding]:
+    """All findings for one engine and one scene."""
+    none = Finding(scene.name, entry.label, "", "not run")
+    if entry.engine is None:
+        return [replace(none, symmetry=name, reason=entry.reason) for name in NAMES]
+    try:
+        own, found = processes.call(entry, _compare, scene, dt)
+        if isinstance(own, Breakdown):
+            return [replace(none, symmetry=name, reason=own.reason) for name in NAMES]
+        processes.renew(entry)
+        fresh = processes.call(entry, _states, scene, dt)
+    except Failed as failure:
+        return [replace(none, symmetry=name, reason=failure.reason) for name in NAMES]
+    repeated = replace(none, symmetry=NEW_PROCESS)
+    found.append(replace(repeated, reason=fresh.reason) if isinstance(fresh, Breakdown) else _judged(repeated, scene, dt, own, fresh, None))
+    return found
+
+
+def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array | Breakdown, list[Finding]]:
+    """The engine's motion of a scene, and the findings that one process can give; runs in the engine's process."""
+    own = _states(entry, scene, dt)
+    if isinstance(own, Breakdown):
+        return own, []
+    names = (name for name in NAMES if name != NEW_PROCESS and (name not in SYMMETRIES or SYMMETRIES[name].applies(scene)))
+    return own, [_finding(entry, scene, dt, own, Finding(scene.name, entry.label, name, "not run")) for name in names]
+
+
+def _finding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
+    """One finding; `none` is that of a symmetry that cannot be compared."""
+    try:
+        other, perturbations = _other(entry, scene, dt, own, none.symmetry)
+    except DropspinError as error:
+        return replace(none, reason=str(error))
+    except Exception as error:  # an engine is somebody else's code
+        return replace(none, reason=classify(error).reason)
+    if isinstance(other, Breakdown):
+        return replace(none, reason=other.reason)
+    return _judged(none, scene, dt, own, other, perturbations, entry.adapter.precision)
+
+
+def _other(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> tuple[Array | Breakdown, list[Array] | None]:
+    """The states that should equal the engine's own, and the effects of perturbations by a few ulp; None if rounding has no effect."""
+    if name == AGAIN:
+        return _states(entry, scene, dt), None
+    if name == BATCH:
+        start = scene.initial_state
+        others = [scene.starting_at(np.concatenate([start[:7], start[RATES] * share])) for share in FASTER]
+        return record_batch(entry.adapter, [scene, *others], dt)[0].states, None
+    if name == HALVES:
+        half = len(own) // 2
+        nominal = whole_steps(scene, dt, len(own) - 1 - half).starting_at(own[half])
+        rest = _states(entry, nominal, dt)
+        if isinstance(rest, Breakdown):
+            return rest, []
+        effects = _effects(entry, nominal, dt, rest, _perturbed(nominal, entry))
+        return np.concatenate([own[:half], rest]), [np.concatenate([np.zeros(half), effect]) for effect in effects]
+    symmetry, times = SYMMETRIES[name], dt * np.arange(len(own), dtype=float)
+    transformed = symmetry.transformed(scene)
+    states = _states(entry, transformed, symmetry.time * dt)
+    if isinstance(states, Breakdown):
+        return states, []
+    starts = [symmetry.back(times[:1], start.initial_state[np.newaxis])[0] for start in _perturbed(transformed, entry)]
+    return symmetry.back(times, states), _effects(entry, scene, dt, own, map(scene.starting_at, starts))
+
+
+def _effects(entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario]) -> list[Array]:
+    """The differences of an engine's motion and those from perturbed starts, each of shape (n,)."""
+    motions = (_states(entry, start, dt) for start in starts)
+    return [differences(scene, own, motion) for motion in motions if not isinstance(motion, Breakdown)]
+
+
+def _perturbed(scene: Scenario, entry: EngineEntry) -> list[Scenario]:
+    """A scene with its initial state perturbed by a few ulp, in some ways."""
+    return [one for [one] in perturbed(scene, [scene], entry.adapter.precision)]
+
+
+def _states(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
+    """The states of an engine's motion at each time step, shape (n, 13), or why there are none."""
+    recording = try_record(entry.adapter, scene, dt)
+    return recording if isinstance(recording, Breakdown) else recording.motion.states
+
+
+def _judged(
+    none: Finding, scene: Scenario, dt: float, own: Array, other: Array, effects: Sequence[Array] | None, precision: type = np.float64
+) -> Finding:
+    """A finding with its status; without effects of perturbations, the two motions must be equal bit for bit."""
+    difference = differences(scene, own, other)
+    largest, steps = float(difference.max()), np.arange(len(own), dtype=float)
+    allowed = np.zeros_like(difference)
+    if effects is not None:
+        grown = np.maximum.accumulate(np.max([allowed, *effects], axis=0))
+        allowed = grown * (FEW_DRAWS + steps / PERTURBATION) + float(np.finfo(precision).eps) * (ULPS_PER_STEP + steps)
+    beyond = np.flatnonzero(~(difference <= allowed))
+    if not len(beyond):
+        return replace(none, status="kept" if largest <= MATTERS else "sensitive", difference=largest)
+    first = int(beyond[0])
+    # What perturbations explain does not count, even if it is large.
+    unexplained = float(difference[beyond].max())
+    status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
+    return replace(none, status=status, difference=unexplained, step=first, time=first * dt)

@@ -1,0 +1,50 @@
+"""`dropspin symmetries`."""
+
+import json
+import os
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import as_json, time_limit_option
+from reports.terminal.safe import echo
+
+
+@click.command("symmetries")
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
+@click.option("--dt", default=1e-3, show_default=True, type=float, metavar="SECONDS", help="The time step.")
+@time_limit_option(60.0, "an engine may use for one scene")
+@click.option("-o", "--output", default="out/symmetries", show_default=True, metavar="DIR", help="Folder for the tables.")
+@as_json
+def symmetries_command(
+    scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float, output: str, json_output: bool
+) -> None:
+    """Test whether engines give the same motion for the same scene seen from elsewhere, in other units, or run again.
+
+    Each scene is turned, mirrored, moved, described with other body axes and in other units, and run again: in a batch, in a new process,
+    and stopped and continued. No exact solution is needed. The default is seven scenes with document, mujoco and pybullet.
+    """
+    from comparisons.running.processes import ResourceLimits
+    from comparisons.symmetries.study import symmetries
+    from reports.output import folder_made
+    from reports.study_files import write_symmetries
+    from reports.terminal.progress import share_bar
+    from reports.terminal.rows import print_rows, print_sentences
+    from reports.views import symmetries as view
+
+    with folder_made(output) as folder:
+        with share_bar("symmetries") as progress:
+
+            def on_progress(what: str, share: float) -> None:
+                stop_if_interrupted()
+                progress(what, share)
+
+            found = symmetries(scenes, engines, dt=dt, on_progress=on_progress, resources=ResourceLimits(processor_time=time_limit))
+        write_symmetries(found, folder)
+    if json_output:
+        echo(json.dumps(view.rows(found), indent=1))
+        return
+    print_rows(view.worst_rows(found), json_output=False)
+    print_sentences([view.legend(found), *view.sentences(found)])
+    echo(f"Written: {os.path.join(output, 'symmetries.md')}")

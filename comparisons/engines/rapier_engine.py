@@ -62,7 +62,8 @@ class Rapier(Engine):
         if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):
             return "Rapier's friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
         truth = truth_for(scene)
-        landings = np.array([rotate(hit.before[ORIENTATION], body.vertices)[:, 1] for hit in truth.events]) if truth else np.empty((0, 1))
+        heights = [rotate(hit.before[ORIENTATION], body.vertices)[:, 1] for hit in truth.events] if truth else []
+        landings = np.reshape(heights, (-1, len(body.vertices)))
         if np.any(np.sum(landings <= landings.min(axis=1, keepdims=True) + 1e-6 * body.size, axis=1) > 1):
             return "Rapier applies restitution to one contact after another, each undoes those before; here several corners land at once"
         return None

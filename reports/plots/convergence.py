@@ -47,8 +47,9 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
             m = float(asymptotic["value"].iloc[0])
             ends = sorted(abs(float(asymptotic[side].iloc[0])) for side in ("lower", "upper"))
             lines.append(Line(engine, np.full(2, FINER * dts.min()), np.array(ends), colour, width=4.0))
-        if len(order) and len(asymptotic):
-            lines.append(_fit(engine, dts, errors, float(order["value"].iloc[0]), m, colour))
+        if len(asymptotic) and (len(order) or m != 0.0):
+            # An error that hardly depends on dt has no order; the line to its asymptotic error then has order 1.
+            lines.append(_fit(engine, dts, errors, float(order["value"].iloc[0]) if len(order) else 1.0, m, colour))
     dts = np.sort(values["dt"].unique())
     if len(dts) > 1 and largest > 0.0:
         # Above the data, so that it hides no line.

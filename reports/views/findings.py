@@ -166,9 +166,10 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
 def _known(tally: Counts) -> str:
     """The end of a sentence: how many values show known faults or are within limitations, how many expected faults do not occur."""
     scenes = _scenes(tally.known_scenes)
-    known = f"; {tally.known} {'value' if tally.known == 1 else 'values'} in {scenes} show{'s' * (tally.known == 1)} known faults"
+    shows = f"show{'s' * (tally.known == 1)} known faults"
+    known = f"; {tally.known} {'value' if tally.known == 1 else 'values'} in {scenes} {shows}"
     known = known if tally.known else ""
-    limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} within known limitations" if tally.limited else ""
+    limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} outside the documented range" if tally.limited else ""
     return (
         known + limited + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not occur" if tally.fixed else "")
     )
@@ -205,8 +206,8 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
         if len(opened):
             names = [quantity(metric) for metric in opened["metric"].unique()]
             more = [f"{len(names) - MOST_METRICS} more"] if len(names) > MOST_METRICS else []
-            undecided.append(f"{engine} in {_named(list(opened['scene'].unique()))} ({', '.join(names[:MOST_METRICS] + more)})")
-    return [*sentences, *([f"Undecided: {'; '.join(undecided)}."] if undecided else [])]
+            undecided.append(f"{engine} {', '.join(names[:MOST_METRICS] + more)} ({_named(list(opened['scene'].unique()))})")
+    return [*sentences, *([f"Undecided metrics: {'; '.join(undecided)}."] if undecided else [])]
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:

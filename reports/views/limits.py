@@ -73,11 +73,16 @@ def _mode(point: ScanPoint) -> str:
 
 def range_rows(found: RobustnessStudy) -> list[dict[str, str]]:
     """The range in which each engine is sound along each axis, and the failure modes beyond."""
-    return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan)} for scan in found.scans]
+    modes = {engine: _mode(points[0]) for engine, points in found.refinements.items() if points[0].mode != "sound"}
+    return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan, modes.get(scan.engine))} for scan in found.scans]
 
 
-def _range(scan: AxisScan) -> dict[str, str]:
+def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
+    """The range of an axis; `nominal` is the failure mode at the nominal values, if there is one, which an invariant axis repeats."""
     points, sound = scan.points, scan.sound_range
+    if scan.axis.invariant and nominal and all(point.mode == "sound" for point in points):
+        beyond = f"{nominal} at the nominal value; the same motion at all {len(points)} tested values"
+        return {"sound from": "–", "to": "–", "beyond": beyond}
     if sound is None:
         those = sum(point.mode == "sound" for point in points)
         beyond = f"{_mode(scan.at(scan.base))} at the nominal value, {scan.base:.4g}; sound at {those} of {len(points)} tested values"

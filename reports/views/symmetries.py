@@ -9,11 +9,11 @@ from typing import Any
 from comparisons.symmetries.study import NAMES, STATUSES, Finding, Status
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
-MARKS: dict[Status, str] = {"kept": "✓", "sensitive": "≈", "nearly kept": "~", "lost": "✗", "not run": "–"}
+MARKS: dict[Status, str] = {"kept": "✓", "rounding": "≈", "nearly kept": "~", "lost": "✗", "not run": "–"}
 MEANINGS: dict[Status, str] = {
     "kept": "kept up to rounding",
-    "sensitive": "the motion is so sensitive that rounding explains the difference",
-    "nearly kept": "differs by up to 1e-5",
+    "rounding": "above 1e-5, but rounding explains it",
+    "nearly kept": "up to 1e-5, but more than rounding explains",
     "lost": "lost",
     "not run": "not run",
 }

@@ -59,13 +59,15 @@ def test_tables_of_largest_steps_and_of_sound_ranges(study):
 def test_sound_range_around_the_nominal_value():
     """Both ways from the scene's nominal value, as far as every point is sound; none if the nominal value is not."""
     found = scan("a", ["sound", "inaccurate", "sound", "sound", "sound", "clamped", "sound"])
-    scans = (replace(found, base=1e3), replace(found, base=10.0), scan("a", ["sound"] * 4), scan("a", ["sound"] * 4, "mass"))
-    study = RobustnessStudy(SPIN, 5e-3, 0.1, scans, {}, {})
+    masses = scan("a", ["sound"] * 4, "mass"), scan("b", ["sound"] * 4, "mass")
+    scans = (replace(found, base=1e3), replace(found, base=10.0), scan("a", ["sound"] * 4), *masses)
+    study = RobustnessStudy(SPIN, 5e-3, 0.1, scans, {}, {"b": (points_of("inaccurate"),)})
     assert [(row["sound from"], row["to"], row["beyond"]) for row in limits.range_rows(study)] == [
         ("100", "1e+04", "inaccurate at 10; clamped at 1e+05"),
         ("–", "–", "inaccurate at the nominal value, 10; sound at 5 of 7 tested values"),
         ("1", "1000", "not tested; sound at all 4 tested values"),
         ("1", "1000", "not tested; the same motion at all 4 tested values"),
+        ("–", "–", "inaccurate at the nominal value; the same motion at all 4 tested values"),
     ]
 
 

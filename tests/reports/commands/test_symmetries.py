@@ -1,0 +1,51 @@
+"""`dropspin symmetries`."""
+
+import json
+
+import pytest
+from support.cli import dropspin
+
+from comparisons.symmetries.study import NAMES
+
+
+def test_table_sentences_and_files(tmp_path):
+    """An engine that keeps every symmetry, one that loses some, and one that declines the scene; the section is part of a report."""
+    asked = ("symmetries", "slide-box", "--dt", "0.002", "-e", "document", "-e", "mujoco[profile=default]", "-e", "document[law=coulomb]")
+    done = dropspin(*asked, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].split() == ["the", "scene", "document", "mujoco[profile=default]", "document[law=coulomb]"]
+    table = {name: next(line for line in lines if line.startswith(name))[len(name) :].split() for name in ("turned by 1 rad", "again")}
+    assert table["turned by 1 rad"][:3] == ["–", "✗", "1e+00"]
+    assert table["turned by 1 rad"][3] == "✓"
+    assert table["again"] == ["–", "✓", "0", "✓", "0"]
+    assert any(line.startswith("mujoco[profile=default], turned by 1 rad: another motion in slide-box, from step ") for line in lines)
+    assert any(line.startswith("Not run: document in slide-box: law=note has no Coulomb coefficient") for line in lines)
+    assert "✓ kept up to rounding" in done.stdout
+    assert done.stdout.endswith("Written: out/symmetries/symmetries.md\n")
+    folder = tmp_path / "out/symmetries"
+    assert {path.name for path in folder.iterdir()} == {"section.json", "symmetries.csv", "symmetries.json", "symmetries.md"}
+    rows = json.loads((folder / "symmetries.json").read_text())
+    assert {row["symmetry"] for row in rows} <= set(NAMES)
+    [turned] = [row for row in rows if row["engine"].startswith("mujoco") and row["symmetry"] == "turned by 1 rad"]
+    assert turned["status"] == "lost"
+    assert turned["time"] == pytest.approx(0.002 * turned["step"])
+    assert dropspin("run", "drop-ball", "-e", "document", "--dt", "0.01", "-o", "run", cwd=tmp_path).returncode == 0
+    assert dropspin("report", "run", "--add", "out/symmetries", cwd=tmp_path).returncode == 0
+    assert "Symmetries and repeated runs" in (tmp_path / "run/report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (["drop-bal"], "Did you mean 'drop-ball'"),
+        (["drop-ball", "drop-ball"], "two scenes have the same name"),
+        (["drop-ball", "-e", "mujocoo"], "engine 'mujocoo' is unknown."),
+        (["drop-ball", "--dt", "7"], "dt: got 7.0 s"),
+    ],
+)
+def test_bad_input_is_refused(asked, message, tmp_path):
+    done = dropspin("symmetries", *asked, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "out").exists()

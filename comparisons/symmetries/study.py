@@ -80,7 +80,7 @@ def symmetries(
     engines: Engine | str | Iterable[Engine | str] = (),
     *,
     dt: float = DT,
-    on_progress: Callable[[str, float], None] = ignore,
+    on_progress: Callable[[str, float], None] | None = None,
     resources: ResourceLimits = RESOURCES,
 ) -> list[Finding]:
     """Run scenes and scenes that have the same motion, and compare the motions.
@@ -105,9 +105,10 @@ def symmetries(
     for scene in chosen:
         verify_time_step(scene, dt)
     found: list[Finding] = []
+    callback = on_progress or ignore
     with EngineProcesses(resources) as processes:
         for number, (scene, entry) in enumerate((scene, entry) for scene in chosen for entry in entries):
-            on_progress(f"{scene.name}, {entry.label}", number / (len(chosen) * len(entries)))
+            callback(f"{scene.name}, {entry.label}", number / (len(chosen) * len(entries)))
             found += _of_engine(processes, entry, scene, dt)
     return found
 

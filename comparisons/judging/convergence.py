@@ -93,7 +93,7 @@ def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Seq
     if vector is not None:
         found = _with_components(found, vector, finest=abs(float(errors[np.argmin(dts)])))
     order, limit = _judge_order(claim, metric, found), None
-    if order is not None:
+    if order is not None and found.dts:
         order = replace(order, tolerance=_order_tolerance(found, dts, errors, np.array([point.tolerance for point in series])))
     if not math.isnan(found.asymptotic_error):
         # What the steps leave open is not compared with another run's.

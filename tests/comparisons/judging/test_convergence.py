@@ -7,6 +7,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
+from comparisons.judging.convergence import Claim, SeriesPoint, study_convergence
+from comparisons.measuring.metric import Average
 
 STEPS = [8e-3, 4e-3, 2e-3]
 
@@ -140,6 +142,15 @@ def test_order_below_the_claimed_one_fails(claimed, error, verdict):
     """First order fails where second, fourth or exactness is claimed; without a claim any order passes."""
     found = run("spin-principal", with_error(claimed, error))
     assert study(found, "orientation_error", "order")["verdict"] == verdict
+
+
+def test_claim_of_exactness_fails_where_an_error_has_no_order():
+    """It vanishes and changes its sign, so that no power of the time step can be fitted."""
+    parts = [np.array([[value]]) for value in (1e-2, 1e-5, -1e-6)]
+    series = [SeriesPoint(dt, 100, Average(part, 0.0 * part, 0.0 * part), None, 0.0) for dt, part in zip(STEPS, parts, strict=True)]
+    found = study_convergence(ds.load("spin-principal"), Claim("made", math.inf, np.float64), ds.METRICS["energy_error"], series)
+    assert found.order.verdict == "failed"
+    assert math.isnan(found.order.tolerance)
 
 
 def test_exact_engine_has_rounding_errors_only():

@@ -41,7 +41,7 @@ def _row(scene: str, engine: str, axis: Axis, point: ScanPoint) -> dict[str, Any
 
 def nominal(found: RobustnessStudy) -> str:
     """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
-    return f"{found.scene.name} at dt = {_step(found.dt)}; an error up to {found.within:g} counts as sound."
+    return f"{found.scene.name} at dt = {_step(found.dt)}; an error up to {found.within:g} (a ratio, or an angle in rad) counts as sound."
 
 
 def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:

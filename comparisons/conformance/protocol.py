@@ -65,7 +65,7 @@ def check_builds(engine: Engine, check: str) -> CheckResult:
             raise CheckFailed(f"{wrong} (in the scene {scene.name})") from None
         except Diverged:
             raise
-        except Exception as error:
+        except Exception as error:  # an adapter is somebody else's code
             raise CheckFailed(
                 f"{described(error, engine)}, in the scene {scene.name}; decline scenes that the engine cannot run, with a reason"
             ) from error

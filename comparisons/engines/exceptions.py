@@ -9,7 +9,7 @@ def described(error: BaseException) -> str:
     """The type and the text of an exception in one line that any stream and file can take."""
     try:
         text = " ".join(str(error).split())
-    except Exception as another:
+    except Exception as another:  # an adapter's exception may raise in its own __str__
         text = f"its text cannot be made, {type(another).__name__}"
     if isinstance(error, MemoryError):
         text = " ".join(filter(None, [text, "(the engine's process may not use more memory)"]))

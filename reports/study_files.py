@@ -23,6 +23,7 @@ def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
     if steps := limits.step_rows(found):
         section.add_heading("The largest steps")
         section.add_table(steps)
+        section.add_text(limits.ACCURATE_AND_STABLE)
     for one in found:
         section.add_heading(one.scene.name)
         section.add_text(limits.nominal(one))

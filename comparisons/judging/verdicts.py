@@ -23,7 +23,7 @@ WORDS = {"known": "known fault", "timed_out": "timed out", "no_truth": "no exact
 MARKS = {
     "passed": "✓",
     "failed": "✗",
-    "known": "≠",
+    "known": "†",
     "measured": "·",
     "limited": "!",
     "diverged": "∞",

@@ -83,4 +83,5 @@ def limits_command(
         print_sentences(view.sentences(one))
     if rows := view.step_rows(found):
         print_rows(rows, json_output=False)
+        print_sentences([view.ACCURATE_AND_STABLE])
     echo(f"Written: {os.path.join(output, 'limits.md')}")

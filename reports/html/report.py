@@ -8,6 +8,7 @@ import pandas as pd
 from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import MARKS
 from comparisons.measuring.metrics import METRICS
+from comparisons.measuring.tolerances import scale
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.provenance import first_settings
 from comparisons.results.results import NEGLIGIBLE, Results
@@ -15,6 +16,7 @@ from reports.pages import page
 from reports.plots.chart import Chart
 from reports.plots.chart_data import chart_data
 from reports.plots.colours import engine_colours
+from reports.plots.convergence import INTERVAL_WIDTH, PREDICTED
 from reports.plots.figures import CHARTS, report_charts
 from reports.plots.spins import wobbles_freely
 from reports.replay import as_data, replay_of
@@ -22,6 +24,7 @@ from reports.sections import Section
 from reports.views import numbers
 from reports.views.error_budget import error_budgets
 from reports.views.leading_errors import leading_errors, step_costs
+from reports.views.matrix import legend_of_marks
 from reports.views.run import Overview
 from reports.views.scene import left_out, modelled
 from scenarios import truth_for
@@ -52,6 +55,7 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
         "leading": leading_errors(results),
         "steps": numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
         "costs": step_costs(results),
+        "legend": legend_of_marks(summary.statuses),
         "plotted": len(charts),
         "scenes": [_scene(results, number, name, charts.get(name, {}), name in failing) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
@@ -69,6 +73,7 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
     studies = frame[frame["kind"].isin(STUDIES)]
     motions = replay_of(results, name)
     budgets = error_budgets(results, name)
+    convergence = [line for chart in charts.get("convergence", ()) for line in chart.lines]
     return {
         "id": f"scene-{number:02d}",
         "name": name,
@@ -89,6 +94,9 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
         "agreement": _agreement(agreements, min(dts)),
         "ensemble": _ensemble(pd.concat([frame, agreements]), min(dts)),
         "wobbles": wobbles_freely(scene),
+        "scales": [f"{scale(scene, unit):.3g} {unit}" for unit in dict.fromkeys(own["unit"]) if unit not in ("1", "rad")],
+        "has_intervals": any(line.width == INTERVAL_WIDTH for line in convergence),
+        "has_predictions": any(line.label == PREDICTED for line in convergence),
         "charts": {kind: [chart_data(chart) for chart in charts.get(kind, ())] for kind in CHARTS},
     }
 

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 FINER = 0.25
 """Smallest time step of the fitted lines, at which the asymptotic errors are drawn, relative to the finest time step."""
+PREDICTED = "predicted"
+"""Label of predicted errors."""
+INTERVAL_WIDTH = 4.0
+"""Line width of the bars that are intervals of asymptotic errors."""
 
 
 def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
@@ -40,13 +44,13 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
         lines.append(Line(engine, dts, np.abs(errors), colour, marker=marker))
         predicted = predictions[(predictions["engine"] == engine) & (predictions["value"] != 0.0)]
         if len(predicted):
-            lines.append(Line("predicted", predicted["dt"].to_numpy(), predicted["value"].abs().to_numpy(), width=0.0, marker="x"))
+            lines.append(Line(PREDICTED, predicted["dt"].to_numpy(), predicted["value"].abs().to_numpy(), width=0.0, marker="x"))
         order, asymptotic = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))
         m = 0.0
         if len(asymptotic) and asymptotic["cause"].iloc[0] in ("model", "setting"):
             m = float(asymptotic["value"].iloc[0])
             ends = sorted(abs(float(asymptotic[side].iloc[0])) for side in ("lower", "upper"))
-            lines.append(Line(engine, np.full(2, FINER * dts.min()), np.array(ends), colour, width=4.0))
+            lines.append(Line(engine, np.full(2, FINER * dts.min()), np.array(ends), colour, width=INTERVAL_WIDTH))
         if len(asymptotic) and (len(order) or m != 0.0):
             # An error that hardly depends on dt has no order; the line to its asymptotic error then has order 1.
             lines.append(_fit(engine, dts, errors, float(order["value"].iloc[0]) if len(order) else 1.0, m, colour))

@@ -20,6 +20,11 @@
     form.elements.shown.textContent = found.size === total && total > 1 ? `all ${total} scenes` : `${found.size} of ${total} scene${total > 1 ? "s" : ""}`;
   };
 
+  // On a narrow screen the filters stay closed until they are needed, so that the results are on the first screen.
+  const wide = matchMedia("(min-width: 40rem)"), details = form.querySelector("details");
+  const unfold = () => { details.open = wide.matches; };
+  wide.addEventListener("change", unfold);
+  unfold();
   form.hidden = false;
   form.addEventListener("input", apply);
   form.addEventListener("submit", (event) => event.preventDefault());

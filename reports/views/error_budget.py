@@ -10,6 +10,8 @@ from comparisons.results.results import NEGLIGIBLE, Results
 from reports.views.numbers import formatted
 
 OF = ["metric", "engine"]
+EXPLAINED = {"known": "Expected", "limited": "Outside the documented range"}
+"""How the reason of an expected model error begins, by verdict."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def error_budgets(results: Results, scene_name: str) -> list[BudgetRow]:
     """The error budgets of a scene, by metric, for engines that ran at enough time steps; negligible errors are left out."""
     table = results.table[results.table["scene"] == scene_name]
     errors = table[table["kind"].isin(["truth", "invariant"]) & ~table["metric"].isin(ARTEFACTS)]
-    columns = [*OF, "value", "lower", "upper", "cause", "reason"]
+    columns = [*OF, "value", "lower", "upper", "cause", "verdict", "reason"]
     limits, orders = (table[table["kind"] == kind][columns] for kind in ("asymptotic_error", "order"))
     worth = (errors["dt"] == errors["dt"].min()) & (errors["value"].abs() > NEGLIGIBLE) & errors["engine"].isin(limits["engine"])
     both = errors[worth].merge(limits, on=OF, how="left", suffixes=("", "_of_limit"))
@@ -78,9 +80,10 @@ def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:
         return f"Set by {cause}, which is the engine's own: it {row['reason_of_limit']}."
     kind = "setting error, which the calibrated profile does not have" if cause == "setting" else "model error, which no time step removes"
     rest = value - limit
+    because = f" {EXPLAINED[row['verdict_of_limit']]}: {row['reason_of_limit']}." if row["verdict_of_limit"] in EXPLAINED else ""
     if abs(rest) <= 0.5 * (float(row["upper_of_limit"]) - float(row["lower_of_limit"])):
-        return f"A {kind}."
-    return f"{formatted(limit)} is a {kind}; the remaining {formatted(rest)} is discretisation error."
+        return f"A {kind}.{because}"
+    return f"{formatted(limit)} is a {kind}; the remaining {formatted(rest)} is discretisation error.{because}"
 
 
 def _why_undecided(row: Mapping[Hashable, Any]) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from comparisons.engines.base import calibrated_label
-from comparisons.judging.convergence import JUMPING, STUDIES
+from comparisons.judging.convergence import JUMPING, SATURATION, STUDIES
 from comparisons.judging.error_budget import is_sufficient
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN
 from comparisons.measuring.tolerances import negligible
@@ -207,7 +207,7 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
             names = [quantity(metric) for metric in opened["metric"].unique()]
             more = [f"{len(names) - MOST_METRICS} more"] if len(names) > MOST_METRICS else []
             undecided.append(f"{engine} {', '.join(names[:MOST_METRICS] + more)} ({_named(list(opened['scene'].unique()))})")
-    return [*sentences, *([f"Undecided metrics: {'; '.join(undecided)}."] if undecided else [])]
+    return [*sentences, *([f"Undecided limits as dt → 0: {'; '.join(undecided)}."] if undecided else [])]
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
@@ -223,7 +223,11 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     kinds = Counter("setting error" if statuses[scene].verdict in CONVERGING else statuses[scene].words for scene in wrong)
     kinds[UNDECIDED] = sum(statuses[scene].words == UNDECIDED for scene in studied if scene not in wrong)
     counted = [f"{kind} in {count}" for kind, count in kinds.items() if count]
-    converges = "; ".join([f"converges in {len(studied) - kinds.total()} of {_scenes(len(studied))}", *filter(None, [", ".join(counted)])])
+    declined = sum(status.verdict == "declined" for status in statuses.values())
+    declines = f", declines {declined}" if declined else ""
+    converges = "; ".join(
+        [f"converges in {len(studied) - kinds.total()} of {_scenes(len(studied))}{declines}", *filter(None, [", ".join(counted)])]
+    )
     if not wrong:
         return converges
     shown = mine[
@@ -233,7 +237,8 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(shown["scene"], shown["unit"], strict=True)]
     largest = (shown["value"].abs() / scales).sort_values(ascending=False, kind="stable").index[:1]
     worst = [
-        f"largest such error: {quantity(row['metric'])} {size(row['value'], row['unit'])} in {row['scene']}"
+        f"largest of these errors: {quantity(row['metric'])} {size(row['value'], row['unit'])} in {row['scene']}"
+        f"{'; π is the maximum' if row['unit'] == 'rad' and abs(row['value']) > SATURATION else ''}"
         for row in shown.loc[largest].to_dict("records")
     ]
     return f"{converges}{''.join(f' ({one})' for one in worst)}"
@@ -258,9 +263,9 @@ def _cost(results: Results, engine: str, costs: Mapping[str, float]) -> list[str
     fastest = min(timed, key=timed.__getitem__)
     if engine != fastest:
         ratio = f"{timed[engine]:.2g}"
-        return [f"a time step takes {'' if ratio == '1' else f'{float(ratio):g} times '}as long as the fastest engine's"]
+        return [f"{'about' if ratio == '1' else f'{float(ratio):g} times'} the fastest engine's time per step"]
     seconds = results.table.loc[results.table["engine"] == engine, "time_per_step"].median()
-    return [f"a time step takes {duration(float(seconds))}{', the shortest' if len(timed) > 1 else ''}"]
+    return [f"{duration(float(f'{seconds:.2g}'))} per time step{', the fastest' if len(timed) > 1 else ''}"]
 
 
 def _scenes(count: int) -> str:

@@ -11,6 +11,7 @@ from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.scan import AxisScan, ScanPoint
 from comparisons.robustness.study import RobustnessStudy
 
+ACCURATE_AND_STABLE = "Accurate: sound at every smaller tested time step. Stable: there, errors beyond the tolerance are the only failures."
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
 
 
@@ -41,7 +42,10 @@ def _row(scene: str, engine: str, axis: Axis, point: ScanPoint) -> dict[str, Any
 
 def nominal(found: RobustnessStudy) -> str:
     """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
-    return f"{found.scene.name} at dt = {_step(found.dt)}; an error up to {found.within:g} (a ratio, or an angle in rad) counts as sound."
+    return (
+        f"{found.scene.name} at dt = {_step(found.dt)}. "
+        f"Sound: the engine does not fail, and its errors are at most {found.within:g} (ratios, and angles in rad)."
+    )
 
 
 def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:

@@ -48,13 +48,18 @@ def matrix(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> Ma
         cells = [(status.mark, sizes.get(engine, "")) for engine, status in found.items()]
         rows.append(MatrixRow(scene, of, cells, any(status.verdict in FAILURES | BREAKDOWNS for status in found.values())))
     steps = sorted({in_ms(one.dt) for one in leading.values()})
-    shown = [status for scene in scenes for status in statuses[scene].values()]
+    legend = legend_of_marks({scene: statuses[scene] for scene in scenes})
+    return Matrix(rows, f"error at {' or '.join(steps)}" if steps else "", legend, left_out)
+
+
+def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
+    """The meaning of each mark, least severe first."""
+    shown = [status for by_engine in statuses.values() for status in by_engine.values()]
     marks = sorted({(SEVERITY.index(status.verdict), status.mark, status.words) for status in shown}, reverse=True)
     words: dict[str, dict[str, None]] = {}
     for _, mark, status in marks:
         words.setdefault(mark, {})[status] = None
-    legend = ", ".join(f"{mark} {' or '.join(meanings)}" for mark, meanings in words.items())
-    return Matrix(rows, f"error at {' or '.join(steps)}" if steps else "", legend, left_out)
+    return ", ".join(f"{mark} {' or '.join(meanings)}" for mark, meanings in words.items())
 
 
 def _shown(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:

@@ -10,8 +10,10 @@ def formatted(value: float) -> str:
     """Three significant digits, with an exponent below 0.01 and from 1000 on; an exact zero is 0, an undefined value is –."""
     if math.isnan(value):
         return "–"
-    rounded = f"{value:.3g}"
-    return rounded if rounded == "0" or ("e" not in rounded and abs(float(rounded)) >= 0.01) else f"{value:.2e}"
+    if value == 0.0:
+        return "0"
+    rounded = f"{value:#.3g}".removesuffix(".")
+    return rounded if "e" not in rounded and abs(float(rounded)) >= 0.01 else f"{value:.2e}"
 
 
 def bound(lower: float, upper: float) -> str:

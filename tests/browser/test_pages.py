@@ -236,6 +236,29 @@ def test_filters_hide_scenes_and_engines_and_count_the_rest(opened, results):
     assert tab.locator("[data-engine='1']:visible").count() > 0
 
 
+def test_filters_are_closed_on_a_narrow_screen_until_they_are_opened(opened):
+    tab = opened("report.html", viewport={"width": 400, "height": 900}).tab
+    assert tab.get_by_role("searchbox").count() == 0
+    tab.locator("#filters summary").click()
+    assert tab.get_by_role("searchbox").is_visible()
+    tab.set_viewport_size({"width": 1600, "height": 900})
+    assert tab.get_by_role("searchbox").is_visible()
+    assert not tab.locator("#filters summary").is_visible()
+
+
+def test_table_that_continues_has_a_shadow_at_its_right_edge_until_it_is_scrolled_to_its_end(opened):
+    """At 400 px the matrix of three engines fits; the errors of an opened scene do not."""
+    tab = opened("report.html", viewport={"width": 400, "height": 900}).tab
+    tab.locator("#scenes > details").first.evaluate("one => { one.open = true; }")
+    table, fitting = tab.get_by_role("region", name="Errors of").first, tab.get_by_role("region", name="Errors and status")
+    shadow = "one => getComputedStyle(one).boxShadow"
+    tab.wait_for_function("one => one.classList.contains('continues')", arg=table.element_handle())
+    assert table.evaluate(shadow) != "none" == fitting.evaluate(shadow)
+    table.evaluate("one => { one.scrollLeft = one.scrollWidth; }")
+    tab.wait_for_function("one => !one.classList.contains('continues')", arg=table.element_handle())
+    assert table.evaluate(shadow) == "none"
+
+
 def test_texts_of_a_study_are_texts_and_pages_load_nothing(opened):
     """A label with markup stays text; the page's policy forbids every source but itself."""
     page = opened("report.html", bypass_csp=False)

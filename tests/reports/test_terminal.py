@@ -68,7 +68,7 @@ def test_cells_have_status_and_leading_error(core, capsys):
     of = errors[errors["scene"] == "spin-asymmetric"].set_index("engine")["value"]
     assert lines["spin-asymmetric"].split()[1:] == [
         *("orientation", "[rad]"),
-        *(part for engine, mark in zip(core.engines, "≠✓✓", strict=True) for part in (mark, f"{of[engine]:.3g}")),
+        *(part for engine, mark in zip(core.engines, "†✓✓", strict=True) for part in (mark, f"{of[engine]:#.3g}")),
     ]
     assert lines["slide-box"].split()[3] == "–"
 
@@ -106,15 +106,18 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     assert [len(some) for some in of.values()] == [1, 1, 1]
     known = core.table[(core.table["verdict"] == "known") & (core.table["unit"] == "rad")]
     row = known.loc[known["value"].abs().idxmax()]
-    assert f"(largest such error: {row['metric'].split('_')[0]} {row['value']:.3g} rad in {row['scene']})" in of["document"][0]
+    largest = f"(largest of these errors: {row['metric'].split('_')[0]} {row['value']:.3g} rad in {row['scene']}; π is the maximum)"
+    assert largest in of["document"][0]
     for engine in core.engines:
         words = [by_engine[engine].words for by_engine in core.statuses().values()]
         studied = len(words) - words.count("declined")
-        assert f"converges in {words.count('converges')} of {studied} scenes" in of[engine][0]
+        declined = words.count("declined")
+        counts = f"converges in {words.count('converges')} of {studied} scenes" + (f", declines {declined}" if declined else "")
+        assert re.search(rf": {counts}[;.]", of[engine][0])
         for status in set(words) - {"converges", "declined"}:
             assert f"{status} in {words.count(status)}" in of[engine][0]
-    assert of["document"][0].endswith(" ns, the shortest.")
-    assert all(of[engine][0].endswith(" times as long as the fastest engine's.") for engine in ("mujoco", "pybullet"))
+    assert of["document"][0].endswith(" ns per time step, the fastest.")
+    assert all(of[engine][0].endswith(" times the fastest engine's time per step.") for engine in ("mujoco", "pybullet"))
 
 
 def test_piped_list_has_one_line_for_each_scene(tmp_path):

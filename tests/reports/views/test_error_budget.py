@@ -17,7 +17,7 @@ class Made:
     table: pd.DataFrame
 
 
-def made(value, unit="1", asymptotic=None, order=None):
+def made(value, unit="1", asymptotic=None, order=None, judged="measured"):
     """A run with this error; `asymptotic` is its asymptotic error, the interval's ends and the cause."""
     metric = "orientation_error" if unit == "rad" else "energy_error"
 
@@ -29,7 +29,7 @@ def made(value, unit="1", asymptotic=None, order=None):
     if asymptotic is not None:
         error, lower, upper, cause = asymptotic
         reason = "the time steps leave it open"
-        rows.append(row(kind="asymptotic_error", value=error, lower=lower, upper=upper, cause=cause, reason=reason))
+        rows.append(row(kind="asymptotic_error", value=error, lower=lower, upper=upper, cause=cause, reason=reason, verdict=judged))
     if order is not None:
         rows.append(row(kind="order", value=order))
     return Made(as_table(rows))
@@ -50,17 +50,26 @@ def budget(results):
         (made(8e-3, asymptotic=(1e-5, -1e-4, 1e-4, "discretisation")), "Discretisation error."),
         (
             made(8e-3, asymptotic=(1e-5, -1e-4, 2e-2, "discretisation"), order=4.0),
-            "Discretisation error down to 0.02; the time steps do not resolve smaller ones.",
+            "Discretisation error down to 0.0200; the time steps do not resolve smaller ones.",
         ),
         (
             made(4e-2, asymptotic=(3e-2, 2.9e-2, 3.1e-2, "model"), order=1.0),
-            "0.03 is a model error, which no time step removes; the remaining 0.01 is discretisation error.",
+            "0.0300 is a model error, which no time step removes; the remaining 0.0100 is discretisation error.",
         ),
         (
             made(0.8, asymptotic=(0.9, 0.89, 0.91, "setting")),
-            "0.9 is a setting error, which the calibrated profile does not have; the remaining -0.1 is discretisation error.",
+            "0.900 is a setting error, which the calibrated profile does not have; the remaining -0.100 is discretisation error.",
         ),
         (made(4e-2, asymptotic=(4.05e-2, 3.9e-2, 4.2e-2, "model")), "A model error, which no time step removes."),
+        (
+            made(4e-2, asymptotic=(4.05e-2, 3.9e-2, 4.2e-2, "model"), judged="known"),
+            "A model error, which no time step removes. Expected: the time steps leave it open.",
+        ),
+        (
+            made(4e-2, asymptotic=(3e-2, 2.9e-2, 3.1e-2, "model"), judged="limited"),
+            "0.0300 is a model error, which no time step removes; the remaining 0.0100 is discretisation error. "
+            "Outside the documented range: the time steps leave it open.",
+        ),
         (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "rounding")), "Within rounding."),
         (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "unresolved")), "Undecided: the time steps leave it open."),
         (made(4e-2), "Undecided: too few usable time steps."),

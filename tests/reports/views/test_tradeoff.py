@@ -75,7 +75,7 @@ def test_every_engine_has_a_row_with_its_place(found):
     """The Pareto front, the most accurate step of each dominated engine, and those left out."""
     rows = tradeoff.pareto_front_rows(found)
     assert [(row["engine"], row["step [ms]"], row["error [rad]"], row["on the Pareto front"]) for row in rows] == [
-        ("accurate", "33", "0.01", "yes"),
+        ("accurate", "33", "0.0100", "yes"),
         ("accurate", "10", "4.00e-03", "yes"),
         ("mujoco[integrator=implicitfast]", "10", "5.20e-03", "dominated by accurate"),
         ("document[rotation=implicit-gyroscopic]", "5", "7.00e-03", "dominated by accurate"),

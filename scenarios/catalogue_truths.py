@@ -10,6 +10,7 @@ _SCENES = {
         "bounce-95",
         "bounce-99",
         "bounce-9999",
+        "bounce-elastic",
         "drop-ball",
         "drop-ball-brisk",
         "drop-ball-dull",

@@ -28,7 +28,7 @@ class EngineMissing(DropspinError):
 
 
 class EngineBroken(DropspinError):
-    """An engine that is there and cannot be imported or constructed; the text says why, and the cure where one is known."""
+    """An installed engine that cannot be imported or constructed; the text says why, and how to repair it where that is known."""
 
 
 class Diverged(Exception):

@@ -90,5 +90,5 @@ class StoredChart(StoredData):
                 raise ValueError(f"the line {line.label!r} has values of other lengths than its positions")
         named = [line for line in self.lines if self.reference and line.label == self.reference]
         if self.reference and not (named and named[0].y is not None):
-            raise ValueError(f"has no line of its reference {self.reference!r}")
+            raise ValueError(f"has no line with the label of its reference, {self.reference!r}")
         return self

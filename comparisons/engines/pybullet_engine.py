@@ -46,7 +46,7 @@ class PyBullet(Engine):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.is_default and {"coordinates", "velocity_clamp"} & self.options.keys():
-            raise DropspinError(f"engine {self.label!r}: profile=default already is a multibody that clamps its speeds; leave out coordinates and velocity_clamp.")
+            raise DropspinError(f"engine {self.label!r}: profile=default sets coordinates and velocity_clamp; leave these out.")
         if self.option("velocity_clamp") == "kept" and not self.is_multibody:
             raise DropspinError(f"engine {self.label!r}: only multibodies clamp speeds; add coordinates=multibody.")
 

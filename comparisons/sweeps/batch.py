@@ -103,7 +103,7 @@ class _Parameters:
 
 
 def _selected(given: Any, indices: Indices) -> Any:
-    """Some rows of every array that has one for each job."""
+    """A selection of rows of every array that has one row for each job."""
     if isinstance(given, np.ndarray):
         return given if len(given) == 1 else given[indices]
     if isinstance(given, Setup):

@@ -109,7 +109,7 @@ def test_profiles_and_coordinates():
     assert calibrated_label("mujoco[integrator=implicitfast,profile=default]") == "mujoco[integrator=implicitfast]"
     assert calibrated_label("mujoco") is calibrated_label("mujoco[kappa=0.002]") is None
     assert engine("pybullet[profile=calibrated]").label == "pybullet"
-    with pytest.raises(DropspinError, match="profile=default is a multibody that clamps its speeds"):
+    with pytest.raises(DropspinError, match="profile=default sets coordinates and velocity_clamp"):
         engine("pybullet[coordinates=multibody,profile=default]")
     with pytest.raises(DropspinError, match="only multibodies clamp speeds"):
         engine("pybullet[velocity_clamp=kept]")

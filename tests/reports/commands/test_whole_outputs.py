@@ -24,7 +24,7 @@ FULL = [
     (("replay", "run", "--no-open"), 20_000, "run/replay.html: cannot be written: File too large; choose another file."),
     (("replay", "run", "few", "--gif", "old.gif"), 5_000, "old.gif: cannot be written: File too large; choose another file."),
     (("accept", "run", "--reason", "x", "--baseline", "old.toml"), 200, "old.toml: cannot be written: File too large"),
-    (("tradeoff", "ball.toml", "-e", "document", "--budget", "0.01", "-o", "study"), 10_000, "study: cannot be written: File too large"),
+    (("tradeoff", "ball.toml", "-e", "document", "--budget", "0.01", "-o", "study"), 500, "study: cannot be written: File too large"),
     (("limits", "ball.toml", "-e", "document", "--axis", "mass", "--dt", "0.01", "-o", "study"), 500, "study: cannot be written: File"),
     (("check", "run", "--junit", "old.xml"), 1_000, "old.xml: cannot be written: File too large; choose another file."),
 ]

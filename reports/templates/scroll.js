@@ -1,5 +1,7 @@
 // A box that scrolls is a tab stop, so that the keyboard can scroll it; a box that does not scroll is none.
 "use strict";
+// Printed cells keep their colour. The W3C checker does not know this property, so the style sheet cannot set it.
+document.documentElement.style.printColorAdjust = "exact";
 // A shadow at its right edge shows that a box continues there.
 const markWhereItContinues = (box) => box.classList.toggle("continues", box.scrollLeft + box.clientWidth < box.scrollWidth - 1);
 const stopWhereItScrolls = new ResizeObserver((entries) => {

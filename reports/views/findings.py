@@ -164,9 +164,9 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
 
 
 def _known(tally: Counts) -> str:
-    """The end of a sentence: how many values show known faults or are within limitations, how many expected faults do not occur."""
+    """The end of a sentence: how many values show known errors or are within limitations, how many expected faults do not occur."""
     scenes = _scenes(tally.known_scenes)
-    shows = f"show{'s' * (tally.known == 1)} known faults"
+    shows = f"show{'s' * (tally.known == 1)} {'a known error' if tally.known == 1 else 'known errors'}"
     known = f"; {tally.known} {'value' if tally.known == 1 else 'values'} in {scenes} {shows}"
     known = known if tally.known else ""
     limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} outside the documented range" if tally.limited else ""

@@ -17,6 +17,7 @@ class Leading:
         metric: The leading metric of the scene.
         unit: Unit of the errors.
         dt: Time step [s].
+        scale: The scale of the errors, in their unit.
         sizes: The size of the error, by engine; NaN where it is undefined.
         levels: The decade of the error relative to its scale, by engine, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1); None if
             undefined.
@@ -27,6 +28,7 @@ class Leading:
     metric: str
     unit: str
     dt: float
+    scale: float
     sizes: dict[str, float]
     levels: dict[str, int | None]
     least: list[str]
@@ -44,8 +46,10 @@ def leading_errors(results: Results) -> dict[str, Leading]:
         sizes = {engine: float(values.get(engine, math.nan)) for engine in results.engines}
         rounded = set(finest.index[finest["cause"] == "rounding"])
         least = [engine for engine, size in sizes.items() if (engine in rounded if rounded else size <= 1.01 * values.min())]
-        levels = {engine: _level(size / scale(scene, METRICS[metric].unit)) for engine, size in sizes.items()}
-        found[name] = Leading(name, metric, METRICS[metric].unit, dt, sizes, levels, least)
+        unit = METRICS[metric].unit
+        of = scale(scene, unit)
+        levels = {engine: _level(size / of) for engine, size in sizes.items()}
+        found[name] = Leading(name, metric, unit, dt, of, sizes, levels, least)
     return found
 
 

@@ -297,13 +297,14 @@ def test_report_without_javascript_shows_all_but_filters_plots_and_replays(opene
 
 
 def test_print_is_the_summary_and_the_failures_on_few_pages(opened):
-    """Closed scenes are left out; the page has at most 15 pages, and nothing in it is wider than A4 landscape."""
+    """Closed scenes are left out, cells keep their colour, at most 15 pages, and nothing is wider than A4 landscape."""
     tab = opened("report.html", viewport={"width": 1047, "height": 718}).tab
     tab.emulate_media(media="print")
     assert tab.locator("#scenes > details:visible").evaluate_all("all => all.map(one => one.dataset.scene)") == ["drop-<b>failing</b>"]
     too_wide = "all => all.filter(one => one.checkVisibility() && one.scrollWidth > one.clientWidth).map(one => one.ariaLabel)"
     assert tab.locator(".scroll").evaluate_all(too_wide) == []
     assert tab.evaluate("document.documentElement.scrollWidth") <= 1047
+    assert tab.locator("#matrix td.l8").first.evaluate("one => getComputedStyle(one).printColorAdjust") == "exact"
     assert 2 <= len(re.findall(rb"/Type\s*/Page\b", tab.pdf(prefer_css_page_size=True))) <= 15
 
 

@@ -38,7 +38,7 @@ def test_known_faults_are_counted_apart_and_in_the_headline(core):
     summary = overview(core)
     assert summary.counts.known == len(known) > 100
     assert summary.counts.passed == (core.table["verdict"] == "passed").sum()
-    assert f"{len(known)} values in {known['scene'].nunique()} scenes show known faults" in summary.verdict
+    assert f"{len(known)} values in {known['scene'].nunique()} scenes show known errors" in summary.verdict
     [sentence] = [one for one in summary.findings if one.startswith("document (Wang's method): ")]
     faults = sum(by_engine["document"].words == "known fault" for by_engine in summary.statuses.values())
     assert faults > 0

@@ -134,7 +134,7 @@ def checked(name: str, values: ArrayLike, shape: tuple[int, ...], allowed: str, 
 
 
 def _numbers(name: str, values: ArrayLike, allowed: str) -> Array:
-    """A copy of the argument, so that later changes of the caller's array have no effect."""
+    """A copy of the argument, so that later changes to the caller's array have no effect."""
     try:
         given = np.asarray(values)
     except ValueError:  # rows of different length

@@ -27,7 +27,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted", "quantity")}
+    environment.filters |= {name: getattr(numbers, name) for name in ("in_ms", "unit", "word", "formatted", "quantity", "duration")}
     environment.filters |= {"cell": _markdown_cell, "code": _markdown_code, "sha256": _base64_sha256}
     environment.globals |= {"bound": numbers.bound, "subject": numbers.subject, "marks": MARKS}
     return environment

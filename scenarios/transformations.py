@@ -31,7 +31,7 @@ def changed(scene: Scenario, duration: float | None = None, **tables: Mapping[st
 
 
 def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Scenario:
-    """The scene with its numbers in other units, of which so many are a metre, a second and a kilogram."""
+    """The scene in other units; the arguments are a metre, a second and a kilogram in these units."""
     start, speed = scene.start, length / time
     tables: dict[str, Mapping[str, Any]] = {
         "body": body_times(scene, length, mass),

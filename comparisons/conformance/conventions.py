@@ -26,10 +26,10 @@ def _convention(part: slice, messages: Messages, wrong: Change, right: Change) -
     """Three faults of one convention: in what is read, in what is set, and in both.
 
     Args:
-        part: The part of a state.
-        messages: Of each fault.
-        wrong: From the right part to the wrong one.
-        right: The inverse.
+        part: The part of a state that has the convention.
+        messages: The message of each fault.
+        wrong: Function from the part in the correct convention to the part in the faulty one.
+        right: The inverse function.
     """
     return _read_set_both(part, messages, changed_part(part, wrong), changed_part(part, right))
 

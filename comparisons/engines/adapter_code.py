@@ -78,7 +78,7 @@ def _imported(file: Path, package: str) -> Iterator[str]:
 
 
 def _file(name: str) -> Path | None:
-    """The file of a module; None for one that is installed, built in, dropspin's own, or not there."""
+    """The source file of a module; None if the module is installed, built into Python, a part of dropspin, or not found."""
     top = name.partition(".")[0]
     if name != top and _file(top) is None:
         return None  # asking for a submodule imports its package

@@ -125,7 +125,7 @@ class MuJoCo(Engine):
         if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
             return "RK4 has no restitution in one step: the contact's damper acts in all stages; use integrator=euler, or spring_steps=20"
         if floor.restitution < LEAST_OF_A_SPRING and "spring_steps" in self.options:
-            return f"a spring that only pushes has no restitution below {LEAST_OF_A_SPRING:g}; leave out spring_steps"
+            return f"a contact spring cannot pull, so its restitution is at least {LEAST_OF_A_SPRING:g}; leave out spring_steps"
         if floor.rest_speed > 0.0:
             return "MuJoCo has no speed below which restitution is 0 (floor.rest_speed)"
         return None

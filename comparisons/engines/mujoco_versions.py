@@ -72,6 +72,7 @@ def refusal_of_boxes(version: Version) -> str | None:
     if version >= EXACT_DIAGONAL:
         return None
     return (
-        f"MuJoCo {formatted(version)} is installed, in which a box's restitution is wrong by about 1e-4 at any step; the flag diagexact, "
-        f"which corrects this, exists from {formatted(EXACT_DIAGONAL)} on: update mujoco, or use profile=default"
+        f"MuJoCo {formatted(version)} is installed, which gives boxes a coefficient of restitution that is wrong by about 1e-4 at every "
+        f"time step; versions from {formatted(EXACT_DIAGONAL)} on have the flag diagexact, which corrects this: update mujoco, or use "
+        "profile=default"
     )

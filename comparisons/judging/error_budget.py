@@ -234,4 +234,6 @@ def _reason(cause: Cause, e: Array, small: Array, order: float) -> str:
         return "within the sampling noise at every time step; more start phases would reduce the noise"
     if (np.diff(np.abs(e)) > small[1:]).all():
         return "grows as dt decreases; finer time steps are needed"
+    if np.abs(e[-1]) <= small[-1]:
+        return "within rounding at the finest time step, but not at coarser ones; finer time steps are needed"
     return "the time steps do not decide whether it vanishes as dt → 0; finer ones are needed"

@@ -24,7 +24,7 @@ _SUFFIX = 8
 
 @contextmanager
 def unfinished_folder(place: Path, name: str = "") -> Iterator[Path]:
-    """An empty folder for output that is not complete; it is removed on leaving.
+    """An empty folder for output that is not complete; it is removed at the end of the block.
 
     Args:
         place: The folder in which it is created, on the file system of the output.

@@ -5,11 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
-from comparisons.judging.convergence import JUMPING
+from comparisons.judging.convergence import ARTEFACTS, JUMPING
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, SEVERITY, WORDS
 from comparisons.measuring.metrics import leading_metric
+from comparisons.measuring.tolerances import scale
 from comparisons.results.ensembles import EnsembleOutcome
 from comparisons.results.measurement import empty_table
 from comparisons.results.provenance import digest
@@ -19,7 +21,9 @@ TrajectoryKey = tuple[str, str, float]
 NEGLIGIBLE = 1e-4
 """Errors below this (relative to the scene's scale, in m or in rad) are not mentioned in summaries and reports."""
 
-STATUS_WORDS = {**WORDS, "limited": "outside the documented range"}
+STATUS_WORDS = {**WORDS, "limited": "known limitation"}
+PARTS = ("angular_momentum_direction_error",)
+"""Metrics that another metric contains."""
 UNDECIDED = "partly undecided"
 """The status of an engine that passes in a scene, but of which the time steps leave errors undecided."""
 MOST_NAMES = 4
@@ -101,7 +105,11 @@ class Results:
         return {scene: {engine: _status(by_pair.get((scene, engine))) for engine in self.engines} for scene in self.scenes}
 
     def leading_errors(self, scene: str) -> pd.DataFrame:
-        """The rows of a scene's leading metric, such as the bounce height, at the finest time step.
+        """The errors of all engines in one metric of a scene, at the finest time step.
+
+        The metric is the one with the largest error, relative to its scale, that is a known fault or limitation or that fails, so that
+        the errors show what the statuses are about. Where no engine has such an error, it is the leading metric of the scene, such as
+        the bounce height.
 
         Args:
             scene: Name of the scene.
@@ -114,10 +122,21 @@ class Results:
         """
         if scene not in self.scenes:
             raise UnknownName("scene", scene, self.scenes)
-        metric = "" if truth_for(self.scenes[scene]) is None else leading_metric(self.scenes[scene])
+        if truth_for(self.scenes[scene]) is None:
+            return self.measurements.iloc[:0].set_index("engine")
         found = self.measurements
-        mine = found[(found["scene"] == scene) & (found["metric"] == metric) & found["value"].notna()]
-        return mine[mine["dt"] == mine["dt"].min()].set_index("engine")
+        mine = found[(found["scene"] == scene) & found["value"].notna()]
+        finest = mine[mine["dt"] == mine["dt"].min()]
+        metric = self._metric_of_findings(finest) or leading_metric(self.scenes[scene])
+        return finest[finest["metric"] == metric].set_index("engine")
+
+    def _metric_of_findings(self, rows: pd.DataFrame) -> str:
+        """The metric of the largest error, relative to its scale, among those that set a status; empty if there is none."""
+        findings = rows[rows["verdict"].isin(["known", "limited", *FAILURES]) & (rows["value"].abs() > NEGLIGIBLE)]
+        findings = findings[~findings["metric"].isin([*JUMPING, *ARTEFACTS, *PARTS])]
+        if findings.empty:
+            return ""
+        return str(findings["metric"].iloc[int(np.argmax(relative_sizes(findings, self.scenes)))])
 
     def summary(self) -> str:
         """A line for each engine: how many checks passed and failed, how many runs broke down, and the scenes with model errors."""
@@ -154,6 +173,12 @@ class Results:
     def exit_code(self) -> int:
         """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""
         return 3 if self.breakdowns.any() else int(self.table["verdict"].isin(FAILURES).any())
+
+
+def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> list[float]:
+    """The absolute values of rows, relative to the scales of their scenes."""
+    columns = zip(rows["value"].abs(), rows["scene"], rows["unit"], strict=True)
+    return [value / scale(scenes[scene], unit) for value, scene, unit in columns]
 
 
 def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":

@@ -132,7 +132,7 @@ class Sweep:
         return [self._of_one_engine(numbers[low - first : high - first]) for low, high in pairwise(edges)]
 
     def _of_one_engine(self, numbers: Indices) -> Jobs:
-        """The jobs with some numbers, which all have the same scene and engine."""
+        """The jobs with these numbers, which must have the same scene and engine."""
         scene, engine, step, start, *grid, draw = np.unravel_index(numbers, self.shape)
         grid_indices = iter(grid)
         values = {axis.name: axis.at(draw if isinstance(axis, Drawn) else next(grid_indices)) for axis in self.axes}

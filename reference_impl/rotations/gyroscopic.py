@@ -6,7 +6,8 @@ Order: 1, as explicit Euler.
 Keeps: nothing. Gains energy at every step and diverges.
 Valid for: short times and |ω| dt below 0.02.
 Cost: `note` and one product with I and I⁻¹ each.
-Source: L. Euler (1758); the explicit term as in many engines, for instance MuJoCo's Euler and Bullet's multibody.
+Source: L. Euler (1758) for the equations; many engines take the term explicitly, for instance MuJoCo's integrator Euler and
+Bullet's btMultiBody.
 """
 
 from reference_impl.quaternion import to_body, to_world

@@ -23,7 +23,7 @@ from reports.replay import as_data, replay_of
 from reports.sections import Section
 from reports.views import numbers
 from reports.views.error_budget import error_budgets
-from reports.views.leading_errors import leading_errors, step_costs
+from reports.views.leading_errors import leading_errors, step_times
 from reports.views.matrix import legend_of_marks
 from reports.views.run import Overview
 from reports.views.scene import left_out, modelled
@@ -54,7 +54,7 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
         "negligible": NEGLIGIBLE,
         "leading": leading_errors(results),
         "steps": numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
-        "costs": step_costs(results),
+        "times": step_times(results),
         "legend": legend_of_marks(summary.statuses),
         "plotted": len(charts),
         "scenes": [_scene(results, number, name, charts.get(name, {}), name in failing) for number, name in enumerate(results.scenes)],

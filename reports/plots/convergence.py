@@ -1,5 +1,6 @@
 """Errors as functions of the time step."""
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,8 +26,9 @@ INTERVAL_WIDTH = 4.0
 def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
     """The absolute value of an error as a function of the time step, logarithmic.
 
-    A dotted line has order 1, dashed lines are the fits from which the order and the asymptotic error are taken, crosses are predicted
-    errors. Bars at the left end are the 95 % intervals of asymptotic errors that exclude 0.
+    Dotted lines have the orders of the errors that vanish, rounded to integers. Dashed lines are the fits from which the order and the
+    asymptotic error are taken, crosses are predicted errors. Bars at the left end are the 95 % intervals of asymptotic errors that exclude
+    0.
 
     Args:
         results: The run.
@@ -35,12 +37,12 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
     """
     frame, predictions = (rows[(rows["scene"] == scene_name) & (rows["metric"] == metric)] for rows in (results.table, results.predictions))
     values = frame[frame["kind"].isin(["truth", "invariant"])]
-    lines, largest = [], 0.0
+    lines: list[Line] = []
+    guides: dict[int, float] = {}  # by order: the largest error at the coarsest time step
     for engine, (colour, marker) in engine_styles(results.engines).items():
         mine = frame[frame["engine"] == engine]
         rows = values[(values["engine"] == engine) & values["value"].notna()].sort_values("dt")
         dts, errors = rows["dt"].to_numpy(), rows["value"].to_numpy()
-        largest = max(largest, np.abs(errors).max(initial=0.0))
         lines.append(Line(engine, dts, np.abs(errors), colour, marker=marker))
         predicted = predictions[(predictions["engine"] == engine) & (predictions["value"] != 0.0)]
         if len(predicted):
@@ -54,17 +56,21 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
         if len(asymptotic) and (len(order) or m != 0.0):
             # An error that hardly depends on dt has no order; the line to its asymptotic error then has order 1.
             lines.append(_fit(engine, dts, errors, float(order["value"].iloc[0]) if len(order) else 1.0, m, colour))
+        if len(order) and order["cause"].iloc[0] == "discretisation" and math.isfinite(order["value"].iloc[0]):
+            rounded = max(1, round(float(order["value"].iloc[0])))
+            guides[rounded] = max(guides.get(rounded, 0.0), abs(errors[-1]))
     dts = np.sort(values["dt"].unique())
-    if len(dts) > 1 and largest > 0.0:
+    for p, largest in sorted(guides.items()):
         # Above the data, so that it hides no line.
-        lines.append(Line("order 1", dts, 2.0 * largest * dts / dts[-1], width=1.0, dashes="dotted"))
+        lines.append(Line(f"order {p}", dts, 2.0 * largest * (dts / dts[-1]) ** p, width=1.0, dashes="dotted"))
+    ends = [FINER * dts.min()] if any(line.dashes == "dashed" for line in lines) else []
     return Chart(
         "time step [ms]",
         metric_label(metric),
         lines,
         x_log=True,
         y_log=True,
-        ticks=[(float(dt), f"{1e3 * dt:g}") for dt in dts],
+        ticks=[(float(dt), f"{1e3 * dt:g}") for dt in [*ends, *dts]],
         rounding=TRUTH_ACCURACY * scale(results.scenes[scene_name], METRICS[metric].unit),
     )
 

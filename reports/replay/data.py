@@ -28,6 +28,7 @@ def as_data(replay: Replay) -> dict[str, Any]:
     shape = outline(replay.scene.body)
     return {
         "scene": replay.scene.name,
+        "dt": replay.dt,
         "interval": replay.interval,
         "sight": replay.sight,
         "hasFloor": replay.scene.floor is not None,

@@ -4,6 +4,7 @@
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
   const [HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [230, 62, 12, 8, 40];
+  const [CHARACTER, BESIDE] = [6.2, 30];  // pixels: the width of a digit of a tick, and the room for the name of the axis
   const NEAR = 40;           // pixels within which a point has its values shown
   const SHORTEST_DRAG = 6;   // pixels; anything shorter is a click
   const DASHES = { dashed: "4 3", dotted: "1 3" };
@@ -46,7 +47,7 @@
     const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     const ticks = [];
     for (let n = Math.ceil(low / step - 1e-6); n * step <= high + 1e-6 * step; n += 1) {
-      const value = n * step, plain = Math.abs(value) < 1e5 && digits <= 5;
+      const value = n * step, plain = Math.abs(value) < 1e5 && digits <= 8;
       ticks.push([value, plain ? value.toFixed(digits).replace("-", "−") : shown(value)]);
     }
     return ticks;
@@ -164,8 +165,10 @@
         button.setAttribute("aria-pressed", String(!this.hidden.has(button.dataset.label)));
         button.hidden = this.engines.hidden.has(button.dataset.label);
       }
-      const left = raw.rows ? 0.36 * width : raw.map ? RIGHT : LEFT, height = raw.rows ? 60 + 26 * raw.rows.length : HEIGHT;
       let [[x0, x1], [y0, y1]] = this.ranges();
+      this.yTicks = raw.rows ? raw.rows.map((row, i) => [i, row]) : (this.yLog ? logTicks : linearTicks)([y0, y1], 6);
+      const longest = Math.max(0, ...this.yTicks.map(([, text]) => text.length));
+      const left = raw.rows ? 0.36 * width : raw.map ? RIGHT : Math.max(LEFT, CHARACTER * longest + BESIDE), height = raw.rows ? 60 + 26 * raw.rows.length : HEIGHT;
       const [wide, tall] = [width - left - RIGHT, height - TOP - (raw.map ? TOP : BOTTOM)];
       if (raw.map) {   // the same scale along both axes
         const scale = Math.max((x1 - x0) / wide, (y1 - y0) / tall), [mx, my] = [(x0 + x1) / 2, (y0 + y1) / 2];
@@ -200,8 +203,7 @@
         used = x + half;
         parts.push(drawn("line", { class: "grid", x1: x, x2: x, y1: TOP, y2: TOP + tall }), drawn("text", { x, y: TOP + tall + 15, "text-anchor": "middle" }, text));
       }
-      const yTicks = raw.rows ? raw.rows.map((row, i) => [i, row]) : (this.yLog ? logTicks : linearTicks)([y0, y1], 6);
-      for (const [v, text] of yTicks) {
+      for (const [v, text] of this.yTicks) {
         const y = this.toY(v);
         if (!raw.rows) parts.push(drawn("line", { class: "grid", x1: left, x2: left + wide, y1: y, y2: y }));
         const label = drawn("text", { x: left - 6, y: y + 4, "text-anchor": "end" }, raw.rows ? "" : text);

@@ -49,7 +49,7 @@ def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     agreements = results.agreements[(results.agreements["scene"] == name) & (results.agreements["dt"] == frame["dt"].min())]
     pairs = agreements[~agreements["reason"].str.startswith(NO_EVIDENCE)]
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column(f"at {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
+    table.add_column(f"at dt = {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
     for engine in engines:
         table.add_column(styled(engine), overflow="fold", justify="right", width=NUMBER_WIDTH + 2)
     if not pairs.empty:

@@ -5,12 +5,14 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import pandas as pd
+
 from comparisons.judging.convergence import ARTEFACTS, SATURATION
-from comparisons.results.results import NEGLIGIBLE, Results
+from comparisons.results.results import NEGLIGIBLE, Results, is_undecided
 from reports.views.numbers import formatted
 
 OF = ["metric", "engine"]
-EXPLAINED = {"known": "Expected", "limited": "Outside the documented range"}
+EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
 """How the reason of an expected model error begins, by verdict."""
 
 
@@ -44,12 +46,14 @@ class BudgetRow:
 
 
 def error_budgets(results: Results, scene_name: str) -> list[BudgetRow]:
-    """The error budgets of a scene, by metric, for engines that ran at enough time steps; negligible errors are left out."""
+    """The error budgets of a scene, by metric, for engines that ran at enough time steps; negligible errors that vanish are left out."""
     table = results.table[results.table["scene"] == scene_name]
     errors = table[table["kind"].isin(["truth", "invariant"]) & ~table["metric"].isin(ARTEFACTS)]
     columns = [*OF, "value", "lower", "upper", "cause", "verdict", "reason"]
     limits, orders = (table[table["kind"] == kind][columns] for kind in ("asymptotic_error", "order"))
-    worth = (errors["dt"] == errors["dt"].min()) & (errors["value"].abs() > NEGLIGIBLE) & errors["engine"].isin(limits["engine"])
+    undecided = pd.MultiIndex.from_frame(table.loc[is_undecided(table), OF])
+    worth = (errors["value"].abs() > NEGLIGIBLE) | pd.MultiIndex.from_frame(errors[OF]).isin(undecided)
+    worth &= (errors["dt"] == errors["dt"].min()) & errors["engine"].isin(limits["engine"])
     both = errors[worth].merge(limits, on=OF, how="left", suffixes=("", "_of_limit"))
     both = both.merge(orders, on=OF, how="left", suffixes=("", "_of_order"))
     places = {metric: number for number, metric in enumerate(dict.fromkeys(errors["metric"]))}

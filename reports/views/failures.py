@@ -70,7 +70,9 @@ class FailureGroup:
 
 
 def failures(results: Results, baseline: str | None = None) -> list[Failure]:
-    """The failures of a run, in this order: breakdowns, accepted results by the size of the change, asymptotic errors, others.
+    """The failures of a run.
+
+    The order is: breakdowns, deviations from accepted results (the largest first), asymptotic errors, others.
 
     Args:
         results: The run, with the rows of a check if there was one.

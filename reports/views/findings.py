@@ -1,23 +1,30 @@
 """The findings of a run as counts and sentences, for terminal, HTML and Markdown."""
 
+import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from comparisons.engines.base import calibrated_label
-from comparisons.judging.convergence import JUMPING, SATURATION, STUDIES
+from comparisons.judging.convergence import ARTEFACTS, JUMPING
 from comparisons.judging.error_budget import is_sufficient
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN
-from comparisons.measuring.tolerances import negligible
-from comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided
-from reports.views.leading_errors import step_costs
-from reports.views.numbers import duration, quantity, size, word
+from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, SEVERITY
+from comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
+from reports.views.leading_errors import step_times
+from reports.views.numbers import duration, formatted, in_ms, quantity
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CONVERGING = frozenset({"passed", "measured", "no_truth"})
 """Verdicts that are no finding."""
-MOST_NAMED = 2
-MOST_METRICS = 3
+MOST_NAMED = 4
+"""Scenes, metrics or engines that a sentence names; of more it has the number."""
+SAME_SIZE = 0.999
+"""Errors count as equal above this share of the largest one."""
 ENGINE_NAMES = {"document": "document (Wang's method)"}
 """Descriptive names of engines, by label, where the label is not descriptive."""
 
@@ -29,11 +36,12 @@ class Counts:
     Attributes:
         passed: Number of passed checks.
         failed: Number of failed checks.
-        known: Number of checks that show a fault that the scene expects of the engine by name.
+        known: Number of checks that show a fault, with an error that is not negligible, that the scene expects of the engine by name.
         known_scenes: Number of scenes with such checks.
         fixed: Number of passed checks for which such a fault is expected.
+        known_engines: The engines of these checks.
         limited: Number of checks whose failure is explained by a known limitation of the engine.
-        of_studies: Number of passed and failed checks of orders and asymptotic errors.
+        limited_engines: The engines of these checks.
         broken: Number of rows that report a breakdown of an engine.
     """
 
@@ -42,18 +50,19 @@ class Counts:
     known: int
     known_scenes: int
     fixed: int
+    known_engines: tuple[str, ...]
     limited: int
-    of_studies: int
+    limited_engines: tuple[str, ...]
     broken: int
 
 
 def counts(results: Results) -> Counts:
     """Count the verdicts of a run."""
     verdicts = results.table["verdict"]
-    passed, failed, known = verdicts == "passed", verdicts.isin(FAILURES), verdicts == "known"
+    passed, failed = verdicts == "passed", verdicts.isin(FAILURES)
+    known = (verdicts == "known") & (results.table["value"].abs() > NEGLIGIBLE)
     fixed = passed & results.table["reason"].str.startswith(HOLDS_AGAIN)
     limited = (verdicts == "limited") & (results.table["metric"] != "")
-    of_studies = (passed | failed) & results.table["kind"].isin(STUDIES)
     broken = verdicts.isin(BREAKDOWNS)
     return Counts(
         passed=int(passed.sum()),
@@ -61,10 +70,17 @@ def counts(results: Results) -> Counts:
         known=int(known.sum()),
         known_scenes=results.table.loc[known, "scene"].nunique(),
         fixed=int(fixed.sum()),
+        known_engines=_engines(results, known),
         limited=int(limited.sum()),
-        of_studies=int(of_studies.sum()),
+        limited_engines=_engines(results, limited),
         broken=int(broken.sum()),
     )
+
+
+def _engines(results: Results, rows: "pd.Series[bool]") -> tuple[str, ...]:
+    """The engines of some rows, in the order of the run."""
+    found = set(results.table.loc[rows, "engine"])
+    return tuple(engine for engine in results.engines if engine in found)
 
 
 def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
@@ -158,28 +174,29 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
         set_at_all = any(scene.expect for scene in results.scenes.values())
         none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
         return f"{none}; {len(results.measurements):,} values were measured."
-    kinds = [f"{judged - tally.of_studies} expectations", f"{tally.of_studies} orders and asymptotic errors"]
-    both = " and ".join(kind for kind in kinds if not kind.startswith("0 "))
-    return f"All {judged} checks pass: {both}{_known(tally)}."
+    expected = f"No unexpected results: {judged} checks pass" if tally.known or tally.limited else f"All {judged} checks pass"
+    return f"{expected}{_known(tally)}."
 
 
 def _known(tally: Counts) -> str:
     """The end of a sentence: how many values show known errors or are within limitations, how many expected faults do not occur."""
-    scenes = _scenes(tally.known_scenes)
-    shows = f"show{'s' * (tally.known == 1)} {'a known error' if tally.known == 1 else 'known errors'}"
-    known = f"; {tally.known} {'value' if tally.known == 1 else 'values'} in {scenes} {shows}"
-    known = known if tally.known else ""
-    limited = f"; {tally.limited} {'is' if tally.limited == 1 else 'are'} outside the documented range" if tally.limited else ""
-    return (
-        known + limited + (f"; {tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not occur" if tally.fixed else "")
-    )
+    parts = []
+    if tally.known:
+        shows = "value shows a known error" if tally.known == 1 else "values show known errors"
+        parts.append(f"{tally.known} {shows} of {_named(tally.known_engines, 'engine')} in {_scenes(tally.known_scenes)}")
+    if tally.limited:
+        shows = "value shows a known limitation" if tally.limited == 1 else "values show known limitations"
+        parts.append(f"{tally.limited} {shows} of {_named(tally.limited_engines, 'engine')}")
+    if tally.fixed:
+        parts.append(f"{tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not occur")
+    return "".join(f"; {part}" for part in parts)
 
 
 def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
     """One sentence for each engine, and one for all errors that the time steps leave undecided.
 
-    The sentence gives the number of scenes in which the engine converges, the number with each other status, its largest error, its
-    breakdowns, and the cost of a time step. The sentence of a missing engine gives the reason why it is missing.
+    The sentence gives the number of scenes in which the engine converges, the number with each other status, its largest error that
+    is known or does not vanish as dt → 0, and the cost of a time step. The sentence of a missing engine gives the reason why it is missing.
 
     Args:
         results: The run.
@@ -187,8 +204,8 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
         profiles: Engines with default settings compared with the calibrated ones.
     """
     missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine").set_index("engine")["reason"]
-    costs, statuses = step_costs(results), results.statuses()
-    sentences, undecided = [], []
+    times, statuses = step_times(results), results.statuses()
+    sentences, undecided, hidden = [], [], False
     for engine in results.engines:
         if engine in missing:
             sentences.append(str(missing[engine]))
@@ -198,74 +215,64 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
         opened = errors[is_undecided(errors) & ~errors["metric"].isin(JUMPING)]
         parts = [
             _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
-            *_breakdowns(results, engine),
             *(profile.clause for profile in profiles if profile.engine == engine),
-            *_cost(results, engine, costs),
+            *_cost(engine, times),
         ]
         sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
         if len(opened):
+            scenes = list(opened["scene"].unique())
             names = [quantity(metric) for metric in opened["metric"].unique()]
-            more = [f"{len(names) - MOST_METRICS} more"] if len(names) > MOST_METRICS else []
-            undecided.append(f"{engine} {', '.join(names[:MOST_METRICS] + more)} ({_named(list(opened['scene'].unique()))})")
-    return [*sentences, *([f"Undecided limits as dt → 0: {'; '.join(undecided)}."] if undecided else [])]
+            undecided.append(f"{engine} in {_named(scenes, 'scene')} ({', '.join(names[:MOST_NAMED])}{', …' * (len(names) > MOST_NAMED)})")
+            hidden |= any(statuses[scene][engine].words != UNDECIDED for scene in scenes)
+    also = ", partly in scenes with a more severe status" if hidden else ""
+    return [*sentences, *([f"Undecided as dt → 0{also}: {'; '.join(undecided)}."] if undecided else [])]
 
 
 def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
-    """The number of scenes in which an engine converges, the number with each other status, and the largest error relative to its scale."""
+    """The number of scenes in which an engine converges, the number with each other status, and the largest known or remaining error."""
     mine = results.table[results.table["engine"] == engine]
-    studied = list(mine.loc[mine["kind"] == "asymptotic_error", "scene"].unique())
-    if not studied:
-        frame = results.measurements
-        measured = _scenes(frame.loc[frame["engine"] == engine, "scene"].nunique())
+    kinds: Counter[str] = Counter()
+    for scene, status in sorted(statuses.items(), key=lambda item: -SEVERITY.index(item[1].verdict)):
+        kinds["setting error" if scene in remain and status.verdict in CONVERGING else status.words] += 1
+    declined = kinds.pop("declined", 0)
+    others = [f"{kind} in {count}" for kind, count in kinds.items() if kind != "converges"] + [f"declines {declined}"] * bool(declined)
+    if not (mine["kind"] == "asymptotic_error").any():
         enough = is_sufficient(results.provenance["asked"]["dts"])
-        return f"{measured} measured, no asymptotic errors" + ("" if enough else "; these need three time steps that span a factor of four")
-    wrong = [scene for scene in studied if scene in remain or statuses[scene].verdict not in CONVERGING]
-    kinds = Counter("setting error" if statuses[scene].verdict in CONVERGING else statuses[scene].words for scene in wrong)
-    kinds[UNDECIDED] = sum(statuses[scene].words == UNDECIDED for scene in studied if scene not in wrong)
-    counted = [f"{kind} in {count}" for kind, count in kinds.items() if count]
-    declined = sum(status.verdict == "declined" for status in statuses.values())
-    declines = f", declines {declined}" if declined else ""
-    converges = "; ".join(
-        [f"converges in {len(studied) - kinds.total()} of {_scenes(len(studied))}{declines}", *filter(None, [", ".join(counted)])]
-    )
-    if not wrong:
-        return converges
-    shown = mine[
-        mine["scene"].isin(wrong) & (mine["verdict"].isin(["known", "limited", *FAILURES]) | mine["cause"].isin(["model", "setting"]))
-    ]
-    shown = shown[(shown["metric"] != "") & (shown["kind"] != "order") & ~shown["metric"].isin(JUMPING) & shown["value"].notna()]
-    scales = [negligible(results.scenes[scene], unit) for scene, unit in zip(shown["scene"], shown["unit"], strict=True)]
-    largest = (shown["value"].abs() / scales).sort_values(ascending=False, kind="stable").index[:1]
-    worst = [
-        f"largest of these errors: {quantity(row['metric'])} {size(row['value'], row['unit'])} in {row['scene']}"
-        f"{'; π is the maximum' if row['unit'] == 'rad' and abs(row['value']) > SATURATION else ''}"
-        for row in shown.loc[largest].to_dict("records")
-    ]
-    return f"{converges}{''.join(f' ({one})' for one in worst)}"
+        none = "no asymptotic errors" + ("" if enough else ", which need three time steps that span a factor of four")
+        return f"{', '.join(others)} of {_scenes(len(statuses))}; {none}"
+    converges = ", ".join([f"converges in {kinds['converges']} of {_scenes(len(statuses))}", *others])
+    found = mine[mine["kind"].isin(["truth", "invariant"]) & (mine["value"].abs() > NEGLIGIBLE)]
+    found = found[~found["metric"].isin([*JUMPING, *ARTEFACTS])]
+    finest = found[found["dt"] == found.groupby("scene")["dt"].transform("min")]
+    wrong = finest[finest["verdict"].isin(["known", "limited", *FAILURES]) | finest["cause"].isin(["model", "setting"])]
+    return f"{converges}{_largest(results, wrong)}"
 
 
-def _named(scenes: Collection[str]) -> str:
-    """The names of the scenes if they are few, otherwise their number."""
-    return ", ".join(scenes) if len(scenes) <= MOST_NAMED else _scenes(len(scenes))
+def _largest(results: Results, errors: "pd.DataFrame") -> str:
+    """The largest of some errors relative to their scales, with the scenes in which it has this size; empty if there are none."""
+    if errors.empty:
+        return ""
+    first = errors.to_dict("records")[int(np.argmax(relative_sizes(errors, results.scenes)))]
+    equal = errors[(errors["metric"] == first["metric"]) & (errors["value"].abs() > SAME_SIZE * abs(first["value"]))]
+    of = "" if first["unit"] == "1" else f" {first['unit']}"
+    names = _named(list(equal["scene"].unique()), "scene")
+    return f"; largest error {quantity(first['metric'])} {formatted(abs(first['value']))}{of} at dt = {in_ms(first['dt'])} in {names}"
 
 
-def _breakdowns(results: Results, engine: str) -> list[str]:
-    """The number of scenes in which an engine broke down, for each kind of breakdown."""
-    table = results.table[(results.table["engine"] == engine) & results.table["verdict"].isin(BREAKDOWNS)]
-    return [f"{word(str(verdict))} in {_scenes(scenes)}" for verdict, scenes in table.groupby("verdict")["scene"].nunique().items()]
+def _named(names: Collection[str], kind: str) -> str:
+    """Names if they are few, otherwise their number."""
+    return ", ".join(names) if len(names) <= MOST_NAMED else f"{len(names)} {kind}s"
 
 
-def _cost(results: Results, engine: str, costs: Mapping[str, float]) -> list[str]:
-    """The median time per step of the fastest engine; for others, the ratio to the fastest engine in the same scene at the same dt."""
-    timed = {label: cost for label, cost in costs.items() if cost > 0.0}
+def _cost(engine: str, times: Mapping[str, float]) -> list[str]:
+    """The time per step of an engine, and its ratio to that of the fastest engine."""
+    timed = {label: time for label, time in times.items() if not math.isnan(time)}
     if engine not in timed:
         return []
+    absolute = f"{duration(float(f'{timed[engine]:.2g}'))} per time step"
     fastest = min(timed, key=timed.__getitem__)
-    if engine != fastest:
-        ratio = f"{timed[engine]:.2g}"
-        return [f"{'about' if ratio == '1' else f'{float(ratio):g} times'} the fastest engine's time per step"]
-    seconds = results.table.loc[results.table["engine"] == engine, "time_per_step"].median()
-    return [f"{duration(float(f'{seconds:.2g}'))} per time step{', the fastest' if len(timed) > 1 else ''}"]
+    ratio = float(f"{timed[engine] / timed[fastest]:.2g}")
+    return [absolute if engine == fastest or ratio == 1.0 else f"{absolute}, {ratio:g} times that of {fastest}"]
 
 
 def _scenes(count: int) -> str:

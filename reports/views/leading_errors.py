@@ -1,7 +1,9 @@
-"""A table of engines: the leading error of each engine in each scene, and the relative cost of its time steps."""
+"""A table of engines: the error of each engine in each scene, and the time of its steps."""
 
 import math
 from dataclasses import dataclass
+
+from scipy.stats import gmean
 
 from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.tolerances import scale
@@ -10,11 +12,11 @@ from comparisons.results.results import Results
 
 @dataclass(frozen=True)
 class Leading:
-    """The leading error of a scene at its finest time step.
+    """The errors of a scene in one metric at its finest time step.
 
     Attributes:
         scene: Name of the scene.
-        metric: The leading metric of the scene.
+        metric: The metric, as chosen by `Results.leading_errors`.
         unit: Unit of the errors.
         dt: Time step [s].
         scale: The scale of the errors, in their unit.
@@ -53,12 +55,17 @@ def leading_errors(results: Results) -> dict[str, Leading]:
     return found
 
 
-def step_costs(results: Results) -> dict[str, float]:
-    """The median time per step relative to the fastest engine in the same scene at the same dt, by engine; NaN if not timed."""
+def step_times(results: Results) -> dict[str, float]:
+    """The time per step [s], by engine: the geometric mean over the scenes and time steps in which all engines were timed.
+
+    Ratios of these times are therefore the geometric means of the ratios. NaN for an engine that was not timed. If there are no scenes and
+    time steps in which all engines were timed, the mean is over those of each engine.
+    """
     timed = results.table[results.table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
-    least = timed.groupby(["scene", "dt"])["time_per_step"].transform("min")
-    ratios = (timed["time_per_step"] / least).groupby(timed["engine"]).median()
-    return {engine: float(ratios.get(engine, math.nan)) for engine in results.engines}
+    times = timed.pivot(index=["scene", "dt"], columns="engine", values="time_per_step")
+    common = times.dropna()
+    means = (common if len(common) else times).agg(gmean, nan_policy="omit")
+    return {engine: float(means.get(engine, math.nan)) for engine in results.engines}
 
 
 def _level(error: float) -> int | None:

@@ -18,7 +18,7 @@ WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
 @dataclass(frozen=True)
 class MatrixRow:
-    """A scene: the quantity of its leading error, and for each engine, in order, the mark of its status and the size of that error."""
+    """A scene: the quantity whose errors are shown, and for each engine, in order, the mark of its status and the size of its error."""
 
     scene: str
     quantity: str
@@ -49,13 +49,14 @@ def matrix(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> Ma
         rows.append(MatrixRow(scene, of, cells, any(status.verdict in FAILURES | BREAKDOWNS for status in found.values())))
     steps = sorted({in_ms(one.dt) for one in leading.values()})
     legend = legend_of_marks({scene: statuses[scene] for scene in scenes})
-    return Matrix(rows, f"error at {' or '.join(steps)}" if steps else "", legend, left_out)
+    return Matrix(rows, f"error at dt = {' or '.join(steps)}" if steps else "", legend, left_out)
 
 
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
-    """The meaning of each mark, least severe first."""
+    """The meaning of each mark, least severe first; one mark stands for known model errors and other known faults."""
     shown = [status for by_engine in statuses.values() for status in by_engine.values()]
-    marks = sorted({(SEVERITY.index(status.verdict), status.mark, status.words) for status in shown}, reverse=True)
+    meant = {(status.verdict, status.mark, "known error" if status.verdict == "known" else status.words) for status in shown}
+    marks = sorted(((SEVERITY.index(verdict), mark, words) for verdict, mark, words in meant), reverse=True)
     words: dict[str, dict[str, None]] = {}
     for _, mark, status in marks:
         words.setdefault(mark, {})[status] = None

@@ -64,7 +64,7 @@ def folder(results, tmp_path_factory):
     return made
 
 
-LIMITED = "outside the documented range"
+LIMITED = "known limitation"
 
 
 def test_poses_are_those_of_the_trajectories(opened, results, folder):

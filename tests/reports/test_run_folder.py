@@ -135,7 +135,7 @@ def test_the_page_states_the_verdict_before_any_table(results, folder):
     """The sentence before any table, one chip for each scene and engine, the colours of each engine."""
     text = (folder / "report.html").read_text(encoding="utf-8")
     passed = (results.table["verdict"] == "passed").sum()
-    assert f"All {passed} checks pass:" in text
+    assert f"All {passed} checks pass." in text
     assert text.index("checks pass") < text.index("<table")
     assert len(re.findall(r'class="chip (passed|measured)"', text)) == 6
     assert "does not vanish as dt → 0" in text
@@ -309,7 +309,7 @@ def studied():
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
     """Orders in a column of their own, with window and limit; model errors named above and on a chip."""
     _, text = studied
-    assert "converges in 0 of 1 scene; known model error in 1 (largest of these errors: orientation 2.67 rad in spin-asymmetric); " in text
+    assert "converges in 0 of 1 scene, known model error in 1; largest error orientation 2.67 rad at dt = 2 ms in spin-asymmetric; " in text
     assert "mujoco: converges in 1 of 1 scene; " in text
     assert len(re.findall(r'<span class="status known">†<span class="words"> known model error</span></span>', text)) == 1
     assert len(re.findall(r">order 1\.0[012]</td>", text)) >= 4
@@ -332,7 +332,9 @@ def test_two_time_steps_give_no_asymptotic_errors():
     found = run("spin-asymmetric", "mujoco", [8e-3, 4e-3])
     assert not found.table["kind"].isin(["order", "asymptotic_error"]).any()
     [sentence] = overview(found).findings
-    assert sentence.startswith("mujoco: 1 scene measured, no asymptotic errors; these need three time steps that span a factor of four; ")
+    assert sentence.startswith(
+        "mujoco: measured in 1 of 1 scene; no asymptotic errors, which need three time steps that span a factor of four; "
+    )
 
 
 def test_an_empty_folder_is_not_a_run(tmp_path):
@@ -360,7 +362,7 @@ def test_the_terminal_table_fits_80_columns(results, capsys):
     text = capsys.readouterr().out
     assert "…" not in text
     assert NASTY in text
-    assert "checks pass:" in text
+    assert "checks pass." in text
     assert max(map(len, text.splitlines())) <= 80
 
 

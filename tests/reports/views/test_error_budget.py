@@ -68,7 +68,7 @@ def budget(results):
         (
             made(4e-2, asymptotic=(3e-2, 2.9e-2, 3.1e-2, "model"), judged="limited"),
             "0.0300 is a model error, which no time step removes; the remaining 0.0100 is discretisation error. "
-            "Outside the documented range: the time steps leave it open.",
+            "Known limitation: the time steps leave it open.",
         ),
         (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "rounding")), "Within rounding."),
         (made(4e-2, asymptotic=(4e-2, -1e-2, 5e-2, "unresolved")), "Undecided: the time steps leave it open."),

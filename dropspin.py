@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from comparisons.engines.registry import engine_names as engine_names
     from comparisons.judging.error_budget import ErrorBudget as ErrorBudget
     from comparisons.judging.error_budget import error_budget as error_budget
+    from comparisons.measuring.contacts import contacts as contacts
     from comparisons.measuring.metrics import METRICS as METRICS
     from comparisons.regressions.baseline import Baseline as Baseline
     from comparisons.regressions.baseline import accept as accept
@@ -89,6 +90,7 @@ _HOMES = {
     ),
     "comparisons.engines.registry": ("engine", "engine_names"),
     "comparisons.judging.error_budget": ("ErrorBudget", "error_budget"),
+    "comparisons.measuring.contacts": ("contacts",),
     "comparisons.measuring.metrics": ("METRICS",),
     "comparisons.regressions.baseline": ("Baseline", "accept", "load_baseline", "write_baseline"),
     "comparisons.regressions.checking": ("check",),

@@ -1,7 +1,7 @@
 """Planted faults of every kind are detected and a correct engine passes; `make faults` and the slow tests run the whole core catalogue."""
 
 import pytest
-from support.fault_suite import ENGINES, FAULTS, SOUND, core_scenes, failed_checks
+from support.fault_suite import ENGINES, FAULTS, SOUND, failed_checks, scenes_with
 
 NUMBERS = {engine.title: number for number, engine in enumerate(ENGINES)}
 SUBTLE = {
@@ -26,14 +26,29 @@ OTHER_KINDS = {
 }
 
 
-@pytest.mark.parametrize(("title", "scene"), (SUBTLE | HARD_CODED | OTHER_KINDS).items())
+FRICTION = {
+    "friction along the axes separately": "slide-box-askew",
+    "friction in one direction only": "roll-ball",
+    "friction that pushes": "slide-box",
+    "rolling resistance of 0.5 % a second": "roll-ball",
+    "speed gained on slopes, 0.1 % a second": "slope-box-slide",
+    "acceleration of 1 mm/s² along a hidden axis": "roll-ball-back",
+    "gravity along a slope dropped": "roll-slope",
+    "balls of 2/3 M r²": "roll-ball",
+    "orientation that depends on the number of earlier simulations": "spin-asymmetric",
+}
+
+
+@pytest.mark.parametrize(("title", "scene"), (SUBTLE | HARD_CODED | OTHER_KINDS | FRICTION).items())
 def test_planted_fault_is_detected_in_one_scene(title, scene):
     """At the default time steps: a changed scene, changed states, changes at impacts and a wrong claim."""
     assert failed_checks(NUMBERS[title], [scene])
 
 
 def test_correct_engine_passes_in_some_scenes():
-    assert failed_checks(NUMBERS["single precision, declared"], ["drop-ball", "spin-asymmetric", "slide-box"]) == []
+    assert (
+        failed_checks(NUMBERS["single precision, declared"], ["drop-ball", "spin-asymmetric", "slide-box", "roll-ball", "roll-slope"]) == []
+    )
 
 
 @pytest.mark.slow
@@ -52,4 +67,5 @@ def test_suite_has_forty_faults_and_ten_correct_engines():
     assert len(FAULTS) >= 40
     assert len(SOUND) >= 10
     assert len(NUMBERS) == len(FAULTS) + len(SOUND)
-    assert {*SUBTLE.values(), *HARD_CODED.values(), *OTHER_KINDS.values()} <= set(core_scenes())
+    assert {*SUBTLE.values(), *HARD_CODED.values(), *OTHER_KINDS.values()} <= set(scenes_with("core"))
+    assert set(FRICTION.values()) <= set(scenes_with("core", "friction"))

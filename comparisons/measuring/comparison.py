@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.measuring.contacts import ContactResiduals, contact_residuals
 from comparisons.measuring.motions import Motions
 from scenarios import Scenario, Trajectory, Truth
 from scenarios.mechanics import angular_momentum, energy, kinetic_energy
@@ -128,6 +129,11 @@ class Comparison:
     def dt(self) -> float:
         """Time between two rows [s]."""
         return float(self.motion.t[1] - self.motion.t[0])
+
+    @cached_property
+    def contacts(self) -> ContactResiduals:
+        """The violations of the laws of contact at each step in which the floor acts."""
+        return contact_residuals(self.scene, self.motion, self.motions)
 
     @property
     def has_impact_to_come(self) -> bool:

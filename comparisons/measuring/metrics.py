@@ -229,6 +229,33 @@ def penetration(case: Comparison | Motions) -> Array:
     return np.maximum(-case.lowest_height, 0.0).max(axis=-1)
 
 
+@_metric("1", "invariant", "a floor, no damping", requirements.obeys_contact_laws)
+def contact_pull(case: Comparison) -> float:
+    """Largest impulse in a time step with which the floor pulls the body, over M v.
+
+    M is the mass, and v the speed at which the kinetic energy equals the scene's energy.
+    """
+    return _largest(case.contacts.pull)
+
+
+@_metric("1", "invariant", "a floor whose friction is not infinite, no damping", requirements.limits_friction)
+def friction_cone_excess(case: Comparison) -> float:
+    """Largest impulse along the floor in a time step beyond friction coefficient times normal impulse, over M v as in contact_pull."""
+    return _largest(case.contacts.cone_excess)
+
+
+@_metric("1", "invariant", "a floor, no damping", requirements.obeys_contact_laws)
+def friction_push(case: Comparison) -> float:
+    """Largest impulse of friction in a time step times the slip that is left in its direction, over the scene's energy."""
+    return _largest(case.contacts.push)
+
+
+@_metric("m", "invariant", "a floor, no damping", requirements.obeys_contact_laws)
+def contact_gap(case: Comparison) -> float:
+    """Largest height of the body's lowest point, at both ends of a time step, in which the floor changes the velocity."""
+    return _largest(case.contacts.gap)
+
+
 def leading_metric(scene: Scenario) -> str:
     """The leading metric of a scene with an exact solution: bounce height, else orientation if the body rotates, else position."""
     truth = truth_for(scene)
@@ -244,6 +271,11 @@ def leading_metric(scene: Scenario) -> str:
 def last_time_in_motion(scene: Scenario, motion: Trajectory) -> float:
     """The time [s] of `Motions.last_row_in_motion`."""
     return float(motion.t[Motions.of(scene, motion).last_row_in_motion])
+
+
+def _largest(values: Array) -> float:
+    """The largest of values that are not negative; 0 if there are none."""
+    return float(values.max(initial=0.0))
 
 
 def _largest_of_each_flight(values: Array, case: Comparison) -> Array:

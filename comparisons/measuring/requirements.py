@@ -56,6 +56,16 @@ def has_floor(scene: Scenario, truth: Truth | None) -> bool:
     return scene.floor is not None
 
 
+def obeys_contact_laws(scene: Scenario, truth: Truth | None) -> bool:
+    """Whether the forces of the floor can be computed from the motion: there is a floor, and no damping."""
+    return scene.floor is not None and scene.damping is None
+
+
+def limits_friction(scene: Scenario, truth: Truth | None) -> bool:
+    """Whether, in addition, friction is limited by a coefficient, which is 0 without friction."""
+    return obeys_contact_laws(scene, truth) and scene.floor is not None and scene.floor.friction != "infinite"
+
+
 def keeps_energy(scene: Scenario, truth: Truth | None) -> bool:
     """Whether there is no damping, so that energy is lost only at the floor."""
     return scene.damping is None

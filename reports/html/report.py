@@ -22,6 +22,7 @@ from reports.plots.spins import wobbles_freely
 from reports.replay import as_data, replay_of
 from reports.sections import Section
 from reports.views import numbers
+from reports.views.contacts import worst_contacts
 from reports.views.error_budget import error_budgets
 from reports.views.leading_errors import leading_errors, step_times
 from reports.views.matrix import legend_of_marks
@@ -92,6 +93,7 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
         "replay": None if motions is None else as_data(motions),
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
         "agreement": _agreement(agreements, min(dts)),
+        "contacts": worst_contacts(results, name),
         "ensemble": _ensemble(pd.concat([frame, agreements]), min(dts)),
         "wobbles": wobbles_freely(scene),
         "scales": [f"{scale(scene, unit):.3g} {unit}" for unit in dict.fromkeys(own["unit"]) if unit not in ("1", "rad")],

@@ -7,7 +7,7 @@ docs/faults.md. The file is over 300 lines because it is one list of faults with
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -66,13 +66,18 @@ def undistorted(rows, times, dt, truth):
 
 @dataclass(frozen=True)
 class Made(Engine):
-    """An exact engine with a change of the scene that it simulates, or of the states that it returns."""
+    """An exact engine with a change of the scene that it simulates, or of the states that it returns.
+
+    It runs the core catalogue, and the scenes with an additional tag or name.
+    """
 
     title: str = "exact"
     change: Callable[[Any], Any] = lambda scene: scene
     distort: Callable[..., Array] = undistorted
     claim: float | None = float("inf")
     vanishing: bool = False
+    plant: Callable[[Any], Callable[..., Array]] | None = None
+    extra: tuple[str, ...] = ()
 
     name = "made"
 
@@ -85,7 +90,7 @@ class Made(Engine):
 
     def prepare(self, scene, dt):
         change = partial(self.change, dt=dt) if self.vanishing else self.change
-        return Sampled(scene, dt, change(scene), self.distort)
+        return Sampled(scene, dt, change(scene), self.distort if self.plant is None else self.plant(scene))
 
 
 # Changes of the scene.
@@ -96,8 +101,7 @@ def with_floor(scene, **values):
 
 
 def with_coefficient(factor):
-    rough = lambda scene: scene.floor is not None and not isinstance(scene.floor.friction, str)  # noqa: E731
-    return lambda scene: with_floor(scene, friction=factor * scene.floor.friction) if rough(scene) else scene
+    return lambda scene: with_floor(scene, friction=factor * scene.floor.friction) if is_rough(scene) else scene
 
 
 def with_grip(coefficient):
@@ -330,6 +334,105 @@ def single_precision(rows, times, dt, truth):
     return rows.astype(np.float32).astype(float)
 
 
+# Faults of friction, on a level or sloped floor.
+
+
+def is_rough(scene):
+    return scene.floor is not None and not isinstance(scene.floor.friction, str)
+
+
+def where_it_slides(function):
+    """A distortion of the scenes in which the body starts on a rough floor: of the states, their times and the scene."""
+
+    def plant(scene):
+        if not is_rough(scene) or scene.starts_above_floor:
+            return undistorted
+        return lambda rows, times, dt, truth: function(rows.copy(), times[:, None], scene)
+
+    return plant
+
+
+def along_axes(rows, t, scene):
+    """Each horizontal component of the velocity of a box is slowed by itself, with the whole friction."""
+    if scene.body.shape != "box" or scene.acceleration[[0, 2]].any() or scene.start.angular_velocity != (0.0, 0.0, 0.0):
+        return rows
+    for axis in (0, 2):
+        speed, slowed = rows[0, 7 + axis], scene.floor.friction * -scene.acceleration[1]
+        until = np.minimum(t[:, 0], abs(speed) / slowed)
+        rows[:, axis] = rows[0, axis] + speed * until - 0.5 * np.sign(speed) * slowed * until**2
+        rows[:, 7 + axis] = speed - np.sign(speed) * slowed * until
+    return rows
+
+
+def pushing(rows, t, scene):
+    """The deceleration with the wrong sign."""
+    v = rows[0, VELOCITY].copy()
+    rows[:, POSITION] = 2.0 * (rows[0, POSITION] + v * t) - rows[:, POSITION]
+    rows[:, VELOCITY] = 2.0 * v - rows[:, VELOCITY]
+    return rows
+
+
+def rolling_resistance(rows, t, scene):
+    """The speed of a ball decays by 0.5 % in a second."""
+    if scene.body.shape == "sphere":
+        rows[:, POSITION] -= 0.5 * 5e-3 * t * (rows[:, POSITION] - rows[0, POSITION])
+        rows[:, 7:] *= 1.0 - 5e-3 * t
+    return rows
+
+
+def downhill(rows, t, scene):
+    """A gain of 0.1 % of the velocity in a second, on slopes only."""
+    if scene.acceleration[[0, 2]].any():
+        rows[:, POSITION] += 0.5 * 1e-3 * t * (rows[:, POSITION] - rows[0, POSITION])
+        rows[:, 7:] *= 1.0 + 1e-3 * t
+    return rows
+
+
+def attracted(rows, t, scene):
+    """A hidden acceleration along the x axis of the world."""
+    rows[:, 0] += 0.5e-3 * t[:, 0] ** 2
+    rows[:, 7] += 1e-3 * t[:, 0]
+    return rows
+
+
+def one_sided(scene):
+    """No friction on a body that slides along +z."""
+    return with_floor(scene, friction="none") if is_rough(scene) and scene.start.velocity[2] > 0.0 else scene
+
+
+def level(scene):
+    """The component of gravity along the floor is dropped."""
+    return with_gravity(np.diag([0.0, 1.0, 0.0]))(scene) if scene.floor is not None else scene
+
+
+def hollow(scene):
+    """2/3 instead of 2/5 of M r² for balls."""
+    return with_body(moments=lambda m: m * 5.0 / 3.0)(scene) if scene.body.shape == "sphere" else scene
+
+
+def at_rest_below(speed):
+    """No restitution in impacts below a speed."""
+
+    def change(scene):
+        if scene.floor is None or scene.gravity is None or 2.0 * -scene.acceleration[1] * scene.clearance > speed**2:
+            return scene
+        return with_floor(scene, restitution=0.0)
+
+    return change
+
+
+@dataclass(frozen=True)
+class Remembering(Made):
+    """Exact except that each simulation turns the body by 1 mrad more than the one before in its process."""
+
+    counted: list = field(default_factory=list, compare=False)
+
+    def prepare(self, scene, dt):
+        self.counted.append(None)
+        angle = 1e-3 * len(self.counted)
+        return Sampled(scene, dt, scene, turned(lambda t: angle + 0 * t))
+
+
 @dataclass(frozen=True)
 class WrongRotor(Made):
     """Exact except for the gyroscopic torque, of which it uses a share, in free flight without damping."""
@@ -368,6 +471,10 @@ class WrongRotor(Made):
 
 def fault(title, **parts):
     return Made(title=title, **parts)
+
+
+def sliding(title, **parts):
+    return Made(title=title, extra=("friction",), **parts)
 
 
 DEGREES = np.pi / 180
@@ -429,6 +536,16 @@ FAULTS = [
     fault("frozen", distort=frozen),
     fault("first order, claimed exact", distort=at_times(lambda t, dt: t * (1 + 0.1 * dt))),
     fault("second order, claimed fourth", distort=at_times(lambda t, dt: t * (1 + 10 * dt * dt)), claim=4.0),
+    Remembering(title="orientation that depends on the number of earlier simulations"),
+    sliding("friction along the axes separately", plant=where_it_slides(along_axes)),
+    sliding("friction in one direction only", change=one_sided),
+    sliding("friction that pushes", plant=where_it_slides(pushing)),
+    sliding("rolling resistance of 0.5 % a second", plant=where_it_slides(rolling_resistance)),
+    sliding("speed gained on slopes, 0.1 % a second", plant=where_it_slides(downhill)),
+    sliding("acceleration of 1 mm/s² along a hidden axis", plant=where_it_slides(attracted)),
+    sliding("gravity along a slope dropped", change=level),
+    sliding("balls of 2/3 M r²", change=hollow),
+    fault("no restitution below 1 m/s", change=at_rest_below(1.0), extra=("bounce-elastic",)),
     fault("mirrored: left-handed axes", distort=on_rows(lambda rows, t: rows * np.array([1, 1, -1, -1, -1, 1, 1, 1, 1, -1, -1, -1, 1]))),
 ]
 
@@ -509,7 +626,7 @@ class NoFloors(Made):
 
 
 SOUND = [
-    Made(title="the exact solution, sampled"),
+    Made(title="the exact solution, sampled", extra=("friction", "bounce-elastic")),
     Made(title="quaternions with alternating sign", distort=other_sign),
     Made(title="rounded to 1e-15", distort=rounded),
     Made(title="evaluated in pieces", distort=in_pieces),
@@ -517,22 +634,22 @@ SOUND = [
     Made(title="claims first order", claim=1.0),
     Integrated(title="DOP853 at 3e-14"),
     Restarted(title="restarted halfway"),
-    Declared32(title="single precision, declared", distort=single_precision),
+    Declared32(title="single precision, declared", distort=single_precision, extra=("friction",)),
     NoFloors(title="declines floors"),
 ]
 ENGINES = [*FAULTS, *SOUND]
 
 
-def core_scenes() -> list[str]:
-    """The names of the core catalogue, without the ensemble: its members have no exact solution."""
-    scenes = map(scenarios.load, scenarios.names())
-    return [scene.name for scene in scenes if "core" in scene.tags and scene.ensemble is None]
+def scenes_with(*wanted: str) -> list[str]:
+    """The names of the scenes with one of these tags or names, without the ensemble: its members have no exact solution."""
+    found = map(scenarios.load, scenarios.names())
+    return [scene.name for scene in found if scene.ensemble is None and {scene.name, *scene.tags} & set(wanted)]
 
 
 def failed_checks(number: int, scenes: Sequence[str] = ()) -> list[tuple[str, str]]:
-    """The scenes, by default of the core catalogue, and the checks in them that an engine fails."""
+    """The scenes, by default those that the engine is meant for, and the checks in them that it fails."""
     with np.errstate(all="ignore"):
-        found = run(scenes or core_scenes(), ENGINES[number])
+        found = run(scenes or scenes_with("core", *ENGINES[number].extra), ENGINES[number])
     bad = found.table[found.table["verdict"].isin(["failed", "crashed", "diverged"])]
     return [(row.scene, f"{row.kind} of {row.metric}" if row.metric else row.verdict) for row in bad.itertuples()]
 

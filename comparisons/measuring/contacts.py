@@ -1,0 +1,127 @@
+"""The contacts of a motion, and by how much the forces of the floor violate the laws of contact; no exact solution is needed.
+
+The impulse of the floor in a time step, and its moment about the vertical, follow from the states before and after it:
+
+    J = M (v₁ - v₀ - g dt)        τ = Y·(L₁ - L₀)
+
+These laws hold for any number of contact points in the plane of the floor, and for any restitution from 0 to 1:
+
+    J·Y >= 0                      the floor does not pull (A. Signorini, 1933)
+    |J - Y (J·Y)| <= f J·Y        friction is within its cone, because each contact's is (C. A. Coulomb, 1785)
+    J·u + τ ω·Y <= 0              friction opposes the slip that is left (maximal dissipation; J. J. Moreau, 1988)
+
+with the velocity u = v + ω × (-h Y) of the body at the floor, at the distance h below its centre of mass, after the step. The fourth law
+is that the floor acts only where it touches (complementarity): the lowest point is on the floor.
+
+In an impact with friction these laws permit a gain of energy (T. R. Kane, 1984), so that energy is measured separately.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.measuring.motions import Motions
+from scenarios import DropspinError, Scenario, Trajectory
+from scenarios.mechanics import angular_momentum
+from scenarios.rotations import length
+from scenarios.state import UP
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+RESIDUALS = ("pull", "cone_excess", "push", "gap")
+"""The laws of contact, by the name of their violation."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactResiduals:
+    """The violations of the laws of contact in each time step in which the floor acts; each is 0 where its law holds.
+
+    Attributes:
+        steps: The numbers of these time steps, the first step being 0, shape (n,).
+        pull: Impulse with which the floor pulls, over M v, shape (n,), with the speed v at which the kinetic energy is the scene's energy.
+        cone_excess: Impulse along the floor beyond the friction coefficient times the normal impulse, over M v, shape (n,); NaN if
+            friction is infinite.
+        push: Impulse of friction times the slip in its direction, summed over the contacts, over the scene's energy, shape (n,).
+        gap: Height of the body's lowest point above the floor, before or after the step, whichever is lower [m], shape (n,).
+    """
+
+    steps: NDArray[np.intp]
+    pull: Array
+    cone_excess: Array
+    push: Array
+    gap: Array
+
+
+def contact_residuals(scene: Scenario, motion: Trajectory, motions: Motions | None = None) -> ContactResiduals:
+    """The violations of the laws of contact in a motion of a scene with a floor.
+
+    Args:
+        scene: The scene; it must not have damping.
+        motion: At least two states, equally spaced in time.
+        motions: `Motions.of(scene, motion)`, if it was already computed.
+    """
+    assert scene.floor is not None
+    found = motions or Motions.of(scene, motion)
+    steps = np.flatnonzero(found.states.touching)
+    before, after, lowest = motion[steps], motion[steps + 1], found.lowest_height
+    energy = float(found.energy_scale) or 1.0  # a body at rest without gravity violates nothing
+    momentum = scene.body.mass * np.sqrt(2.0 * energy / scene.body.mass)
+
+    impulse = scene.body.mass * (after.velocity - before.velocity - float(found.dt) * scene.acceleration)
+    normal, along = impulse @ UP, impulse - np.outer(impulse @ UP, UP)
+    moment = (angular_momentum(scene, after) - angular_momentum(scene, before)) @ UP
+    to_floor = (lowest[steps + 1] - after.position[:, 1])[:, np.newaxis] * UP
+    slip = after.velocity + np.cross(after.angular_velocity, to_floor)
+    along_slip = np.sum(along * slip, axis=1) + moment * (after.angular_velocity @ UP)
+    if np.isinf(scene.floor.coefficient):
+        excess = np.full_like(normal, np.nan)
+    else:
+        excess = np.maximum(length(along) - scene.floor.coefficient * np.maximum(normal, 0.0), 0.0)
+    return ContactResiduals(
+        steps,
+        pull=np.maximum(-normal, 0.0) / momentum,
+        cone_excess=excess / momentum,
+        push=np.maximum(along_slip, 0.0) / energy,
+        gap=np.maximum(np.minimum(lowest[steps], lowest[steps + 1]), 0.0),
+    )
+
+
+def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
+    """The contacts of a motion, each with the impulse of the floor and the largest violation of each law of contact.
+
+    Args:
+        scene: A scene with a floor and without damping.
+        motion: Its motion, such as `simulate` returns it.
+
+    Returns:
+        One row for each contact, which is a sequence of time steps in which the floor acts: `start` and `end` [s], the impulse along the
+        normal `impulse` [N s], the change of energy `energy_change` [J], and the largest `pull`, `cone_excess`, `push` and `gap` of its
+        steps, as in `ContactResiduals`.
+
+    Raises:
+        DropspinError: The scene has no floor, or it has damping.
+    """
+    import pandas as pd
+
+    if scene.floor is None or scene.damping is not None:
+        raise DropspinError(f"{scene.name}: the forces of the floor need a scene with a floor and without damping.")
+    motions = Motions.of(scene, motion)
+    found = contact_residuals(scene, motion, motions)
+    first = np.flatnonzero(np.diff(found.steps, prepend=-2) > 1)
+    starts, ends = found.steps[first], found.steps[np.append(first[1:], len(found.steps)) - 1] + 1
+    falling = (motion.t[ends] - motion.t[starts]) * scene.acceleration[1]
+    residuals = {name: np.maximum.reduceat(getattr(found, name), first) if len(first) else np.empty(0) for name in RESIDUALS}
+    return pd.DataFrame(
+        {
+            "start": motion.t[starts],
+            "end": motion.t[ends],
+            "impulse": scene.body.mass * (motion.velocity[ends, 1] - motion.velocity[starts, 1] - falling),
+            "energy_change": motions.energy[ends] - motions.energy[starts],
+            **residuals,
+        }
+    )

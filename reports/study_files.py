@@ -1,19 +1,24 @@
 """The files that a study writes: tables as CSV and JSON, a Markdown page, figures, and the section for the report of a run."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from comparisons.regressions.history import History
 from comparisons.results.stored_files import file_name
 from comparisons.robustness.study import RobustnessStudy
 from comparisons.symmetries.study import Finding
 from comparisons.tradeoff.points import TradeOff
+from reports.html.replay import replay_page
 from reports.markdown import history_markdown
 from reports.output import write_table
 from reports.plots.figures import history_figure, limits_charts, tradeoff_charts
 from reports.plots.svg import save_svg
+from reports.replay.motions import replay_together
 from reports.sections import Section
 from reports.views import history, limits, symmetries, tradeoff
+from scenarios import Scenario, Trajectory
 
 
 def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
@@ -46,14 +51,32 @@ def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: P
     section.write(folder, "tradeoff")
 
 
-def write_symmetries(found: Sequence[Finding], folder: Path) -> None:
-    """Write `symmetries.csv`, `symmetries.json` and `symmetries.md`."""
+def write_symmetries(found: Sequence[Finding], scenes: Mapping[str, Scenario], dt: float, folder: Path) -> None:
+    """Write `symmetries.csv`, `symmetries.json`, `symmetries.md`, and `symmetries.html` with a replay of the worst case of each engine.
+
+    Args:
+        found: The findings.
+        scenes: The scenes by name.
+        dt: The time step [s].
+        folder: The folder.
+    """
     write_table(folder, "symmetries", symmetries.COLUMNS, symmetries.rows(found))
     section = Section("Symmetries and repeated runs")
     section.add_table(symmetries.worst_rows(found))
     section.add_text(symmetries.legend(found))
     section.add_list(symmetries.sentences(found))
     section.write(folder, "symmetries")
+    if worst := symmetries.worst_lost(found):
+        replays = [replay_together(scenes[one.scene], dt, _as_trajectories(one, dt)) for one in worst]
+        (folder / "symmetries.html").write_text(replay_page(replays, [[]] * len(replays)), encoding="utf-8")
+
+
+def _as_trajectories(lost: Finding, dt: float) -> dict[str, Trajectory]:
+    """The engine's motion and the one that should equal it, by labels."""
+    assert lost.motions is not None
+    labels = lost.engine, f"{lost.engine}, {lost.symmetry}"
+    times = dt * np.arange(len(lost.motions[0]), dtype=np.float64)
+    return {label: Trajectory.from_states(times, states) for label, states in zip(labels, lost.motions, strict=True)}
 
 
 def write_history(found: History, folder: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios import Scenario, Truth
+from scenarios.body import Box, Sphere
 from scenarios.errors import DropspinError, UnknownName
 from scenarios.validation import shown
 
@@ -160,6 +161,20 @@ def may_tumble(scene: Scenario) -> bool:
     return bool(np.ptp(moments) > 1e-12 * moments[-1]) and (any(scene.start.angular_velocity) or scene.floor is not None)
 
 
+def refusal_of_shape(scene: Scenario, hull: str = "") -> str | None:
+    """Why the shape of a scene's body cannot strike a floor; None if it can, or need not.
+
+    Args:
+        scene: The scene.
+        hull: What the engine calls a body of corners, if the shape is represented so; empty for spheres and boxes themselves.
+    """
+    if scene.floor is None:
+        return f"there is no shape without a floor, and no {hull}" if hull else None
+    if isinstance(scene.body, Sphere) and hull:
+        return f"a {hull} would only approximate a ball"
+    return None if isinstance(scene.body, (Sphere, Box)) else "only spheres and boxes are mapped onto a floor"
+
+
 def calibrated_label(label: str) -> str | None:
     """The label of the calibrated profile of an engine whose label has profile=default; None for any other label."""
     name, _, listed = label.removesuffix("]").partition("[")
@@ -199,6 +214,11 @@ class Engine:
 
     Where an error does not vanish as dt → 0, `run` refines these options together with the time step.
     """
+    representations: ClassVar[tuple[str, ...]] = ()
+    """Names of `choices` that represent the same scene in different ways, such as a box as a mesh: the motion does not depend on them.
+
+    `symmetries` compares the motions.
+    """
     reasons: ClassVar[Mapping[str, str]] = {}
     """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
 
@@ -215,6 +235,9 @@ class Engine:
             if canonical != self._default(option):
                 chosen[option] = canonical
         object.__setattr__(self, "options", chosen)
+        for option in self.representations:
+            if option not in self.choices:
+                raise UnknownName(f"{self.name}'s representation", option, self.choices)
         for option, values in self.accuracy.items():
             if option not in self.choices and option not in self.numbers:
                 raise UnknownName(f"{self.name}'s accuracy option", option, [*self.choices, *self.numbers])
@@ -254,6 +277,15 @@ class Engine:
         levels = self.accuracy_levels()
         count = min(len(dts), len(levels))
         return list(zip(sorted(dts)[:count][::-1], levels[-count:], strict=True))
+
+    def represented_otherwise(self) -> dict[str, Self]:
+        """The engine with each other value of each option in `representations`, by text such as `with body=mesh`."""
+        return {
+            f"with {option}={value}": replace(self, options={**self.options, option: value})
+            for option in self.representations
+            for value in self.choices[option]
+            if value != self.option(option)
+        }
 
     @property
     def label(self) -> str:

@@ -5,7 +5,7 @@ import numpy as np
 
 from comparisons.engines import base
 from comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLimitation, Simulation, version
-from scenarios.body import Array, Body, Box, Sphere
+from scenarios.body import Array, Body, Box
 from scenarios.model import Floor, Scenario
 from scenarios.rotations import cross, rotate
 from scenarios.state import ORIENTATION, SPIN
@@ -35,8 +35,8 @@ class Dart(Engine):
         moments, floor = np.linalg.eigvalsh(scene.body.inertia_tensor), scene.floor
         if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
             return "DART damps a free joint about the world's axes; angular damping needs a body of equal moments of inertia"
-        if floor is not None and not isinstance(scene.body, (Sphere, Box)):
-            return "only spheres and boxes are mapped onto a floor"
+        if (unfit := base.refusal_of_shape(scene)) is not None:
+            return unfit
         if floor is not None and floor.rest_speed > 0.0:
             return "DART has a fixed rebound speed below which restitution is 0, 0.1 m/s; floor.rest_speed cannot be set"
         return None

@@ -16,9 +16,10 @@ from comparisons.engines.base import (
     NumericOption,
     Simulation,
     may_tumble,
+    refusal_of_shape,
 )
 from comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
-from comparisons.engines.mujoco_model import INTEGRATORS, calibrated_specification, default_specification
+from comparisons.engines.mujoco_model import INTEGRATORS, Form, calibrated_specification, default_specification
 from comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
 from comparisons.engines.mujoco_versions import BATCHES, flight_of, numbers_of, refusal, refusal_of_boxes, solver
 from comparisons.engines.programs import can_be_pasted, rendered
@@ -53,7 +54,13 @@ class MuJoCo(Engine):
     """MuJoCo with exact restitution: one free body and one explicit contact pair with the floor; or its defaults (profile=default)."""
 
     name = "mujoco"
-    choices: ClassVar = {"integrator": tuple(INTEGRATORS), "profile": PROFILES}
+    choices: ClassVar = {
+        "integrator": tuple(INTEGRATORS),
+        "profile": PROFILES,
+        "body": ("geom", "mesh", "child"),
+        "floor": ("plane", "box"),
+    }
+    representations: ClassVar = ("body", "floor")
     numbers: ClassVar = {"kappa": NumericOption(0.0, 0.0, 1.0), "spring_steps": NumericOption(0.0, 0.0, 1e4)}
 
     def __post_init__(self) -> None:
@@ -112,11 +119,9 @@ class MuJoCo(Engine):
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
         if scene.damping is not None and not is_diagonal(body.inertia_tensor):
             return "MuJoCo damps along the body's own axes; these are not principal axes"
-        if floor is None:
-            return None
-        if not isinstance(body, (Sphere, Box)):
-            return "only spheres and boxes are mapped onto a floor"
-        if self.option("profile") == "default":
+        if (unfit := refusal_of_shape(scene, "mesh" if self.option("body") == "mesh" else "")) is not None:
+            return unfit
+        if floor is None or self.option("profile") == "default":
             return None
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
             return f"contacts break down at coefficients of friction above {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
@@ -157,10 +162,11 @@ class MuJoCo(Engine):
         return MuJoCoBatch([self._prepare(member, dt) for member in members])
 
     def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
-        settings = {name: self.option(name) for name in ("profile", "integrator")}
+        form = Form(self.option("integrator"), self.option("body"), self.option("floor"))
+        settings = {name: self.option(name) for name in ("profile", "integrator", "body", "floor")}
         if self.option("profile") == "default":
-            return MuJoCoSimulation(scene, default_specification(scene, dt, self.option("integrator")), settings)
+            return MuJoCoSimulation(scene, default_specification(scene, dt, form), settings)
         pair = self._pair(scene, dt)
         flags = solver(VERSION) if pair else {"autoreset": "disable"}
-        specification = calibrated_specification(scene, dt, self.option("integrator"), pair, flags)
+        specification = calibrated_specification(scene, dt, form, pair, flags)
         return MuJoCoSimulation(scene, specification, settings | flags | pair)

@@ -1,6 +1,7 @@
 """MuJoCo models of a scene: a free body and, where the scene has a floor, one contact pair with it; or MuJoCo's defaults."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -21,32 +22,48 @@ INTEGRATORS = {
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
     "rk4": mujoco.mjtIntegrator.mjINT_RK4,
 }
+FLOOR_HALF_SIZE = 1e3  # m, of the floor as a box
 FLOOR_QUATERNION = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: rotates the plane's normal from z to y
 
 
-def default_specification(scene: Scenario, dt: float, integrator: str) -> Any:
+@dataclass(frozen=True)
+class Form:
+    """How a scene is written as a model.
+
+    Attributes:
+        integrator: A key of `INTEGRATORS`.
+        body: `geom`; `mesh`, a box as the convex hull of its corners; or `child`, with mass and shape on a fixed child of the free body.
+        floor: `plane`, or `box`, whose top is the floor.
+    """
+
+    integrator: str
+    body: str = "geom"
+    floor: str = "plane"
+
+
+def default_specification(scene: Scenario, dt: float, form: Form) -> Any:
     """The specification of a user who sets friction on both surfaces and nothing else: MuJoCo has no restitution to set."""
-    spec, body = _free_body(scene, dt, integrator)
+    spec, body = _free_body(scene, dt, form)
     if scene.floor is not None:
         known = {"none": 0.0, "infinite": DEFAULT_INFINITE_FRICTION}
         friction = known[scene.floor.friction] if isinstance(scene.floor.friction, str) else scene.floor.friction
         surface = {"friction": [friction, 0.005, 0.0001]}  # sliding; torsion and rolling keep their defaults
-        _add_shape(body, scene, **surface)
-        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **surface)
+        _add_shape(spec, body, scene, form, **surface)
+        spec.worldbody.add_geom(**_floor(form), **surface)
     return spec
 
 
-def calibrated_specification(scene: Scenario, dt: float, integrator: str, pair: Mapping[str, Any], flags: Mapping[str, str]) -> Any:
+def calibrated_specification(scene: Scenario, dt: float, form: Form, pair: Mapping[str, Any], flags: Mapping[str, str]) -> Any:
     """The specification of a calibrated simulation.
 
     Args:
         scene: The scene.
         dt: Time step [s].
-        integrator: A key of `INTEGRATORS`.
+        form: How the scene is written.
         pair: Settings of the contact pair; without any, MuJoCo detects neither contacts nor constraints.
         flags: Solver settings that the installed version has, by their names in MJCF.
     """
-    spec, body = _free_body(scene, dt, integrator)
+    spec, body = _free_body(scene, dt, form)
     option, disable = spec.option, mujoco.mjtDisableBit
     if not pair:
         option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
@@ -58,24 +75,26 @@ def calibrated_specification(scene: Scenario, dt: float, integrator: str, pair: 
     if "diagexact" in flags:
         option.enableflags = mujoco.mjtEnableBit.mjENBL_DIAGEXACT
     passive = {"contype": 0, "conaffinity": 0}  # the pair is the only contact
-    _add_shape(body, scene, name="shape", **passive)
-    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=FLOOR_QUATERNION, **passive)
+    _add_shape(spec, body, scene, form, name="shape", **passive)
+    spec.worldbody.add_geom(name="floor", **_floor(form), **passive)
     spec.add_pair(geomname1="floor", geomname2="shape", **pair)
     return spec
 
 
-def _free_body(scene: Scenario, dt: float, integrator: str) -> tuple[Any, Any]:
-    """The specification that all profiles share (step, gravity, integrator, a free body's mass and inertia), and its body.
+def _free_body(scene: Scenario, dt: float, form: Form) -> tuple[Any, Any]:
+    """The specification that all profiles share (step, gravity, integrator, a free body's mass and inertia), and the body that has them.
 
     The automatic reset is off: it would put a simulation that broke down back to its start without notice.
     """
     spec = mujoco.MjSpec()
     spec.option.timestep = dt
     spec.option.gravity = scene.acceleration
-    spec.option.integrator = INTEGRATORS[integrator]
+    spec.option.integrator = INTEGRATORS[form.integrator]
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     body = spec.worldbody.add_body(name="body")
     body.add_freejoint()
+    if form.body == "child":
+        body = body.add_body(name="child")
     body.explicitinertial = True
     body.mass = scene.body.mass
     body.ipos = [0.0, 0.0, 0.0]
@@ -95,8 +114,18 @@ def _principal(inertia: Array) -> tuple[Array, Array]:
     return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)
 
 
-def _add_shape(body: Any, scene: Scenario, **properties: Any) -> None:
-    if isinstance(scene.body, Sphere):
+def _floor(form: Form) -> dict[str, Any]:
+    """The geom of the floor."""
+    if form.floor == "box":
+        return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [FLOOR_HALF_SIZE] * 3, "pos": [0.0, -FLOOR_HALF_SIZE, 0.0]}
+    return {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "quat": FLOOR_QUATERNION}
+
+
+def _add_shape(spec: Any, body: Any, scene: Scenario, form: Form, **properties: Any) -> None:
+    if form.body == "mesh":
+        spec.add_mesh(name="hull", uservert=scene.body.vertices.ravel().tolist())
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull", **properties)
+    elif isinstance(scene.body, Sphere):
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[scene.body.radius, 0.0, 0.0], **properties)
     elif isinstance(scene.body, Box):
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=scene.body.half_extents, **properties)

@@ -94,9 +94,10 @@ class MuJoCoSimulation(Simulation):
         return rows
 
     def as_built(self) -> AsBuilt:
-        axes = rotate(self._model.body_iquat[1][[1, 2, 3, 0]], np.eye(3))
-        inertia = axes.T @ np.diag(self._model.body_inertia[1]) @ axes
-        return AsBuilt(float(self._model.body_mass[1]), inertia, self._model.opt.gravity.copy())
+        body = self._model.nbody - 1  # the free body, or its only child
+        axes = rotate(self._model.body_iquat[body][[1, 2, 3, 0]], np.eye(3))
+        inertia = axes.T @ np.diag(self._model.body_inertia[body]) @ axes
+        return AsBuilt(float(self._model.body_mass[body]), inertia, self._model.opt.gravity.copy())
 
     def _raise_if_bad(self, when: str) -> None:
         for kind in BAD_STATE:

@@ -14,6 +14,7 @@ from comparisons.engines.base import (
     Engine,
     Simulation,
     may_tumble,
+    refusal_of_shape,
 )
 from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.engines.pybullet_settings import (
@@ -25,10 +26,10 @@ from comparisons.engines.pybullet_settings import (
     damping_properties,
     world_parameters,
 )
-from comparisons.engines.pybullet_simulation import LARGEST_TURN, PyBulletSimulation
+from comparisons.engines.pybullet_simulation import LARGEST_TURN, Form, PyBulletSimulation
 from comparisons.measuring.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
-from scenarios.body import Box, Sphere
+from scenarios.body import Box
 from scenarios.mechanics import is_diagonal
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
@@ -41,7 +42,14 @@ class PyBullet(Engine):
     name = "pybullet"
     order = 1.0
     reasons = REASONS
-    choices: ClassVar = {"coordinates": ("maximal", "multibody"), "profile": PROFILES, "velocity_clamp": ("lifted", "kept")}
+    choices: ClassVar = {
+        "coordinates": ("maximal", "multibody"),
+        "profile": PROFILES,
+        "velocity_clamp": ("lifted", "kept"),
+        "body": ("shape", "hull"),
+        "floor": ("fitting", "plane", "box"),
+    }
+    representations: ClassVar = ("body", "floor")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -92,13 +100,11 @@ class PyBullet(Engine):
             return f"Bullet's damping allows no decay faster than {FASTEST_DECAY:g} per second"
         if scene.damping is not None and self.is_multibody and not self.is_default:
             return "Bullet's multibodies damp by another law, k v (1 + |v|)"
-        if floor is None:
-            return None
+        if (unfit := refusal_of_shape(scene, "hull" if self.option("body") == "hull" else "")) is not None or floor is None:
+            return unfit
         travel = np.linalg.norm(scene.start.position) + np.linalg.norm(scene.start.velocity) * scene.duration
         if isinstance(scene.body, Box) and travel + scene.body.size > FLOOR_HALF_SIZE:
             return f"the floor is a box of {2 * FLOOR_HALF_SIZE:g} m, and the body may leave it"
-        if not isinstance(scene.body, (Sphere, Box)):
-            return "only spheres and boxes are mapped onto a floor"
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
             return f"Bullet caps friction at {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
         return None
@@ -119,4 +125,5 @@ class PyBullet(Engine):
         }
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return PyBulletSimulation(scene, dt, default=self.is_default, multibody=self.is_multibody, unclamped=self.is_unclamped)
+        form = Form(self.is_default, self.is_multibody, self.is_unclamped, self.option("body"), self.option("floor"))
+        return PyBulletSimulation(scene, dt, form)

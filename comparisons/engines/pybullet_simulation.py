@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -28,43 +29,62 @@ NO_PUSH = 1e-6  # relative to what gravity adds in a step
 LARGEST_TURN = np.pi / 4  # rad a step; beyond it Bullet's rotation is too small
 
 
+@dataclass(frozen=True)
+class Form:
+    """How a scene is built.
+
+    Attributes:
+        default: Whether Bullet keeps its defaults.
+        multibody: Whether the body is a btMultiBody rather than a btRigidBody.
+        unclamped: Whether the clamp of a multibody's speeds is removed.
+        body: `shape`, or `hull`, a box as the convex hull of its corners.
+        floor: `plane`, `box`, or `fitting`: with calibrated settings a box for bodies with corners, else a plane.
+    """
+
+    default: bool
+    multibody: bool
+    unclamped: bool
+    body: str = "shape"
+    floor: str = "fitting"
+
+
 class PyBulletSimulation(Simulation):
     """A connection to the physics server in this process, which no other simulation uses until it is closed."""
 
-    def __init__(self, scene: Scenario, dt: float, *, default: bool, multibody: bool, unclamped: bool) -> None:
+    def __init__(self, scene: Scenario, dt: float, form: Form) -> None:
         self._bullet = _import_quietly()
         self._dt, self._fall, self.velocity_lag = dt, dt * scene.acceleration, 0.5 * dt
         self._grips = scene.floor is not None and scene.floor.friction == "infinite"
-        self._idle = _idle.setdefault(default, [])
+        self._idle = _idle.setdefault(form.default, [])
         self._client = self._idle.pop() if self._idle else self._bullet.connect(self._bullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet returned no connection")
         try:
-            self._build(scene, dt, default, multibody, unclamped)
+            self._build(scene, dt, form)
         except BaseException:
             self.close()
             raise
 
-    def _build(self, scene: Scenario, dt: float, default: bool, multibody: bool, unclamped: bool) -> None:
-        bullet, client = self._bullet, self._client
+    def _build(self, scene: Scenario, dt: float, form: Form) -> None:
+        bullet, client, default = self._bullet, self._client, form.default
         parameters = {"fixedTimeStep": dt} if default else world_parameters(scene, dt)
         bullet.setPhysicsEngineParameter(physicsClientId=client, **parameters)
         bullet.setGravity(*map(float, scene.acceleration), physicsClientId=client)
         contact = {} if scene.floor is None else contact_properties(scene, default)
         if scene.floor is not None:
-            self._add_floor(scene, contact, default, multibody)
+            self._add_floor(scene, contact, form)
         self._body = bullet.createMultiBody(
             baseMass=scene.body.mass,
-            baseCollisionShapeIndex=-1 if scene.floor is None else self._shape(scene),
+            baseCollisionShapeIndex=-1 if scene.floor is None else self._shape(scene, form),
             basePosition=scene.start.position,
             baseOrientation=scene.start.orientation,
-            useMaximalCoordinates=not multibody,
+            useMaximalCoordinates=not form.multibody,
             physicsClientId=client,
         )
         dynamics = contact | damping_properties(scene, default)
         if not default:
             dynamics["activationState"] = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
-        if unclamped:
+        if form.unclamped:
             dynamics["maxJointVelocity"] = FASTEST
         bullet.changeDynamics(
             self._body,
@@ -78,27 +98,35 @@ class PyBulletSimulation(Simulation):
         self.settings = {
             "version": version("pybullet"),
             "profile": "default" if default else "calibrated",
-            "coordinates": "multibody" if multibody else "maximal",
+            "coordinates": "multibody" if form.multibody else "maximal",
+            "body": form.body,
+            "floor": form.floor,
             **parameters,
             **dynamics,
         }
 
-    def _shape(self, scene: Scenario) -> int:
+    def _shape(self, scene: Scenario, form: Form) -> int:
         bullet, client = self._bullet, self._client
+        if form.body == "hull":
+            corners = scene.body.vertices.tolist()
+            return int(bullet.createCollisionShape(bullet.GEOM_MESH, vertices=corners, physicsClientId=client))
         if isinstance(scene.body, Sphere):
             return int(bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=scene.body.radius, physicsClientId=client))
         assert isinstance(scene.body, Box)
         return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=scene.body.half_extents, physicsClientId=client))
 
-    def _add_floor(self, scene: Scenario, contact: dict[str, float], default: bool, multibody: bool) -> None:
+    def _add_floor(self, scene: Scenario, contact: dict[str, float], form: Form) -> None:
         bullet, client = self._bullet, self._client
-        if default or isinstance(scene.body, Sphere):
+        fits_plane = form.default or isinstance(scene.body, Sphere)
+        if form.floor == "plane" or (form.floor == "fitting" and fits_plane):
             shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0], physicsClientId=client)
             top = 0.0
         else:  # on a plane, Bullet gives a box one contact point per step
             shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3, physicsClientId=client)
             top = FLOOR_HALF_SIZE
-        floor = bullet.createMultiBody(0, shape, basePosition=[0, -top, 0], useMaximalCoordinates=not multibody, physicsClientId=client)
+        floor = bullet.createMultiBody(
+            0, shape, basePosition=[0, -top, 0], useMaximalCoordinates=not form.multibody, physicsClientId=client
+        )
         # Bullet multiplies the coefficients of the two bodies; with 1 for the floor, the product is the scene's value.
         bullet.changeDynamics(floor, -1, **contact | {"restitution": 1.0, "lateralFriction": 1.0}, physicsClientId=client)
 

@@ -12,7 +12,7 @@ import numpy as np
 import rapier3d
 from scipy.spatial.transform import Rotation
 
-from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, may_tumble, version
+from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, may_tumble, refusal_of_shape, version
 from comparisons.measuring.predictions import spins_steadily
 from scenarios import Scenario, truth_for
 from scenarios.body import Box, Sphere
@@ -49,10 +49,8 @@ class Rapier(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         body, floor = scene.body, scene.floor
-        if floor is None:
-            return None
-        if not isinstance(body, (Sphere, Box)):
-            return "only spheres and boxes are mapped onto a floor"
+        if (unfit := refusal_of_shape(scene)) is not None or floor is None:
+            return unfit
         if floor.rest_speed > 0.0:
             return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
         if isinstance(body, Box) and not isinstance(floor.friction, str):

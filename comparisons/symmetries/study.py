@@ -7,7 +7,7 @@ bit.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -63,6 +63,7 @@ class Finding:
         step: The first time step at which rounding does not explain the difference; None if it does at all steps.
         time: The time of this step [s]; NaN if there is none.
         reason: Why there is no motion to compare; otherwise empty.
+        motions: If the symmetry is lost, the engine's motion and the one that should equal it, states of shape (n, 13).
     """
 
     scene: str
@@ -73,6 +74,7 @@ class Finding:
     step: int | None = None
     time: float = float("nan")
     reason: str = ""
+    motions: tuple[Array, Array] | None = field(default=None, repr=False, compare=False)
 
 
 def symmetries(
@@ -136,7 +138,8 @@ def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array | Br
     own = _states(entry, scene, dt)
     if isinstance(own, Breakdown):
         return own, []
-    names = (name for name in NAMES if name != NEW_PROCESS and (name not in SYMMETRIES or SYMMETRIES[name].applies(scene)))
+    names = [name for name in NAMES if name != NEW_PROCESS and (name not in SYMMETRIES or SYMMETRIES[name].applies(scene))]
+    names += entry.adapter.represented_otherwise()
     return own, [_finding(entry, scene, dt, own, Finding(scene.name, entry.label, name, "not run")) for name in names]
 
 
@@ -157,6 +160,11 @@ def _other(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str
     """The states that should equal the engine's own, and the effects of perturbations by a few ulp; None if rounding has no effect."""
     if name == AGAIN:
         return _states(entry, scene, dt), None
+    if name not in NAMES:
+        other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
+        if (reason := other.adapter.declines(scene)) is not None:
+            raise DropspinError(reason)
+        return _states(other, scene, dt), _effects(entry, scene, dt, own, _perturbed(scene, entry))
     if name == BATCH:
         start = scene.initial_state
         others = [scene.starting_at(np.concatenate([start[:7], start[RATES] * share])) for share in FASTER]
@@ -215,4 +223,5 @@ def _judged(
     # What perturbations explain does not count, even if it is large.
     unexplained = float(difference[beyond].max())
     status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
-    return replace(none, status=status, difference=unexplained, step=first, time=first * dt)
+    motions = (own, other) if status == "lost" else None
+    return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)

@@ -23,15 +23,17 @@ def symmetries_command(
     """Test whether engines give the same motion for the same scene seen from elsewhere, in other units, or run again.
 
     Each scene is turned, mirrored, moved, described with other body axes and in other units, and run again: in a batch, in a new process,
-    and stopped and continued. No exact solution is needed. The default is seven scenes with document, mujoco and pybullet.
+    and stopped and continued; and with other representations of body and floor, if the engine has any. No exact solution is needed. The
+    default is seven scenes with document, mujoco and pybullet.
     """
     from comparisons.running.processes import ResourceLimits
-    from comparisons.symmetries.study import symmetries
+    from comparisons.symmetries.study import SCENES, symmetries
     from reports.output import folder_made
     from reports.study_files import write_symmetries
     from reports.terminal.progress import share_bar
     from reports.terminal.rows import print_rows, print_sentences
     from reports.views import symmetries as view
+    from scenarios import load
 
     with folder_made(output) as folder:
         with share_bar("symmetries") as progress:
@@ -40,11 +42,16 @@ def symmetries_command(
                 stop_if_interrupted()
                 progress(what, share)
 
-            found = symmetries(scenes, engines, dt=dt, on_progress=on_progress, resources=ResourceLimits(processor_time=time_limit))
-        write_symmetries(found, folder)
+            loaded = {scene.name: scene for scene in map(load, scenes or SCENES)}
+            found = symmetries(
+                loaded.values(), engines, dt=dt, on_progress=on_progress, resources=ResourceLimits(processor_time=time_limit)
+            )
+        write_symmetries(found, loaded, dt, folder)
     if json_output:
         echo(json.dumps(view.rows(found), indent=1))
         return
     print_rows(view.worst_rows(found), json_output=False)
     print_sentences([view.legend(found), *view.sentences(found)])
     echo(f"Written: {os.path.join(output, 'symmetries.md')}")
+    if view.worst_lost(found):
+        echo(f"Replay of the worst case of each engine: {os.path.join(output, 'symmetries.html')}")

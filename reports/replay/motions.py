@@ -1,5 +1,6 @@
 """The motions of a replay: the poses of the body in each engine and in the exact solution, and the impulses of the floor."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -151,14 +152,17 @@ def replay_of(results: Results, scene_name: str, dt: float | None = None) -> Rep
     if dt is not None and dt not in steps:
         raise DropspinError(f"{scene_name} was not run at {dt:g} s; choose one of {', '.join(f'{step:g}' for step in steps)} s.")
     chosen = steps[0] if dt is None else dt
-    every = _stride(scene.steps(chosen))
-    colours = engine_colours(results.engines)
-    truth = truth_for(scene)
     moved = {engine: results.trajectories.get((scene_name, engine, chosen)) for engine in results.engines}
-    motions = [_motion(scene, truth, engine, colours[engine], motion, every) for engine, motion in moved.items() if motion is not None]
+    return replay_together(scene, chosen, {engine: motion for engine, motion in moved.items() if motion is not None})
+
+
+def replay_together(scene: Scenario, dt: float, moved: Mapping[str, Trajectory]) -> Replay:
+    """Motions of a scene at a time step [s], by their labels, and the exact solution if there is one."""
+    every, truth, colours = _stride(scene.steps(dt)), truth_for(scene), engine_colours(tuple(moved))
+    motions = [_motion(scene, truth, label, colours[label], motion, every) for label, motion in moved.items()]
     if truth is not None:
-        motions.append(_exact_motion(scene, truth, chosen * every * np.arange(scene.steps(chosen) // every + 1, dtype=np.float64)))
-    return Replay(scene, chosen, chosen * every, [motion for motion in motions if len(motion.frames) > 1])
+        motions.append(_exact_motion(scene, truth, dt * every * np.arange(scene.steps(dt) // every + 1, dtype=np.float64)))
+    return Replay(scene, dt, dt * every, [motion for motion in motions if len(motion.frames) > 1])
 
 
 def _stride(steps: int) -> int:

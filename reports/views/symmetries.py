@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from itertools import groupby
 from typing import Any
 
@@ -21,7 +20,7 @@ MEANINGS: dict[Status, str] = {
 
 def rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
     """Every finding, with all digits; numbers that are not finite are None."""
-    return [{key: None if _is_undefined(value) else value for key, value in asdict(one).items()} for one in findings]
+    return [{name: None if _is_undefined(value := getattr(one, name)) else value for name in COLUMNS} for one in findings]
 
 
 def _is_undefined(value: object) -> bool:
@@ -31,7 +30,8 @@ def _is_undefined(value: object) -> bool:
 def worst_rows(findings: Sequence[Finding]) -> list[dict[str, str]]:
     """The worst finding of all scenes for each symmetry, with a column for each engine."""
     engines = dict.fromkeys(one.engine for one in findings)
-    named = [name for name in NAMES if any(one.symmetry == name for one in findings)]
+    found = {one.symmetry for one in findings}
+    named = [name for name in dict.fromkeys([*NAMES, *(one.symmetry for one in findings)]) if name in found]
     return [{"the scene": name, **{engine: _cell(_of(findings, engine, name)) for engine in engines}} for name in named]
 
 
@@ -49,6 +49,12 @@ def _cell(findings: Sequence[Finding]) -> str:
 
 def _number(difference: float) -> str:
     return "0" if difference == 0.0 else f"{difference:.0e}"
+
+
+def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
+    """For each engine that loses a symmetry, the finding with the largest difference."""
+    lost = sorted((one for one in findings if one.motions is not None), key=lambda one: -one.difference)
+    return [next(one for one in lost if one.engine == engine) for engine in dict.fromkeys(one.engine for one in lost)]
 
 
 def legend(findings: Sequence[Finding]) -> str:

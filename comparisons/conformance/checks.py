@@ -11,6 +11,7 @@ from comparisons.conformance.motion import check_motion
 from comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckResult, Declined
 from comparisons.conformance.probes import PROBES
 from comparisons.conformance.protocol import check_builds, check_claims, check_record, check_refusals, check_settings, check_states
+from comparisons.conformance.symmetries import check_symmetries
 from comparisons.engines.base import Diverged, Engine
 from comparisons.running.entries import present_entry
 from comparisons.running.inputs import EngineEntry
@@ -26,6 +27,7 @@ CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
     "time": check_time,
     "velocity lag": check_velocity_lag,
     "repeats": check_repeats,
+    "symmetries": check_symmetries,
     "states": check_states,
     "settings": check_settings,
     "files": check_files,

@@ -146,6 +146,8 @@ class NumericOption(NamedTuple):
 
 FEWEST_VALUES = 3
 """Values of an option that sets the accuracy: extrapolation needs as many."""
+REPRESENTED = "with "
+"""How the name of another representation begins, such as `with body=mesh`."""
 PROFILES = ("calibrated", "default")
 """Settings that reproduce the scene as closely as the engine can; and the engine's defaults, with only the obvious settings made."""
 LATE_IMPACTS = "impacts detected late"
@@ -281,7 +283,7 @@ class Engine:
     def represented_otherwise(self) -> dict[str, Self]:
         """The engine with each other value of each option in `representations`, by text such as `with body=mesh`."""
         return {
-            f"with {option}={value}": replace(self, options={**self.options, option: value})
+            f"{REPRESENTED}{option}={value}": replace(self, options={**self.options, option: value})
             for option in self.representations
             for value in self.choices[option]
             if value != self.option(option)

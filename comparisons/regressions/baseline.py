@@ -16,12 +16,16 @@ import tomlkit
 from pydantic import Field
 from tomlkit.items import InlineTable, Item
 
+from comparisons.engines.base import REPRESENTED
 from comparisons.measuring.metrics import METRICS
 from comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.output import written_whole
 from comparisons.results.provenance import digest, versions_behind
 from comparisons.results.results import Results
+from comparisons.results.stored_table import OF_SYMMETRIES
+from comparisons.symmetries.rows import kind_of
+from comparisons.symmetries.study import NAMES
 from scenarios import DropspinError
 from scenarios.body import Table
 from scenarios.errors import did_you_mean
@@ -149,7 +153,7 @@ def _read_line(where: str, key: tuple[str, str, str, str], content: Any, accepta
     line = validated(_Line, here, content)
     if line.by not in acceptances:
         raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
-    unit = "1" if kind == "order" else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
+    unit = "1" if kind in ("order", *OF_SYMMETRIES) else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
     identity = {"scene": scene, "engine": engine, "steps": steps, "metric": metric, "kind": kind}
     return identity | line.model_dump() | {"unit": unit}
 
@@ -275,6 +279,8 @@ def _metric_and_kind(where: str, name: str) -> tuple[str, str]:
         return name, METRICS[name].kind
     if name in ENSEMBLE_METRICS:
         return name, "ensemble"
+    if name in NAMES or name.startswith(REPRESENTED):
+        return name, kind_of(name)
     for ending, kind in SUFFIXES.items():
         if name.removesuffix(ending) in METRICS and name.endswith(ending):
             return name.removesuffix(ending), kind

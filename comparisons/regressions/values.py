@@ -19,6 +19,8 @@ BETTER: Mapping[str, Literal["smaller", "larger", "neither"]] = {
     "asymptotic_error": "smaller",
     "order": "larger",
     "ensemble": "neither",
+    "symmetry": "smaller",
+    "determinism": "smaller",
 }
 """Kinds of comparable rows, with the direction of an improvement: errors towards 0, orders upwards; a mean has none."""
 

@@ -9,7 +9,19 @@ import pandas as pd
 
 from comparisons.judging.verdicts import Cause, Judgement, Verdict
 
-Kind = Literal["", "truth", "invariant", "agreement", "prediction", "ensemble", "order", "asymptotic_error", "baseline"]
+Kind = Literal[
+    "",
+    "truth",
+    "invariant",
+    "agreement",
+    "prediction",
+    "ensemble",
+    "order",
+    "asymptotic_error",
+    "symmetry",
+    "determinism",
+    "baseline",
+]
 """What a value is compared with; empty for a row without a value, which says what became of an engine in a scene."""
 
 
@@ -22,7 +34,7 @@ class Measurement:
         engine: Label of the engine.
         dt: Time step [s]; NaN for results of several time steps.
         seed: Number of the start, for sweeps; 0 in a run.
-        metric: Name of the metric; empty in a row about an engine, without a value.
+        metric: Name of the metric, or of the symmetry; empty in a row about an engine, without a value.
         value: The value, in `unit`.
         unit: SI unit; '1' for a ratio.
         kind: What the value is compared with.

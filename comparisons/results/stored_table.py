@@ -19,6 +19,10 @@ from scenarios.validation import shown
 _ARROW = {"str": (pa.string(), pa.large_string()), "float64": (pa.float64(),), "int64": (pa.int64(),)}
 
 
+OF_SYMMETRIES = ("symmetry", "determinism")
+"""Kinds whose rows have the name of a symmetry for a metric; adapters may add names, such as `with body=mesh`."""
+
+
 def loaded_table(content: bytes, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float]) -> pd.DataFrame:
     """The table in a file.
 
@@ -53,7 +57,7 @@ def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Co
         "engine": engines,
         "verdict": VERDICTS,
         "kind": [kind for kind in get_args(Kind) if kind != "baseline"],  # which checks add
-        "metric": {"", *METRICS, *ENSEMBLE_METRICS},
+        "metric": {"", *METRICS, *ENSEMBLE_METRICS, *rows.loc[rows["kind"].isin(OF_SYMMETRIES), "metric"]},
         "dt": {*dts, np.nan},
     }
     for name, known in allowed.items():
@@ -84,6 +88,8 @@ def _verify_kind(kind: str, metric: str, unit: str) -> None:
     """Raise `ValueError` if no row has this kind of this metric in this unit."""
     if metric == "":
         kinds, own = {""}, ""
+    elif kind in OF_SYMMETRIES:
+        kinds, own = {kind}, "1"
     elif metric in ENSEMBLE_METRICS:
         kinds, own = {"ensemble", "agreement"}, ENSEMBLE_METRICS[metric].unit
     else:

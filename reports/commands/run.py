@@ -40,6 +40,7 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
 )
 @click.option("--draw", "count", type=int, metavar="N", help="Add N random scenes, up to 1000, to the named ones.")
 @click.option("--seed", type=int, metavar="SEED", help="Seed of the random scenes. [default: a fresh seed, which is printed]")
+@click.option("--symmetries", "test_symmetries", is_flag=True, help="Also test the symmetries of each scene at the finest time step.")
 @time_limit_option(300.0, "an engine may use for one scene at one time step")
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that are already measured are not run again.")
@@ -52,6 +53,7 @@ def run_command(
     output: str,
     count: int | None,
     seed: int | None,
+    test_symmetries: bool,
     time_limit: float,
     baseline: str | None,
     resume: bool,
@@ -87,7 +89,7 @@ def run_command(
         echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
     file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
     show = None if json_output else print_table if verbose else print_summary
-    results = _run(loaded, drawn, engines, dts, output, time_limit, resume, show)
+    results = _run(loaded, drawn, engines, dts, output, time_limit, resume, show, test_symmetries=test_symmetries)
     checked = _checked(results, file, json_output)
     if json_output:
         echo(json_rows(checked.results.table))
@@ -107,10 +109,14 @@ def _run(
     time_limit: float,
     resume: bool,
     show: "Callable[[Results], None] | None",
+    *,
+    test_symmetries: bool,
 ) -> "Results":
     """Run the scenes, print the results and write the run; an interrupted run keeps the scenes that were measured."""
     from comparisons.running.processes import ResourceLimits
     from comparisons.running.run import DEFAULT_DTS, run, what_changed
+    from comparisons.symmetries.rows import with_symmetries
+    from reports.commands.symmetries import with_progress
     from reports.run_folder import MeasuredScenes, fill, run_folder
     from reports.terminal.progress import progress_bar, status
 
@@ -134,6 +140,9 @@ def _run(
             asked = {**results.provenance["asked"], **drawn}
             named = sorted({name.strip() for name in engines})
             results = replace(results, provenance={**results.provenance, "asked": asked, "named": named})
+            if test_symmetries:
+                finest = min(steps)
+                results = with_symmetries(results, with_progress(scenes, chosen, finest, resources), finest)
             if show is not None:
                 show(results)
             with status("writing the report"):

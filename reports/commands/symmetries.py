@@ -2,12 +2,20 @@
 
 import json
 import os
+from typing import TYPE_CHECKING
 
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
 from reports.commands.options import as_json, time_limit_option
 from reports.terminal.safe import echo
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from comparisons.running.processes import ResourceLimits
+    from comparisons.symmetries.study import Finding
+    from scenarios import Scenario
 
 
 @click.command("symmetries")
@@ -27,25 +35,16 @@ def symmetries_command(
     default is seven scenes with document, mujoco and pybullet.
     """
     from comparisons.running.processes import ResourceLimits
-    from comparisons.symmetries.study import SCENES, symmetries
+    from comparisons.symmetries.study import SCENES
     from reports.output import folder_made
     from reports.study_files import write_symmetries
-    from reports.terminal.progress import share_bar
     from reports.terminal.rows import print_rows, print_sentences
     from reports.views import symmetries as view
     from scenarios import load
 
     with folder_made(output) as folder:
-        with share_bar("symmetries") as progress:
-
-            def on_progress(what: str, share: float) -> None:
-                stop_if_interrupted()
-                progress(what, share)
-
-            loaded = {scene.name: scene for scene in map(load, scenes or SCENES)}
-            found = symmetries(
-                loaded.values(), engines, dt=dt, on_progress=on_progress, resources=ResourceLimits(processor_time=time_limit)
-            )
+        loaded = {scene.name: scene for scene in map(load, scenes or SCENES)}
+        found = with_progress(loaded.values(), engines, dt, ResourceLimits(processor_time=time_limit))
         write_symmetries(found, loaded, dt, folder)
     if json_output:
         echo(json.dumps(view.rows(found), indent=1))
@@ -55,3 +54,17 @@ def symmetries_command(
     echo(f"Written: {os.path.join(output, 'symmetries.md')}")
     if view.worst_lost(found):
         echo(f"Replay of the worst case of each engine: {os.path.join(output, 'symmetries.html')}")
+
+
+def with_progress(scenes: "Iterable[Scenario]", engines: "Iterable[str]", dt: float, resources: "ResourceLimits") -> "list[Finding]":
+    """The findings of the study, which shows its progress and stops at an interrupt."""
+    from comparisons.symmetries.study import symmetries
+    from reports.terminal.progress import share_bar
+
+    with share_bar("symmetries") as progress:
+
+        def on_progress(what: str, share: float) -> None:
+            stop_if_interrupted()
+            progress(what, share)
+
+        return symmetries(scenes, engines, dt=dt, on_progress=on_progress, resources=resources)

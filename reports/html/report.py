@@ -12,6 +12,7 @@ from comparisons.measuring.tolerances import scale
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.provenance import first_settings
 from comparisons.results.results import NEGLIGIBLE, Results
+from comparisons.results.stored_table import OF_SYMMETRIES
 from reports.pages import page
 from reports.plots.chart import Chart
 from reports.plots.chart_data import chart_data
@@ -89,7 +90,7 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
         "trends": _trends(studies),
         "budgets": [one for one in budgets if one.cause != "discretisation"],
         "converging": sum(one.cause == "discretisation" for one in budgets),
-        "rows": _all_results(results, name, pd.concat([own, studies])),
+        "rows": _all_results(results, name, pd.concat([own, studies, frame[frame["kind"].isin(OF_SYMMETRIES)]])),
         "replay": None if motions is None else as_data(motions),
         "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
         "agreement": _agreement(agreements, min(dts)),

@@ -10,6 +10,7 @@ from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import FAILURES
 from comparisons.regressions.parameters import WrongParameter, wrong_parameters
 from comparisons.results.results import Results
+from comparisons.results.stored_table import OF_SYMMETRIES
 from comparisons.running.processes import ResourceLimits
 from reports.views.numbers import bound, formatted, step, subject, word
 
@@ -32,6 +33,7 @@ class Failure:
         reproduce: The command, or the call, that reproduces it.
         broke_down: Whether the engine crashed, hung, diverged, or is missing.
         accepted: Whether the failure is of an accepted result.
+        of_symmetry: Whether the failure is of a symmetry or of a repeated run.
     """
 
     scene: str
@@ -43,6 +45,7 @@ class Failure:
     reproduce: str
     broke_down: bool
     accepted: bool
+    of_symmetry: bool
 
     @property
     def sentence(self) -> str:
@@ -102,6 +105,7 @@ def _failure(results: Results, group: list[Row], baseline: str | None) -> Failur
         reproduce=reproduce(results, row, baseline),
         broke_down=row["verdict"] not in FAILURES,
         accepted=row["kind"] == "baseline",
+        of_symmetry=row["kind"] in OF_SYMMETRIES,
     )
 
 
@@ -120,7 +124,8 @@ def grouped(results: Results, found: Sequence[Failure], baseline: str | None = N
 def _group(results: Results, engine: str, causes: Sequence[Sequence[Failure]], baseline: str | None) -> FailureGroup:
     scenes = list(dict.fromkeys(one.scene for some in causes for one in some))
     accepted = any(one.accepted for some in causes for one in some)
-    command = reproduce_scenes(results, scenes, engine, baseline=baseline if accepted else None)
+    symmetric = any(one.of_symmetry for some in causes for one in some)
+    command = reproduce_scenes(results, scenes, engine, baseline=baseline if accepted else None, symmetries=symmetric)
     parameters = dict.fromkeys(map(_described, wrong_parameters(results, engine)))
     consistent_with = f"Consistent with {' or '.join(parameters)}." if parameters else ""
     return FailureGroup(engine, [_of_one_cause(some) for some in causes], consistent_with, command)
@@ -138,11 +143,12 @@ def _of_one_cause(some: Sequence[Failure]) -> str:
     first = some[0]
     if first.broke_down:
         others = list(dict.fromkeys(one.scene for one in some[1:]))
-        return first.sentence.rstrip(".") + (f"; likewise in {_listed(others)}" if others else "") + "."
+        return first.sentence.rstrip(".") + (f"; the same in {_listed(others)}" if others else "") + "."
     rows = sum(1 + one.others for one in some[1:])
     results = [name for name in dict.fromkeys(one.result for one in some[1:]) if name not in ("", first.result)]
     others_too = f" ({_listed(results)})" if results else ""
-    return first.sentence.rstrip(".") + (f"; {rows} other results of this scene fail{others_too}" if rows else "") + "."
+    fail = "1 other result of this scene fails" if rows == 1 else f"{rows} other results of this scene fail"
+    return first.sentence.rstrip(".") + (f"; {fail}{others_too}" if rows else "") + "."
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -166,11 +172,18 @@ def what_fails(row: Row) -> str:
 def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
     """The command that measures a row again, or the Python call if the scene or the engine was given as an object."""
     dts = None if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
-    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, baseline if row["kind"] == "baseline" else None)
+    of_baseline = baseline if row["kind"] == "baseline" else None
+    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, of_baseline, symmetries=row["kind"] in OF_SYMMETRIES)
 
 
 def reproduce_scenes(
-    results: Results, names: Sequence[str], label: str, dts: Sequence[float] | None = None, baseline: str | None = None
+    results: Results,
+    names: Sequence[str],
+    label: str,
+    dts: Sequence[float] | None = None,
+    baseline: str | None = None,
+    *,
+    symmetries: bool = False,
 ) -> str:
     """The command that runs scenes with one engine again, or the Python call if a scene or the engine was given as an object.
 
@@ -180,6 +193,7 @@ def reproduce_scenes(
         label: Label of the engine.
         dts: Time steps [s]; None for all of the run.
         baseline: The baseline file to compare with.
+        symmetries: Whether to test symmetries too.
     """
     asked = results.provenance["asked"]
     scenes, steps = [results.scenes[name] for name in names], sorted(asked["dts"] if dts is None else dts, reverse=True)
@@ -189,7 +203,8 @@ def reproduce_scenes(
         named_scenes = named[0] if len(named) == 1 else f"[{', '.join(named)}]"
         named_engine = f"<engine {label!r}>" if engine is None else repr(engine)
         return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]})"
-    options = [*_options(steps, asked["time_limit"]), *([] if baseline is None else ["--baseline", baseline])]
+    options = [*_options(steps, asked["time_limit"]), *["--symmetries"] * symmetries]
+    options += [] if baseline is None else ["--baseline", baseline]
     return shlex.join(["dropspin", "run", *(scene.origin for scene in scenes), "-e", engine, *options, "-o", "out/again"])
 
 

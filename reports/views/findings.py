@@ -261,7 +261,10 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
 
 def _named(names: Collection[str], kind: str) -> str:
     """Names if they are few, otherwise their number."""
-    return ", ".join(names) if len(names) <= MOST_NAMED else f"{len(names)} {kind}s"
+    if len(names) > MOST_NAMED:
+        return f"{len(names)} {kind}s"
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def _cost(engine: str, times: Mapping[str, float]) -> list[str]:

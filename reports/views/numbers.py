@@ -69,6 +69,7 @@ def subject(metric: str, kind: str, truth: str = "") -> str:
     """The subject of a row in words, such as `order of orientation error`; for a row of kind `baseline`, that of the accepted result."""
     words = metric.replace("_", " ")
     prefixed = {"order": f"order of {words}", "asymptotic_error": f"asymptotic {words}", "ensemble": f"mean {words}"}
+    prefixed |= {"symmetry": f"difference of the motion {words}", "determinism": f"difference of the motion {words}"}
     return prefixed.get(_accepted_kinds().get(truth, kind), words)
 
 

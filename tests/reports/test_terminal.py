@@ -116,7 +116,7 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     known = core.table[(core.table["verdict"] == "known") & (core.table["unit"] == "rad") & (core.table["dt"] == 1e-3)]
     largest = known[known["value"] > 0.999 * known["value"].max()]
     assert set(largest["metric"]) == {"orientation_error"}
-    scenes = ", ".join(largest["scene"])
+    scenes = " and ".join(largest["scene"])
     assert f"; largest error orientation {largest['value'].max():.3g} rad at dt = 1 ms in {scenes}; " in of["document"][0]
     assert "largest error" not in of["pybullet"][0]
     for engine in core.engines:

@@ -65,7 +65,7 @@ def test_documented_adapter_passes_and_is_short():
         ("pybullet", set()),
         pytest.param("pybullet[coordinates=multibody]", set(), marks=pytest.mark.slow),
         ("rapier", set()),
-        ("dart", {"slow ball"}),
+        ("dart", {"slow ball", "symmetries"}),
         ("drake", set()),
     ],
 )
@@ -354,3 +354,29 @@ def test_friction_fault_exceeds_the_known_limitation(factor, monkeypatch):
 def test_unknown_check_suggests_the_nearest_name():
     with pytest.raises(UnknownName, match="Did you mean 'bouncing ball'"):
         conform(engine("document"), checks=["bounce ball"])
+
+
+LEAKS = {
+    "leaks between worlds": "motions[1:, 1:] += 1e-9 * motions[0, 1:]",
+    "permutes worlds": "motions[:, 1:] = motions[[1, 2, 0], 1:]",
+    "reuses one state": "motions[:] = motions[0]",
+}
+
+
+@pytest.mark.parametrize("fault", LEAKS)
+def test_batch_that_differs_from_single_simulations_fails(fault):
+    together = "motions = super().record_batch(members, dt, steps)"
+    batch = f"    def record_batch(self, members, dt, steps):\n        {together}\n        {LEAKS[fault]}\n        return motions\n\n"
+    found = not_passed(documented(("    def prepare(", f"{batch}    def prepare(")), "symmetries")
+    outcome, message = found["symmetries"]
+    assert outcome == "failed"
+    assert message.startswith("a batch of three: ")
+
+
+def test_lost_symmetry_is_noted_with_its_first_step():
+    """A hidden acceleration along an axis of the world."""
+    pushed = documented((RETURN, f"x = x + np.array([1e-6 * self.data.time, 0.0, 0.0])\n        {RETURN}"))
+    outcome, message = not_passed(pushed, "symmetries")["symmetries"]
+    assert outcome == "noted"
+    assert "turned by 90°: by " in message
+    assert " from step " in message

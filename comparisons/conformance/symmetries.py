@@ -1,0 +1,35 @@
+"""The check of symmetries, and of batches: peculiarities of an engine that exact solutions may not show, and batches that leak."""
+
+from comparisons.conformance.outcomes import CheckFailed, CheckResult
+from comparisons.conformance.probes import DT
+from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene
+from comparisons.engines.base import Engine
+from comparisons.running.inputs import EngineEntry
+from comparisons.running.recording import Breakdown
+from comparisons.symmetries.catalogue import SYMMETRIES
+from comparisons.symmetries.study import BATCH, Finding, findings_of
+from scenarios.transformations import whole_steps
+
+
+def check_symmetries(engine: Engine, check: str) -> CheckResult:
+    """Scenes seen from elsewhere and in other units have the same motion, and a batch gives the motions of single simulations."""
+    found = _found(engine, "tumbling", "turning", "falling straight", "coasting") + _found(engine)
+    for one in found:
+        if one.symmetry == BATCH and one.status != "kept":
+            why = one.reason or f"it gives other states than single simulations, from step {one.step} on"
+            raise CheckFailed(f"a batch of three: {why}")
+    lost = {one.symmetry: one for one in sorted(found, key=lambda one: one.difference) if one.status == "lost"}
+    if lost:
+        named = "; ".join(f"{name}: by {one.difference:.2g} from step {one.step} on" for name, one in lost.items())
+        return CheckResult(check, "noted", f"the motion differs if the scene is transformed; {named} (dropspin symmetries shows more)")
+    compared = {one.symmetry for one in found if one.status != "not run"} & set(SYMMETRIES)
+    return CheckResult(check, "passed", f"{len(compared)} symmetries are kept, in flight and with the floor; a batch gives the same bits")
+
+
+def _found(engine: Engine, *preferred: str) -> list[Finding]:
+    """The findings in a short run of the first scene that the engine accepts."""
+    scene = whole_steps(accepted_scene(engine, *preferred), DT, A_FEW_STEPS)
+    own, found = findings_of(EngineEntry(engine.label, engine), scene, DT, (*SYMMETRIES, BATCH))
+    if isinstance(own, Breakdown):
+        raise CheckFailed(own.reason)
+    return found

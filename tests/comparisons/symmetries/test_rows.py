@@ -1,0 +1,105 @@
+"""Findings on symmetries as rows of a run: their verdicts, a stored run, baselines, and the commands that reproduce them."""
+
+import datetime
+import itertools
+
+import numpy as np
+import pytest
+from support import engines as made
+
+import dropspin as ds
+from comparisons.symmetries.rows import with_symmetries
+from comparisons.symmetries.study import AGAIN, BITWISE, NAMES, Finding, symmetries
+from reports.views.failures import failures
+
+SCENE, DTS = "spin-asymmetric", (8e-3, 4e-3)
+
+
+def measured(engine):
+    found = ds.run(SCENE, engine, DTS)
+    return with_symmetries(found, symmetries(SCENE, engine, dt=min(DTS)), min(DTS))
+
+
+def rows_of(results):
+    return results.table[results.table["kind"].isin(["symmetry", "determinism"])].set_index("metric")
+
+
+def one_ulp_more(ulps):
+    """Each simulation has another number of ulps more."""
+
+    class Noisy(made.Exact):
+        name = "noisy"
+
+        def prepare(self, scene, dt):
+            share = 1.0 + next(ulps) * np.finfo(float).eps
+            return made.ExactSimulation(scene, dt, lambda state, time: state * share if time > 0.0 else state)
+
+    return Noisy()
+
+
+def test_exact_solution_passes_every_symmetry_and_gives_the_same_bits():
+    rows = rows_of(measured(made.Exact()))
+    assert set(rows.index) == set(NAMES)
+    assert set(rows["verdict"]) == {"passed"}
+    assert (rows.loc[list(BITWISE), "value"] == 0.0).all()
+    assert set(rows["kind"]) == {"symmetry", "determinism"}
+
+
+def test_noise_of_one_ulp_fails_the_check_of_repeated_runs():
+    rows = rows_of(measured(one_ulp_more(itertools.count())))
+    assert rows.loc[AGAIN, "verdict"] == "failed"
+    assert 0.0 < rows.loc[AGAIN, "value"] < 1e-12
+    assert rows.loc[AGAIN, "upper"] == 0.0
+    assert rows.loc["turned by 90°", "verdict"] == "passed"
+
+
+def test_lost_symmetry_fails_the_run_and_is_reproduced_with_the_option():
+    def along_x(state, time):
+        state = state.copy()
+        state[0] += 1e-3 * time**2
+        return state
+
+    results = measured(made.engine_with("pushed", along_x))
+    assert rows_of(results).loc["turned by 90°", "verdict"] == "failed"
+    assert results.exit_code() == 1
+    assert results.statuses()[SCENE]["pushed"].verdict == "failed"
+    [found] = [one for one in failures(results) if one.result == "difference of the motion turned by 90°"]
+    assert "expected ≤ 1e-05" in found.what
+    assert found.of_symmetry
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    results = with_symmetries(ds.run(SCENE, "mujoco", DTS), symmetries(SCENE, "mujoco", dt=min(DTS)), min(DTS))
+    folder = tmp_path_factory.mktemp("symmetric") / "run"
+    ds.write_report(results, folder)
+    return folder
+
+
+def test_stored_run_has_the_rows_and_its_report_shows_them(stored):
+    rows = rows_of(ds.load_results(stored))
+    assert {"turned by 1 rad", AGAIN, "with body=child"} <= set(rows.index)
+    assert "difference of the motion turned by 1 rad" in (stored / "report.html").read_text(encoding="utf-8")
+
+
+def test_baseline_holds_them_and_finds_a_lost_one(stored, tmp_path):
+    results = ds.load_results(stored)
+    accepted, _ = ds.accept(results, ds.Baseline(), "first", datetime.date(2026, 11, 24))
+    ds.write_baseline(accepted, tmp_path / "baseline.toml")
+    baseline = ds.load_baseline(tmp_path / "baseline.toml")
+    assert set(baseline.results.loc[baseline.results["kind"] == "determinism", "metric"]) >= set(BITWISE)
+    assert ds.check(results, baseline).results.exit_code() == 0
+    lost = Finding(SCENE, "mujoco", "turned by 1 rad", "lost", 0.5, 1, 4e-3)
+    unsound = with_symmetries(ds.run(SCENE, "mujoco", DTS), [lost], min(DTS))
+    checked = ds.check(unsound, baseline).results
+    reasons = checked.table.loc[(checked.table["kind"] == "baseline") & (checked.table["metric"] == "turned by 1 rad"), "verdict"]
+    assert list(reasons) == ["failed"]
+
+
+def test_rounding_has_a_tolerance_of_its_size():
+    """A chaotic motion gives a difference of another size on another machine."""
+    found = [Finding(SCENE, "mujoco", "turned by 1 rad", "rounding", 0.1), Finding(SCENE, "mujoco", "mirrored", "kept", 1e-12)]
+    rows = rows_of(with_symmetries(ds.run(SCENE, "mujoco", DTS[0]), found, DTS[0]))
+    assert rows.loc["turned by 1 rad", "tolerance"] == pytest.approx(0.3)
+    assert rows.loc["mirrored", "tolerance"] == 1e-5
+    assert set(rows["verdict"]) == {"passed"}

@@ -113,7 +113,7 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
     motions = Motions.of(scene, motion)
     found = contact_residuals(scene, motion, motions)
     first = np.flatnonzero(np.diff(found.steps, prepend=-2) > 1)
-    starts, ends = found.steps[first], found.steps[np.append(first[1:], len(found.steps)) - 1] + 1
+    starts, ends = found.steps[first], found.steps[np.append(first[1:], len(found.steps))[: len(first)] - 1] + 1
     falling = (motion.t[ends] - motion.t[starts]) * scene.acceleration[1]
     residuals = {name: np.maximum.reduceat(getattr(found, name), first) if len(first) else np.empty(0) for name in RESIDUALS}
     return pd.DataFrame(

@@ -6,6 +6,7 @@ effect of the perturbations so far, times a factor that allows for a rounding er
 bit.
 """
 
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
@@ -20,7 +21,7 @@ from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.recording import Breakdown, classify, record_batch, try_record
-from comparisons.symmetries.catalogue import SYMMETRIES
+from comparisons.symmetries.catalogue import SYMMETRIES, Symmetry
 from scenarios import DropspinError, Scenario
 from scenarios.state import RATES
 from scenarios.transformations import whole_steps
@@ -40,10 +41,12 @@ SCENES = ("spin-asymmetric", "drop-ball-backspin", "drop-box-anyhow", "drop-box-
 ENGINES = ("document", "mujoco", "pybullet")
 DT = 1e-3  # s
 RESOURCES = ResourceLimits(processor_time=60.0)
-AGAIN, BATCH, HALVES, NEW_PROCESS = "again", "in a batch", "in two halves", "in a new process"
-REPEATS = (AGAIN, BATCH, NEW_PROCESS, HALVES)
-"""Runs of the same scene: after others in the same process, together with two others, in a new process, and stopped and continued."""
-BITWISE = (AGAIN, BATCH, NEW_PROCESS)
+AGAIN, BATCH, HALVES, NEW_PROCESS, ONE_CORE = "again", "in a batch", "in two halves", "in a new process", "on one core"
+REPEATS = (AGAIN, BATCH, NEW_PROCESS, ONE_CORE, HALVES)
+"""Runs of the same scene: after others in the same process, together with two others, in a new process, in a batch on one processor, and
+stopped and continued.
+"""
+BITWISE = (AGAIN, BATCH, NEW_PROCESS, ONE_CORE)
 """Those that must give the same bits; a new simulation may continue from a state with other rounding errors."""
 NAMES = (*SYMMETRIES, *REPEATS)
 ULPS = 1000.0
@@ -128,18 +131,22 @@ def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, 
         own, found = processes.call(entry, _compare, scene, dt)
         if isinstance(own, Breakdown):
             return [replace(none, symmetry=name, reason=own.reason) for name in NAMES]
-        processes.renew(entry)
-        fresh = processes.call(entry, _states, scene, dt)
+        for name, again in IN_NEW_PROCESSES.items():
+            processes.renew(entry)
+            fresh, repeated = processes.call(entry, again, scene, dt), replace(none, symmetry=name)
+            if isinstance(fresh, Breakdown):
+                found.append(replace(repeated, reason=fresh.reason))
+            else:
+                found.append(_judged(repeated, scene, dt, own, fresh, None))
+        processes.renew(entry)  # the last one may use one processor only
     except Failed as failure:
         return [replace(none, symmetry=name, reason=failure.reason) for name in NAMES]
-    repeated = replace(none, symmetry=NEW_PROCESS)
-    found.append(replace(repeated, reason=fresh.reason) if isinstance(fresh, Breakdown) else _judged(repeated, scene, dt, own, fresh, None))
     return found
 
 
 def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array | Breakdown, list[Finding]]:
     """All findings that one process can give."""
-    names = [name for name in NAMES if name != NEW_PROCESS]
+    names = [name for name in NAMES if name not in IN_NEW_PROCESSES]
     return findings_of(entry, scene, dt, [*names, *entry.adapter.represented_otherwise()])
 
 
@@ -178,30 +185,51 @@ def _other(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str
             raise DropspinError(reason)
         return _states(other, scene, dt), lambda: _effects(entry, scene, dt, own, _perturbed(scene, entry))
     if name == BATCH:
-        start = scene.initial_state
-        others = [scene.starting_at(np.concatenate([start[:7], start[RATES] * share])) for share in FASTER]
-        together = [motion.states for motion in record_batch(entry.adapter, [scene, *others], dt)]
-        first = together[0]
-        for batched, alone in zip(together[1:], (_states(entry, one, dt) for one in others), strict=True):
-            if isinstance(alone, Breakdown):
-                return alone, None
-            # Differences of the others count as if they were of the scene's own motion; without any, its bits stay.
-            first = first + np.abs(batched - alone)
-        return first, None
-    if name == HALVES:
-        half = len(own) // 2
-        nominal = whole_steps(scene, dt, len(own) - 1 - half).starting_at(own[half])
-        rest = _states(entry, nominal, dt)
-        if isinstance(rest, Breakdown):
-            return rest, None
+        return _batched(entry, scene, dt), None
+    return _halves(entry, scene, dt, own) if name == HALVES else _transformed(entry, scene, dt, own, SYMMETRIES[name])
 
-        def of_rest() -> list[Array]:
-            effects = _effects(entry, nominal, dt, rest, _perturbed(nominal, entry))
-            return [np.concatenate([np.zeros(half), effect]) for effect in effects]
 
-        return np.concatenate([own[:half], rest]), of_rest
-    symmetry, times = SYMMETRIES[name], dt * np.arange(len(own), dtype=float)
-    transformed = symmetry.transformed(scene)
+def _batched(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
+    """The states of a scene that is run in a batch with two others; differences of the others from single runs are added to them."""
+    start = scene.initial_state
+    others = [scene.starting_at(np.concatenate([start[:7], start[RATES] * share])) for share in FASTER]
+    states, *batched = [motion.states for motion in record_batch(entry.adapter, [scene, *others], dt)]
+    for other, together in zip(others, batched, strict=True):
+        alone = _states(entry, other, dt)
+        if isinstance(alone, Breakdown):
+            return alone
+        states = states + np.abs(together - alone)  # without a difference, its bits stay
+    return states
+
+
+def _on_one_core(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
+    """The same in a process that may use one processor, so that engines that share work among threads have one."""
+    if not hasattr(os, "sched_setaffinity"):
+        return Breakdown("declined", "this system cannot restrict a process to one processor")
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    return _batched(entry, scene, dt)
+
+
+def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple[Array | Breakdown, Effects | None]:
+    """The states of a scene that is stopped half way and continued."""
+    half = len(own) // 2
+    nominal = whole_steps(scene, dt, len(own) - 1 - half).starting_at(own[half])
+    rest = _states(entry, nominal, dt)
+    if isinstance(rest, Breakdown):
+        return rest, None
+
+    def of_rest() -> list[Array]:
+        effects = _effects(entry, nominal, dt, rest, _perturbed(nominal, entry))
+        return [np.concatenate([np.zeros(half), effect]) for effect in effects]
+
+    return np.concatenate([own[:half], rest]), of_rest
+
+
+def _transformed(
+    entry: EngineEntry, scene: Scenario, dt: float, own: Array, symmetry: Symmetry
+) -> tuple[Array | Breakdown, Effects | None]:
+    """The states of a transformed scene, transformed back."""
+    times, transformed = dt * np.arange(len(own), dtype=float), symmetry.transformed(scene)
     states = _states(entry, transformed, symmetry.time * dt)
     if isinstance(states, Breakdown):
         return states, None
@@ -253,3 +281,7 @@ def _judged(
     status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
     motions = (own, other) if status == "lost" else None
     return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)
+
+
+IN_NEW_PROCESSES = {NEW_PROCESS: _states, ONE_CORE: _on_one_core}
+"""Runs of the same scene in processes that did nothing before."""

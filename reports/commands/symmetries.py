@@ -30,9 +30,9 @@ def symmetries_command(
 ) -> None:
     """Test whether engines give the same motion for the same scene seen from elsewhere, in other units, or run again.
 
-    Each scene is turned, mirrored, moved, described with other body axes and in other units, and run again: in a batch, in a new process,
-    and stopped and continued; and with other representations of body and floor, if the engine has any. No exact solution is needed. The
-    default is seven scenes with document, mujoco and pybullet.
+    Each scene is turned, mirrored, moved, described with other body axes and in other units, and run again: in a batch, in a new
+    process, on one core, and stopped and continued. If the engine has other representations of body or floor, they are compared too. No
+    exact solution is needed. The default is seven scenes with document, mujoco and pybullet.
     """
     from comparisons.running.processes import ResourceLimits
     from comparisons.symmetries.study import SCENES
@@ -43,9 +43,9 @@ def symmetries_command(
     from scenarios import load
 
     with folder_made(output) as folder:
-        loaded = {scene.name: scene for scene in map(load, scenes or SCENES)}
-        found = with_progress(loaded.values(), engines, dt, ResourceLimits(processor_time=time_limit))
-        write_symmetries(found, loaded, dt, folder)
+        loaded = [load(name) for name in scenes or SCENES]
+        found = with_progress(loaded, engines, dt, ResourceLimits(processor_time=time_limit))
+        write_symmetries(found, {scene.name: scene for scene in loaded}, dt, folder)
     if json_output:
         echo(json.dumps(view.rows(found), indent=1))
         return

@@ -1,11 +1,14 @@
 """The contacts of a scene: for each engine, the largest violation of each law of contact, and the time of the contact that has it."""
 
+import numpy as np
+
 from comparisons.measuring.contacts import RESIDUALS, contacts
 from comparisons.measuring.requirements import obeys_contact_laws
 from comparisons.results.results import Results
 from reports.views.numbers import formatted
 
 
+@np.errstate(all="ignore")  # an engine may return 1e300
 def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
     """A row for each engine that touches the floor at the finest time step: its contacts, and the worst for each law.
 
@@ -18,7 +21,8 @@ def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
     rows = []
     for engine in results.engines:
         motion = next((mine[key] for key in sorted(mine, key=lambda key: key[1]) if key[0] == engine), None)
-        found = None if motion is None else contacts(scene, motion)
+        sound = None if motion is None else motion[: motion.first_bad_row]
+        found = None if sound is None or len(sound) < 2 else contacts(scene, sound)
         if found is not None and len(found):
             worst = {name: _worst(found[name].fillna(0.0).tolist(), found["start"].tolist()) for name in RESIDUALS}
             rows.append({"engine": engine, "contacts": str(len(found)), **worst})

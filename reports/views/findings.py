@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 CONVERGING = frozenset({"passed", "measured", "no_truth"})
 """Verdicts that are no finding."""
-MOST_NAMED = 4
+MOST_NAMED = 3
 """Scenes, metrics or engines that a sentence names; of more it has the number."""
 SAME_SIZE = 0.999
 """Errors count as equal above this share of the largest one."""
@@ -272,7 +272,7 @@ def _cost(engine: str, times: Mapping[str, float]) -> list[str]:
     timed = {label: time for label, time in times.items() if not math.isnan(time)}
     if engine not in timed:
         return []
-    absolute = f"{duration(float(f'{timed[engine]:.2g}'))} per time step"
+    absolute = f"{duration(float(f'{timed[engine]:.2g}'))} per step"
     fastest = min(timed, key=timed.__getitem__)
     ratio = float(f"{timed[engine] / timed[fastest]:.2g}")
     return [absolute if engine == fastest or ratio == 1.0 else f"{absolute}, {ratio:g} times that of {fastest}"]

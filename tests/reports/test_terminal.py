@@ -125,9 +125,9 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
         assert (f", declines {words.count('declined')};" in of[engine][0]) == ("declined" in words)
         for status in set(words) - {"converges", "declined"}:
             assert f"{status} in {words.count(status)}" in of[engine][0]
-    assert of["document"][0].endswith(" ns per time step.")
+    assert of["document"][0].endswith(" ns per step.")
     for engine in ("mujoco", "pybullet"):
-        seconds, ratio = re.search(r"; ([\d.]+) µs per time step, ([\d.]+) times that of document\.$", of[engine][0]).groups()
+        seconds, ratio = re.search(r"; ([\d.]+) µs per step, ([\d.]+) times that of document\.$", of[engine][0]).groups()
         fastest = float(re.search(r"([\d.]+) ns per", of["document"][0])[1])
         assert float(ratio) * fastest == pytest.approx(1e3 * float(seconds), rel=0.1)
 

@@ -375,7 +375,7 @@ def test_batch_that_differs_from_single_simulations_fails(fault):
 
 def test_lost_symmetry_is_noted_with_its_first_step():
     """A hidden acceleration along an axis of the world."""
-    pushed = documented((RETURN, f"x = x + np.array([1e-6 * self.data.time, 0.0, 0.0])\n        {RETURN}"))
+    pushed = documented((RETURN, f"x = x + np.array([1e-2 * self.data.time, 0.0, 0.0])\n        {RETURN}"))
     outcome, message = not_passed(pushed, "symmetries")["symmetries"]
     assert outcome == "noted"
     assert "turned by 90°: by " in message

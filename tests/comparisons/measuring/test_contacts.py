@@ -132,6 +132,11 @@ def test_contacts_are_listed_with_impulse_and_energy():
     assert not found[list(RESIDUALS)].to_numpy().any()
 
 
+def test_motion_without_a_contact_has_an_empty_list():
+    scene, motion = exact("drop-ball")
+    assert ds.contacts(scene, motion[:100]).empty
+
+
 def test_contacts_without_a_floor_are_refused():
     with pytest.raises(ds.DropspinError, match="spin-principal: the forces of the floor need a scene with a floor and without damping"):
         ds.contacts(ds.load("spin-principal"), ds.simulate("spin-principal", "mujoco", dt=1e-2))

@@ -175,7 +175,10 @@ def test_scene_without_truth_is_measured_by_invariants():
     found = ds.run([scene.model_copy(update={"expect": ()})], ["document[law=coulomb]", "pybullet"], [2e-3])
     own, pairs = found.table, found.agreements
     assert set(own["verdict"]) == {"measured", "no_truth"}
-    assert set(own[own["verdict"] == "measured"]["metric"]) == {"energy_drift", "energy_gain", "penetration"}
+    assert set(own[own["verdict"] == "measured"]["metric"]) == {
+        *("energy_drift", "energy_gain", "penetration"),
+        *("contact_pull", "friction_cone_excess", "friction_push", "contact_gap"),
+    }
     assert set(pairs["metric"]) == {"energy_error"}
     assert (pairs["value"].abs() < 1e-12).all()  # up to the first contact both fall freely
 

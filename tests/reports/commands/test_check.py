@@ -118,7 +118,7 @@ def test_an_engine_that_can_no_longer_be_imported_loses_its_accepted_results(rep
     done = dropspin("check", "out", *BASELINE, "--junit", "junit.xml", "--summary", "summary.md", cwd=tmp_path)
     assert done.returncode == 3
     assert "✗ spin-principal · my_engine:MyEngine · 0.008 s: missing. my_engine:MyEngine needs the module no_such_library" in done.stdout
-    assert "54 of 54 accepted results fail." in done.stdout
+    assert "66 of 66 accepted results fail." in done.stdout
     junit_schema.validate(tmp_path / "junit.xml")
     assert (tmp_path / "summary.md").read_text().startswith("## dropspin: ✗")
 
@@ -131,11 +131,11 @@ def expecting(metric):
 @pytest.mark.parametrize(
     ("metric", "accepted", "outcome"),
     [
-        ("penetration", [], ["1 known failure, not counted as failed.", "All 11 accepted results hold."]),
+        ("penetration", [], ["1 known failure, not counted as failed.", "All 15 accepted results hold."]),
         (
             "energy_error_raw",
             ["1 failing check has no comparable result and cannot be accepted."],
-            ["1 of 1 checks fail. All 11 accepted results hold."],
+            ["1 of 1 checks fail. All 15 accepted results hold."],
         ),
     ],
 )

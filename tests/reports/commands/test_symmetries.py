@@ -22,11 +22,15 @@ def test_table_sentences_and_files(tmp_path):
     assert any(line.startswith("mujoco[profile=default], turned by 1 rad: another motion in slide-box, from step ") for line in lines)
     assert any(line.startswith("Not run: document in slide-box: law=note has no Coulomb coefficient") for line in lines)
     assert "✓ kept up to rounding" in done.stdout
-    assert done.stdout.endswith("Written: out/symmetries/symmetries.md\n")
+    assert lines[-2:] == [
+        "Written: out/symmetries/symmetries.md",
+        "Replay of the worst case of each engine: out/symmetries/symmetries.html",
+    ]
     folder = tmp_path / "out/symmetries"
-    assert {path.name for path in folder.iterdir()} == {"section.json", "symmetries.csv", "symmetries.json", "symmetries.md"}
+    assert {path.name for path in folder.iterdir()} == {"section.json", *(f"symmetries.{kind}" for kind in ("csv", "html", "json", "md"))}
+    assert "mujoco[profile=default], " in (folder / "symmetries.html").read_text()
     rows = json.loads((folder / "symmetries.json").read_text())
-    assert {row["symmetry"] for row in rows} <= set(NAMES)
+    assert {row["symmetry"] for row in rows if not row["symmetry"].startswith("with ")} <= set(NAMES)
     [turned] = [row for row in rows if row["engine"].startswith("mujoco") and row["symmetry"] == "turned by 1 rad"]
     assert turned["status"] == "lost"
     assert turned["time"] == pytest.approx(0.002 * turned["step"])

@@ -13,6 +13,7 @@ from scenarios.truths.impact_laws import LAWS, Law
 from scenarios.truths.rocking import rocking
 from scenarios.truths.rolling import rolling
 from scenarios.truths.slipping import slipping
+from scenarios.truths.top import top
 from scenarios.truths.truth import Impact, Truth
 
 __all__ = ["LAWS", "Impact", "Law", "Truth", "truth_for"]
@@ -38,7 +39,7 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
         raise DropspinError(f"scene: got {scene!r} ({type(scene).__name__}); give a Scenario, as load() returns it.")
     if law is not None:
         return corner_impact(scene, law)
-    for problem in (flight, bounce_ladder, rocking, slipping, corner_impact, coulomb_slide, rolling, coulomb_turn):
+    for problem in (flight, bounce_ladder, rocking, slipping, top, corner_impact, coulomb_slide, rolling, coulomb_turn):
         truth = problem(scene)
         if truth is not None:
             return truth

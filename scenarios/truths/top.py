@@ -1,0 +1,113 @@
+"""Lagrange's top: a body of revolution spins on a tip that a floor of infinite friction holds.
+
+L is the angular momentum about the tip, r the vector from the tip to the centre of mass, of length l, n = r/l, and A and C the moments of
+inertia about the tip across n and along n:
+
+    dL/dt = r × M g        dq/dt = ½ ω q        ω = L/A + (1/C - 1/A) (L·n) n
+
+With the angle θ between n and the vertical, a steady precession at the rate Ω has A Ω² cos θ - C ω·n Ω + M g l = 0. The general motion is a
+precession with nutation; its angles are elliptic integrals of the third kind. Here the equations are integrated numerically.
+
+Source: J. L. Lagrange, Mécanique analytique (1788); E. T. Whittaker, Analytical Dynamics, sections 71 to 73; E. Hairer, S. P. Nørsett &
+G. Wanner, Solving Ordinary Differential Equations I (1993), section II.5, for the integrator DOP853.
+Valid for: a body that touches the floor with one corner, which is at rest, with equal moments of inertia across the line from this corner
+to the centre of mass; infinite friction, gravity straight down, no damping; until the floor would have to pull or another corner touches
+it.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.model import TOUCHING, Scenario
+from scenarios.rotations import multiply, rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from scenarios.truths.truth import Truth
+
+Array = NDArray[np.float64]
+
+EQUAL = 1e-12
+"""Largest difference of moments of inertia, relative to the largest, up to which they count as equal."""
+AT_REST = 1e-12
+"""Speed of the tip that counts as rest, relative to that of the centre of mass."""
+RTOL, ATOL = 3e-14, 1e-15
+"""Tolerances of the integrator, close to the least that double precision allows; the motion is then exact to about 1e-12."""
+SAMPLES_PER_RADIAN = 20
+
+
+def top(scene: Scenario) -> Truth | None:
+    """The exact solution of a top on a corner; None if the scene is no such top."""
+    floor, start, g, body = scene.floor, scene.initial_state, scene.acceleration, scene.body
+    if floor is None or floor.friction != "infinite" or scene.damping is not None or not (g[1] < 0.0 and g[0] == 0.0 and g[2] == 0.0):
+        return None
+    if body.rounding or abs(scene.clearance) > TOUCHING * body.size or not start[SPIN].any():
+        return None
+    heights = rotate(start[ORIENTATION], body.vertices)[:, 1]
+    lowest = np.flatnonzero(heights <= heights.min() + TOUCHING * body.size)
+    if len(lowest) != 1:
+        return None
+    arm = -body.vertices[lowest[0]]  # from the tip to the centre of mass, in the body
+    length = float(np.linalg.norm(arm))
+    axis = arm / length
+    along = float(axis @ body.inertia_tensor @ axis)
+    across = 0.5 * (float(np.trace(body.inertia_tensor)) - along)
+    symmetric = across * np.eye(3) + (along - across) * np.outer(axis, axis)
+    if np.abs(body.inertia_tensor - symmetric).max() > EQUAL * max(along, across):
+        return None
+    tip_velocity = start[VELOCITY] - np.cross(start[SPIN], rotate(start[ORIENTATION], arm))
+    if np.linalg.norm(tip_velocity) > AT_REST * max(float(np.linalg.norm(start[VELOCITY])), float(np.linalg.norm(start[SPIN])) * length):
+        return None
+    return _integrated(scene, arm, along, across + body.mass * length**2, np.delete(body.vertices, lowest[0], axis=0))
+
+
+def _integrated(scene: Scenario, arm: Array, along: float, across: float, others: Array) -> Truth:
+    """The solution from the moments C (`along`) and A (`across`) about the tip, and the corners that are not the tip."""
+    from scipy.integrate import solve_ivp
+
+    start, weight = scene.initial_state, scene.body.mass * scene.acceleration
+    axis = arm / float(np.linalg.norm(arm))
+    tip = start[POSITION] - rotate(start[ORIENTATION], arm)
+
+    def spin_of(orientation: Array, momentum: Array) -> Array:
+        n = rotate(orientation, axis)
+        found: Array = momentum / across + (1.0 / along - 1.0 / across) * np.sum(momentum * n, axis=-1, keepdims=True) * n
+        return found
+
+    def rates(t: float, y: Array) -> Array:
+        q, momentum = y[:4], y[4:]
+        turning = 0.5 * multiply(np.append(spin_of(q, momentum), 0.0), q)
+        return np.concatenate([turning, np.cross(rotate(q, arm), weight)])
+
+    n = rotate(start[ORIENTATION], axis)
+    momentum = across * start[SPIN] + (along - across) * (start[SPIN] @ n) * n
+    solution = solve_ivp(
+        rates,
+        (0.0, scene.duration * (1.0 + 1e-9)),
+        np.concatenate([start[ORIENTATION], momentum]),
+        method="DOP853",
+        rtol=RTOL,
+        atol=ATOL,
+        dense_output=True,
+    ).sol
+
+    def states(t: Array) -> Array:
+        y = solution(t).T
+        orientation = y[:, :4] / np.linalg.norm(y[:, :4], axis=1, keepdims=True)
+        spin, r = spin_of(orientation, y[:, 4:]), rotate(orientation, arm)
+        return np.hstack([tip + r, orientation, np.cross(spin, r), spin])
+
+    statement = "equations of Lagrange's top (1788), integrated numerically (DOP853)"
+    return Truth("top", statement, states, horizon=_horizon(scene, states, tip, others))
+
+
+def _horizon(scene: Scenario, states: Callable[[Array], Array], tip: Array, others: Array) -> float:
+    """The time up to which the floor only pushes, and no other corner touches it [s]."""
+    turned = float(np.linalg.norm(scene.initial_state[SPIN])) * scene.duration
+    times = np.linspace(0.0, scene.duration, 2 + int(SAMPLES_PER_RADIAN * turned))
+    rows = states(times)
+    clear = np.min([rows[:, 1] + rotate(rows[:, ORIENTATION], corner)[:, 1] for corner in others], axis=0) > tip[1]
+    acceleration = np.gradient(rows[:, 8], times)
+    pushes = acceleration > scene.acceleration[1]
+    sound = clear & pushes
+    return scene.duration if sound.all() else float(times[max(0, int(np.argmin(sound)) - 1)])

@@ -12,6 +12,7 @@ from comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckRes
 from comparisons.conformance.probes import PROBES
 from comparisons.conformance.protocol import check_builds, check_claims, check_record, check_refusals, check_settings, check_states
 from comparisons.conformance.symmetries import check_symmetries
+from comparisons.conformance.waiting import check_waiting
 from comparisons.engines.base import Diverged, Engine
 from comparisons.running.entries import present_entry
 from comparisons.running.inputs import EngineEntry
@@ -25,6 +26,7 @@ CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
     "builds what is meant": check_builds,
     "record and advance": check_record,
     "time": check_time,
+    "waiting": check_waiting,
     "velocity lag": check_velocity_lag,
     "repeats": check_repeats,
     "symmetries": check_symmetries,

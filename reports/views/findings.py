@@ -224,7 +224,7 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
             names = [quantity(metric) for metric in opened["metric"].unique()]
             undecided.append(f"{engine} in {_named(scenes, 'scene')} ({', '.join(names[:MOST_NAMED])}{', …' * (len(names) > MOST_NAMED)})")
             hidden |= any(statuses[scene][engine].words != UNDECIDED for scene in scenes)
-    also = ", partly in scenes with a more severe status" if hidden else ""
+    also = ", also in scenes counted otherwise" if hidden else ""
     return [*sentences, *([f"Undecided as dt → 0{also}: {'; '.join(undecided)}."] if undecided else [])]
 
 

@@ -10,13 +10,15 @@ from pathlib import Path
 import pytest
 from support import engines as made
 
-from comparisons.conformance import motion
+from comparisons.conformance import motion, waiting
 from comparisons.conformance.checks import CHECKS, conform, run_check
 from comparisons.conformance.probes import PROBES
 from comparisons.engines.base import KnownLimitation
 from comparisons.engines.pybullet_engine import PyBullet
 from comparisons.engines.registry import engine
+from comparisons.running import recording
 from comparisons.running.inputs import EngineEntry
+from comparisons.running.recording import time_steps
 from comparisons.running.run import run
 from scenarios import load
 from scenarios.errors import UnknownName
@@ -380,3 +382,56 @@ def test_lost_symmetry_is_noted_with_its_first_step():
     assert outcome == "noted"
     assert "turned by 90°: by " in message
     assert " from step " in message
+
+
+class Clock:
+    """A clock that only simulations advance."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def perf_counter(self):
+        return self.now
+
+
+def working_in(clock, while_advancing, while_reading):
+    """An engine whose steps take these times [s] of a clock: in `advance`, and while `state` waits for them."""
+
+    class Working(made.Exact):
+        name = "working"
+
+        def prepare(self, scene, dt):
+            simulation, started = made.ExactSimulation(scene, dt), []
+            advance, state = simulation.advance, simulation.state
+
+            def advanced(steps):
+                clock.now += while_advancing * steps
+                started.append(steps)
+                advance(steps)
+
+            def read():
+                while started:
+                    clock.now += while_reading * started.pop()
+                return state()
+
+            simulation.advance, simulation.state = advanced, read
+            return simulation
+
+    return Working()
+
+
+def test_engine_that_does_not_wait_for_its_steps_is_found(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(waiting, "time", clock)
+    outcome, message = not_passed(working_in(clock, 1e-6, 2e-4), "waiting")["waiting"]
+    assert outcome == "failed"
+    assert message.startswith("advance(256) returned after 0.26 ms, and state() then took 51 ms: the steps were not done; ")
+    assert not_passed(working_in(clock, 2e-4, 0.0), "waiting") == {}
+    assert not_passed(working_in(clock, 2e-4, 1e-5), "waiting") == {}
+
+
+def test_timing_ends_when_the_state_is_there(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(recording, "time", clock)
+    seconds, _ = time_steps(working_in(clock, 1e-6, 2e-4), load("spin-principal"), 1e-3, 10)
+    assert seconds == pytest.approx(10 * (1e-6 + 2e-4))

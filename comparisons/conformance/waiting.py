@@ -1,0 +1,44 @@
+"""The check that `advance` returns when its steps are done: an engine that computes asynchronously must wait for them."""
+
+import time
+from itertools import pairwise
+
+from comparisons.conformance.outcomes import CheckFailed, CheckResult
+from comparisons.conformance.probes import DT
+from comparisons.conformance.short_runs import accepted_scene
+from comparisons.engines.base import Engine, Simulation
+
+LONG_ENOUGH = 0.02
+"""Wall time of the steps [s]; a shorter one could be hidden by the time that it takes to read a state."""
+MOST_STEPS = 1 << 16
+REPEATS = 2
+LARGEST_SHARE = 0.5
+"""Largest share of the time that may be spent waiting for the state."""
+
+
+def check_waiting(engine: Engine, check: str) -> CheckResult:
+    """Most of the time of a run passes in `advance`, not in the first `state` after it."""
+    with engine.prepare(accepted_scene(engine, "turning", "coasting", "falling straight"), DT) as simulation:
+        _timed(simulation, 1)  # the first step may compile
+        steps, stepping, waiting = 64, 0.0, 0.0
+        while stepping + waiting < LONG_ENOUGH and steps < MOST_STEPS:
+            steps *= 4
+            stepping, waiting = _timed(simulation, steps)
+        # Other processes may delay a call now and then.
+        stepping, waiting = min([(stepping, waiting), *(_timed(simulation, steps) for _ in range(REPEATS))], key=lambda times: times[1])
+    if waiting > LARGEST_SHARE * (stepping + waiting) and waiting > LARGEST_SHARE * LONG_ENOUGH:
+        raise CheckFailed(
+            f"advance({steps}) returned after {1e3 * stepping:.2g} ms, and state() then took {1e3 * waiting:.2g} ms: the steps were not "
+            "done; wait for them in advance (JAX: block_until_ready; Warp: synchronize)"
+        )
+    return CheckResult(check, "passed", "advance returns when its steps are done")
+
+
+def _timed(simulation: Simulation, steps: int) -> tuple[float, float]:
+    """The wall times of `advance`, and of the first `state` after it beyond that of the second one [s]."""
+    times = [time.perf_counter()]
+    for call in (lambda: simulation.advance(steps), simulation.state, simulation.state):
+        call()
+        times.append(time.perf_counter())
+    stepping, first, second = (later - earlier for earlier, later in pairwise(times))
+    return stepping, max(first - second, 0.0)

@@ -4,10 +4,10 @@ from comparisons.conformance.outcomes import CheckFailed, CheckResult
 from comparisons.conformance.probes import DT
 from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene
 from comparisons.engines.base import Engine
+from comparisons.measuring.symmetries import BATCH, SYMMETRIES
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.recording import record
-from comparisons.symmetries.catalogue import SYMMETRIES
-from comparisons.symmetries.study import BATCH, Finding, findings_of
+from comparisons.symmetries.study import Finding, findings_of
 from scenarios.transformations import whole_steps
 
 
@@ -23,7 +23,8 @@ def check_symmetries(engine: Engine, check: str) -> CheckResult:
         named = "; ".join(f"{name}: by {one.difference:.2g} from step {one.step} on" for name, one in lost.items())
         return CheckResult(check, "noted", f"the motion differs if the scene is transformed; {named} (dropspin symmetries shows more)")
     compared = {one.symmetry for one in found if one.status != "not run"} & set(SYMMETRIES)
-    return CheckResult(check, "passed", f"{len(compared)} symmetries are kept, in flight and with the floor; a batch gives the same bits")
+    scenes = " and ".join(dict.fromkeys(one.scene for one in found))
+    return CheckResult(check, "passed", f"{len(compared)} symmetries are kept in {scenes}; a batch gives the same bits")
 
 
 def _found(engine: Engine, *preferred: str) -> list[Finding]:

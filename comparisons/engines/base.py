@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.measuring.symmetries import REPRESENTED
 from scenarios import Scenario, Truth
 from scenarios.body import Box, Sphere
 from scenarios.errors import DropspinError, UnknownName
@@ -146,8 +147,6 @@ class NumericOption(NamedTuple):
 
 FEWEST_VALUES = 3
 """Values of an option that sets the accuracy: extrapolation needs as many."""
-REPRESENTED = "with "
-"""How the name of another representation begins, such as `with body=mesh`."""
 PROFILES = ("calibrated", "default")
 """Settings that reproduce the scene as closely as the engine can; and the engine's defaults, with only the obvious settings made."""
 LATE_IMPACTS = "impacts detected late"

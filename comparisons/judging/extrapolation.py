@@ -121,7 +121,7 @@ class Posterior:
         return abs(median), lower, upper
 
     def _below(self, x: Array) -> Array:
-        """Probability of an m other than 0 below each x."""
+        """The probability that m is not 0 and at most x, at each x."""
         points = np.where(self.squares, np.abs(x[:, None]) * x[:, None], x[:, None])
         found: Array = student_t(self.freedom, (points - self.centres) / self.widths) @ self.weights
         return found

@@ -2,18 +2,19 @@
 
 The impulse of the floor in a time step, and its moment about the vertical, follow from the states before and after it:
 
-    J = M (v₁ - v₀ - g dt)        τ = Y·(L₁ - L₀)
+    J = M (v₁ - v₀ - g dt) = N Y + F        τ = Y·(L₁ - L₀)
 
-These laws hold for any number of contact points in the plane of the floor, and for any restitution from 0 to 1:
+The laws of time-stepping methods hold for any number of contact points in the plane of the floor:
 
-    J·Y >= 0                      the floor does not pull (A. Signorini, 1933)
-    |J - Y (J·Y)| <= f J·Y        friction is within its cone, because each contact's is (C. A. Coulomb, 1785)
-    J·u + τ ω·Y <= 0              friction opposes the slip that is left (maximal dissipation; J. J. Moreau, 1988)
+    N >= 0                  the floor does not pull (A. Signorini, 1933)
+    |F| <= f N              friction is within its cone, because that of each contact is (C. A. Coulomb, 1785)
+    F·u + τ ω·Y <= 0        friction opposes the slip that is left (maximal dissipation; J. J. Moreau, 1988)
 
 with the velocity u = v + ω × (-h Y) of the body at the floor, at the distance h below its centre of mass, after the step. The fourth law
 is that the floor acts only where it touches (complementarity): the lowest point is on the floor.
 
-In an impact with friction these laws permit a gain of energy (T. R. Kane, 1984), so that energy is measured separately.
+In an impact with friction these laws permit a gain of energy (T. R. Kane, 1984), so that energy is measured separately. Where the slip
+reverses within an impact, Coulomb's law at each instant (E. J. Routh, 1860) may leave a slip along F, against the third law.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Tolerances: the largest difference of a result between two runs that is no change, derived from how the result was measured.
+"""Tolerances: how much a result may differ between two runs before it counts as changed. They follow from how it was measured.
 
     metrics              rounding over the time steps, and sampling noise: the impact of one start phase may move to the neighbouring step.
                          If there is only one start, or if the body starts on the floor, sampling noise is replaced by the effect of

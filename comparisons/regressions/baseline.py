@@ -16,16 +16,14 @@ import tomlkit
 from pydantic import Field
 from tomlkit.items import InlineTable, Item
 
-from comparisons.engines.base import REPRESENTED
 from comparisons.measuring.metrics import METRICS
+from comparisons.measuring.symmetries import kind_of
 from comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.output import written_whole
 from comparisons.results.provenance import digest, versions_behind
 from comparisons.results.results import Results
 from comparisons.results.stored_table import OF_SYMMETRIES
-from comparisons.symmetries.rows import kind_of
-from comparisons.symmetries.study import NAMES
 from scenarios import DropspinError
 from scenarios.body import Table
 from scenarios.errors import did_you_mean
@@ -279,9 +277,9 @@ def _metric_and_kind(where: str, name: str) -> tuple[str, str]:
         return name, METRICS[name].kind
     if name in ENSEMBLE_METRICS:
         return name, "ensemble"
-    if name in NAMES or name.startswith(REPRESENTED):
-        return name, kind_of(name)
-    for ending, kind in SUFFIXES.items():
+    if (kind := kind_of(name)) is not None:
+        return name, kind
+    for ending, of_suffix in SUFFIXES.items():
         if name.removesuffix(ending) in METRICS and name.endswith(ending):
-            return name.removesuffix(ending), kind
+            return name.removesuffix(ending), of_suffix
     raise DropspinError(f"{where}: no such result.{did_you_mean(name, [*METRICS, *ENSEMBLE_METRICS])}")

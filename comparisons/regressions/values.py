@@ -9,6 +9,7 @@ import pandas as pd
 from comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
 from comparisons.judging.verdicts import BREAKDOWNS
 from comparisons.results.results import Results
+from comparisons.results.stored_table import OF_SYMMETRIES
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
 """The columns that identify a result; `steps` is the time step as text, or, for orders and asymptotic errors, all time steps used."""
@@ -44,9 +45,11 @@ def step_names(results: Results) -> pd.Series:
 
 
 def asked_for(held: pd.DataFrame, results: Results) -> pd.DataFrame:
-    """The results of scenes, engines and time steps that were requested in a run."""
+    """The results of scenes, engines and time steps that were requested in a run, and of symmetries if it has any."""
     steps = {_all_steps(results), *map(repr, _dts(results))}
-    return held[held["scene"].isin(list(results.scenes)) & held["engine"].isin(results.engines) & held["steps"].isin(steps)]
+    mine = held[held["scene"].isin(list(results.scenes)) & held["engine"].isin(results.engines) & held["steps"].isin(steps)]
+    has_symmetries = results.table["kind"].isin(OF_SYMMETRIES).any()
+    return mine if has_symmetries else mine[~mine["kind"].isin(OF_SYMMETRIES)]
 
 
 def broke_down(rows: pd.DataFrame, results: Results) -> "pd.Series[bool]":

@@ -126,9 +126,9 @@ class Results:
             return self.measurements.iloc[:0].set_index("engine")
         found = self.measurements
         mine = found[(found["scene"] == scene) & found["value"].notna()]
-        finest = mine[mine["dt"] == mine["dt"].min()]
-        metric = self._metric_of_findings(finest) or leading_metric(self.scenes[scene])
-        return finest[finest["metric"] == metric].set_index("engine")
+        metric = self._metric_of_findings(mine[mine["dt"] == mine["dt"].min()]) or leading_metric(self.scenes[scene])
+        shown = mine[mine["metric"] == metric]
+        return shown[shown["dt"] == shown["dt"].min()].set_index("engine")
 
     def _metric_of_findings(self, rows: pd.DataFrame) -> str:
         """The metric of the largest error, relative to its scale, among those that set a status; empty if there is none."""

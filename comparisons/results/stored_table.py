@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 
 from comparisons.judging.verdicts import VERDICTS
 from comparisons.measuring.metrics import METRICS
+from comparisons.measuring.symmetries import kind_of
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.measurement import COLUMNS, Kind
 from scenarios import Scenario
@@ -20,7 +21,7 @@ _ARROW = {"str": (pa.string(), pa.large_string()), "float64": (pa.float64(),), "
 
 
 OF_SYMMETRIES = ("symmetry", "determinism")
-"""Kinds whose rows have the name of a symmetry for a metric; adapters may add names, such as `with body=mesh`."""
+"""Kinds whose rows have the name of a symmetry, or of a repeated run, for a metric."""
 
 
 def loaded_table(content: bytes, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float]) -> pd.DataFrame:
@@ -57,7 +58,7 @@ def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Co
         "engine": engines,
         "verdict": VERDICTS,
         "kind": [kind for kind in get_args(Kind) if kind != "baseline"],  # which checks add
-        "metric": {"", *METRICS, *ENSEMBLE_METRICS, *rows.loc[rows["kind"].isin(OF_SYMMETRIES), "metric"]},
+        "metric": {"", *METRICS, *ENSEMBLE_METRICS, *filter(kind_of, rows["metric"])},
         "dt": {*dts, np.nan},
     }
     for name, known in allowed.items():
@@ -88,8 +89,8 @@ def _verify_kind(kind: str, metric: str, unit: str) -> None:
     """Raise `ValueError` if no row has this kind of this metric in this unit."""
     if metric == "":
         kinds, own = {""}, ""
-    elif kind in OF_SYMMETRIES:
-        kinds, own = {kind}, "1"
+    elif (of_symmetry := kind_of(metric)) is not None:
+        kinds, own = {of_symmetry}, "1"
     elif metric in ENSEMBLE_METRICS:
         kinds, own = {"ensemble", "agreement"}, ENSEMBLE_METRICS[metric].unit
     else:

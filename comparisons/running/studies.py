@@ -89,7 +89,7 @@ def _with_accuracy_options(
     processes: EngineProcesses,
     on_progress: OnProgress,
 ) -> Studies:
-    """The studies; where the time step alone does not make an error vanish, with the accuracy options refined too."""
+    """The convergence studies; if an error does not vanish with the time step alone, accuracy options are refined with it."""
     refined = engine.refined(dts)
     series = _series([one for dt, finer in refined for one in _measured_at(own, engine_entry(finer), dt, processes, on_progress)])
     again = {

@@ -1,4 +1,4 @@
-"""Consecutive jobs of a sweep: side by side where possible, else one after the other."""
+"""Consecutive jobs of a sweep: in one batch if the engine can simulate batches, otherwise one after the other."""
 
 import numpy as np
 

@@ -7,7 +7,7 @@ bit.
 """
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
@@ -15,20 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine
+from comparisons.judging.verdicts import Verdict
 from comparisons.measuring.differences import differences
+from comparisons.measuring.symmetries import AGAIN, AWAY, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
 from comparisons.measuring.tolerances import FEW_DRAWS, MATTERS, PERTURBATION, ULPS_PER_STEP, perturbed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
-from comparisons.running.recording import Breakdown, classify, record_batch, try_record
-from comparisons.symmetries.catalogue import SYMMETRIES, Symmetry
+from comparisons.running.recording import Breakdown, classify, divergence, record_batch, try_record
+from reference_impl.threads import usable_cores
 from scenarios import DropspinError, Scenario
-from scenarios.state import RATES
+from scenarios.state import POSITION, RATES
 from scenarios.transformations import whole_steps
 
 Array = NDArray[np.float64]
 Effects = Callable[[], list[Array]]
 """A function that runs an engine from perturbed starts and returns the differences from its motion, each of shape (n,)."""
+Pairs = Sequence[tuple[Array, Array]]
+"""Motions that should be equal, states of shape (n, 13)."""
 Status = Literal["kept", "rounding", "nearly kept", "lost", "not run"]
 STATUSES: tuple[Status, ...] = get_args(Status)
 """From the best to the worst. Kept: rounding explains the difference, which is up to 1e-5 of the motion's sizes and speeds. Rounding:
@@ -41,20 +45,12 @@ SCENES = ("spin-asymmetric", "drop-ball-backspin", "drop-box-anyhow", "drop-box-
 ENGINES = ("document", "mujoco", "pybullet")
 DT = 1e-3  # s
 RESOURCES = ResourceLimits(processor_time=60.0)
-AGAIN, BATCH, HALVES, NEW_PROCESS, ONE_CORE = "again", "in a batch", "in two halves", "in a new process", "on one core"
-REPEATS = (AGAIN, BATCH, NEW_PROCESS, ONE_CORE, HALVES)
-"""Runs of the same scene: after others in the same process, together with two others, in a new process, in a batch on one processor, and
-stopped and continued.
-"""
-BITWISE = (AGAIN, BATCH, NEW_PROCESS, ONE_CORE)
-"""Those that must give the same bits; a new simulation may continue from a state with other rounding errors."""
-NAMES = (*SYMMETRIES, *REPEATS)
 ULPS = 1000.0
 """Rounding errors of a single time step, in ulp of the scene's sizes and speeds, which some engines make in their transformations."""
 BY_CHANCE = 3.0
 """Factor on the largest effect of a few perturbations, if it is so large that it is due to chance."""
 FASTER = (1.001, 1.002)
-"""Factors on the initial velocities of the other simulations of a batch."""
+"""Factors on the initial velocities of the other simulations of a batch, which also start as many thousandths of the body's size away."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +66,7 @@ class Finding:
         step: The first time step at which rounding does not explain the difference; None if it does at all steps.
         time: The time of this step [s]; NaN if there is none.
         reason: Why there is no motion to compare; otherwise empty.
+        verdict: The verdict on the run that gave no motion, such as `declined` or `crashed`; otherwise empty.
         motions: If the symmetry is lost, the engine's motion and the one that should equal it, states of shape (n, 13).
     """
 
@@ -81,6 +78,7 @@ class Finding:
     step: int | None = None
     time: float = float("nan")
     reason: str = ""
+    verdict: Verdict | Literal[""] = ""
     motions: tuple[Array, Array] | None = field(default=None, repr=False, compare=False)
 
 
@@ -123,25 +121,30 @@ def symmetries(
 
 
 def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float) -> list[Finding]:
-    """All findings for one engine and one scene."""
+    """All findings for one engine and one scene; a crash costs those that one process would have given."""
     none = Finding(scene.name, entry.label, "", "not run")
     if entry.engine is None:
-        return [replace(none, symmetry=name, reason=entry.reason) for name in NAMES]
+        absence: Verdict = entry.absence or "missing"
+        return [replace(none, symmetry=name, reason=entry.reason, verdict=absence) for name in NAMES]
     try:
         own, found = processes.call(entry, _compare, scene, dt)
-        if isinstance(own, Breakdown):
-            return [replace(none, symmetry=name, reason=own.reason) for name in NAMES]
-        for name, again in IN_NEW_PROCESSES.items():
-            processes.renew(entry)
-            fresh, repeated = processes.call(entry, again, scene, dt), replace(none, symmetry=name)
-            if isinstance(fresh, Breakdown):
-                found.append(replace(repeated, reason=fresh.reason))
-            else:
-                found.append(_judged(repeated, scene, dt, own, fresh, None))
-        processes.renew(entry)  # the last one may use one processor only
     except Failed as failure:
-        return [replace(none, symmetry=name, reason=failure.reason) for name in NAMES]
+        own, found = Breakdown(failure.verdict, failure.reason), []
+    if isinstance(own, Breakdown):
+        return [_not_run(replace(none, symmetry=name), own) for name in NAMES]
+    for name, again in IN_NEW_PROCESSES.items():
+        repeated = replace(none, symmetry=name)
+        try:
+            processes.renew(entry)
+            found.append(processes.call(entry, again, scene, dt, own, repeated))
+        except Failed as failure:
+            found.append(_not_run(repeated, Breakdown(failure.verdict, failure.reason)))
+    processes.renew(entry)  # the last one may use one processor only
     return found
+
+
+def _not_run(none: Finding, broken: Breakdown) -> Finding:
+    return replace(none, reason=broken.reason, verdict=broken.verdict)
 
 
 def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array | Breakdown, list[Finding]]:
@@ -162,83 +165,87 @@ def findings_of(entry: EngineEntry, scene: Scenario, dt: float, names: Iterable[
 def _finding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
     """One finding; `none` is that of a symmetry that cannot be compared."""
     try:
-        other, perturbations = _other(entry, scene, dt, own, none.symmetry)
-    except DropspinError as error:
-        return replace(none, reason=str(error))
+        pairs, effects = _pairs(entry, scene, dt, own, none.symmetry)
+        return _judged(none, scene, dt, pairs, effects, entry.adapter.precision)
+    except _NotComparable as error:
+        return _not_run(none, error.breakdown)
+    except DropspinError as error:  # the transformed scene is no valid scene
+        return _not_run(none, Breakdown("declined", str(error)))
     except Exception as error:  # an engine is somebody else's code
-        return replace(none, reason=classify(error).reason)
-    if isinstance(other, Breakdown):
-        return replace(none, reason=other.reason)
-    try:
-        return _judged(none, scene, dt, own, other, perturbations, entry.adapter.precision)
-    except Exception as error:  # the engine runs again from perturbed starts
-        return replace(none, reason=classify(error).reason)
+        return _not_run(none, classify(error))
 
 
-def _other(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> tuple[Array | Breakdown, Effects | None]:
-    """The states that should equal the engine's own, and the function that measures effects of rounding; None if it has no effect."""
+class _NotComparable(Exception):
+    """A run gave no motion."""
+
+    def __init__(self, breakdown: Breakdown) -> None:
+        super().__init__(breakdown.reason)
+        self.breakdown = breakdown
+
+
+def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> tuple[Pairs, Effects | None]:
+    """The motions that should be equal, and the function that measures effects of rounding; None if it has no effect."""
     if name == AGAIN:
-        return _states(entry, scene, dt), None
-    if name not in NAMES:
-        other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
-        if (reason := other.adapter.declines(scene)) is not None:
-            raise DropspinError(reason)
-        return _states(other, scene, dt), lambda: _effects(entry, scene, dt, own, _perturbed(scene, entry))
+        return [(own, _motion(entry, scene, dt))], None
+    if name in SYMMETRIES:
+        return _transformed(entry, scene, dt, own, SYMMETRIES[name])
+    if name == HALVES:
+        return _halves(entry, scene, dt, own)
     if name == BATCH:
-        return _batched(entry, scene, dt), None
-    return _halves(entry, scene, dt, own) if name == HALVES else _transformed(entry, scene, dt, own, SYMMETRIES[name])
+        return _batched(entry, scene, dt, own), None
+    other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
+    return [(own, _motion(other, scene, dt))], lambda: _effects(entry, scene, dt, own, _perturbed(scene, entry))
 
 
-def _batched(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
-    """The states of a scene that is run in a batch with two others; differences of the others from single runs are added to them."""
-    start = scene.initial_state
-    others = [scene.starting_at(np.concatenate([start[:7], start[RATES] * share])) for share in FASTER]
-    states, *batched = [motion.states for motion in record_batch(entry.adapter, [scene, *others], dt)]
-    for other, together in zip(others, batched, strict=True):
-        alone = _states(entry, other, dt)
-        if isinstance(alone, Breakdown):
-            return alone
-        states = states + np.abs(together - alone)  # without a difference, its bits stay
-    return states
+def _batched(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> Pairs:
+    """Of a scene and two others: the motions of single runs, and those of a batch."""
+    others = []
+    for share in FASTER:
+        start = scene.initial_state
+        start[POSITION] += (share - 1.0) * scene.body.size * AWAY
+        start[RATES] *= share
+        others.append(scene.starting_at(start))
+    together = [motion.states for motion in record_batch(entry.adapter, [scene, *others], dt)]
+    return list(zip([own, *(_motion(entry, other, dt) for other in others)], together, strict=True))
 
 
-def _on_one_core(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
-    """The same in a process that may use one processor, so that engines that share work among threads have one."""
-    if not hasattr(os, "sched_setaffinity"):
-        return Breakdown("declined", "this system cannot restrict a process to one processor")
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    return _batched(entry, scene, dt)
-
-
-def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple[Array | Breakdown, Effects | None]:
-    """The states of a scene that is stopped half way and continued."""
+def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple[Pairs, Effects]:
+    """A motion that is stopped half way and continued."""
     half = len(own) // 2
     nominal = whole_steps(scene, dt, len(own) - 1 - half).starting_at(own[half])
-    rest = _states(entry, nominal, dt)
-    if isinstance(rest, Breakdown):
-        return rest, None
+    rest = _motion(entry, nominal, dt)
 
     def of_rest() -> list[Array]:
         effects = _effects(entry, nominal, dt, rest, _perturbed(nominal, entry))
         return [np.concatenate([np.zeros(half), effect]) for effect in effects]
 
-    return np.concatenate([own[:half], rest]), of_rest
+    return [(own, np.concatenate([own[:half], rest]))], of_rest
 
 
-def _transformed(
-    entry: EngineEntry, scene: Scenario, dt: float, own: Array, symmetry: Symmetry
-) -> tuple[Array | Breakdown, Effects | None]:
-    """The states of a transformed scene, transformed back."""
+def _transformed(entry: EngineEntry, scene: Scenario, dt: float, own: Array, symmetry: Symmetry) -> tuple[Pairs, Effects]:
+    """The motion of a transformed scene, transformed back."""
     times, transformed = dt * np.arange(len(own), dtype=float), symmetry.transformed(scene)
-    states = _states(entry, transformed, symmetry.time * dt)
-    if isinstance(states, Breakdown):
-        return states, None
+    states = _motion(entry, transformed, symmetry.time * dt)
 
     def of_transformed() -> list[Array]:
         starts = [symmetry.back(times[:1], start.initial_state[np.newaxis])[0] for start in _perturbed(transformed, entry)]
         return _effects(entry, scene, dt, own, map(scene.starting_at, starts))
 
-    return symmetry.back(times, states), of_transformed
+    return [(own, symmetry.back(times, states))], of_transformed
+
+
+def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
+    """The finding of a run in a process that did nothing before."""
+    return replace(_finding(entry, scene, dt, own, replace(none, symmetry=AGAIN)), symmetry=none.symmetry)
+
+
+def _on_one_core(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
+    """The finding of a batch in a process all of whose threads may use one processor."""
+    if not hasattr(os, "sched_setaffinity") or usable_cores() == 1:
+        return _not_run(none, Breakdown("declined", "the process cannot be restricted to fewer processors"))
+    for thread in os.listdir("/proc/self/task"):
+        os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
+    return replace(_finding(entry, scene, dt, own, replace(none, symmetry=BATCH)), symmetry=none.symmetry)
 
 
 def _effects(entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario]) -> list[Array]:
@@ -252,18 +259,31 @@ def _perturbed(scene: Scenario, entry: EngineEntry) -> list[Scenario]:
     return [one for [one] in perturbed(scene, [scene], entry.adapter.precision)]
 
 
+def _motion(entry: EngineEntry, scene: Scenario, dt: float) -> Array:
+    """The states of an engine's motion at each time step, shape (n, 13).
+
+    Raises:
+        _NotComparable: There is no motion.
+    """
+    states = _states(entry, scene, dt)
+    if isinstance(states, Breakdown):
+        raise _NotComparable(states)
+    return states
+
+
 def _states(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
     """The states of an engine's motion at each time step, shape (n, 13), or why there are none."""
     recording = try_record(entry.adapter, scene, dt)
-    return recording if isinstance(recording, Breakdown) else recording.motion.states
+    if isinstance(recording, Breakdown):
+        return recording
+    return divergence(recording.motion) or recording.motion.states
 
 
-def _judged(
-    none: Finding, scene: Scenario, dt: float, own: Array, other: Array, effects: Effects | None, precision: type = np.float64
-) -> Finding:
-    """A finding with its status; where rounding has no effect, the two motions must be equal bit for bit."""
-    difference = differences(scene, own, other)
-    largest, steps = float(difference.max()), np.arange(len(own), dtype=float)
+def _judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Effects | None, precision: type) -> Finding:
+    """A finding with its status; where rounding has no effect, the motions of each pair must be equal bit for bit."""
+    of_pairs = [differences(scene, *pair) for pair in pairs]
+    difference: Array = np.max(of_pairs, axis=0)
+    largest, steps = float(difference.max()), np.arange(len(difference), dtype=float)
     allowed, ulp = np.zeros_like(difference), float(np.finfo(precision).eps)
     if effects is not None:
         allowed = ulp * (ULPS + ULPS_PER_STEP * steps)
@@ -279,9 +299,9 @@ def _judged(
     # What perturbations explain does not count, even if it is large.
     unexplained = float(difference[beyond].max())
     status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
-    motions = (own, other) if status == "lost" else None
+    motions = pairs[int(np.argmax([one.max() for one in of_pairs]))] if status == "lost" else None
     return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)
 
 
-IN_NEW_PROCESSES = {NEW_PROCESS: _states, ONE_CORE: _on_one_core}
+IN_NEW_PROCESSES = {NEW_PROCESS: _in_new_process, ONE_CORE: _on_one_core}
 """Runs of the same scene in processes that did nothing before."""

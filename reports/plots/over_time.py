@@ -112,5 +112,7 @@ def _drawn(line: Line, times: Array) -> Line:
     if constant or not finite.any() or missed.mean() <= MOST_MISSED:
         return Line(line.label, x, y, line.colour, line.width, line.dashes)
     parts = np.split(line.y, shown[1:])
-    low, high = (np.array([reduce(part) for part in parts]) for reduce in (np.nanmin, np.nanmax))
+    low, high = (
+        np.array([reduce(part) for part in parts]) for reduce in (np.fmin.reduce, np.fmax.reduce)
+    )  # without NaN, as far as there is a number
     return Line(line.label, x, 0.5 * (low + high), line.colour, line.width, line.dashes, low=low, high=high, is_fill=True)

@@ -1,5 +1,7 @@
 """The contacts of a scene: for each engine, the largest violation of each law of contact, and the time of the contact that has it."""
 
+import math
+
 import numpy as np
 
 from comparisons.measuring.contacts import RESIDUALS, contacts
@@ -24,12 +26,14 @@ def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
         sound = None if motion is None else motion[: motion.first_bad_row]
         found = None if sound is None or len(sound) < 2 else contacts(scene, sound)
         if found is not None and len(found):
-            worst = {name: _worst(found[name].fillna(0.0).tolist(), found["start"].tolist()) for name in RESIDUALS}
+            worst = {name: _worst(found[name].tolist(), found["start"].tolist()) for name in RESIDUALS}
             rows.append({"engine": engine, "contacts": str(len(found)), **worst})
     return rows
 
 
 def _worst(values: list[float], times: list[float]) -> str:
-    """The largest value, with its time [s] unless it is 0."""
+    """The largest value, with its time [s] unless it is 0; – if a value is undefined, as the cone of infinite friction is."""
+    if any(map(math.isnan, values)):
+        return "–"
     largest = max(values)
     return "0" if largest == 0.0 else f"{formatted(largest)} at {times[values.index(largest)]:.4g} s"

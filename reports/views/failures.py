@@ -8,9 +8,9 @@ from typing import Any
 
 from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import FAILURES
+from comparisons.measuring.symmetries import kind_of
 from comparisons.regressions.parameters import WrongParameter, wrong_parameters
 from comparisons.results.results import Results
-from comparisons.results.stored_table import OF_SYMMETRIES
 from comparisons.running.processes import ResourceLimits
 from reports.views.numbers import bound, formatted, step, subject, word
 
@@ -105,7 +105,7 @@ def _failure(results: Results, group: list[Row], baseline: str | None) -> Failur
         reproduce=reproduce(results, row, baseline),
         broke_down=row["verdict"] not in FAILURES,
         accepted=row["kind"] == "baseline",
-        of_symmetry=row["kind"] in OF_SYMMETRIES,
+        of_symmetry=kind_of(row["metric"]) is not None,
     )
 
 
@@ -173,7 +173,7 @@ def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
     """The command that measures a row again, or the Python call if the scene or the engine was given as an object."""
     dts = None if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
     of_baseline = baseline if row["kind"] == "baseline" else None
-    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, of_baseline, symmetries=row["kind"] in OF_SYMMETRIES)
+    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, of_baseline, symmetries=kind_of(row["metric"]) is not None)
 
 
 def reproduce_scenes(

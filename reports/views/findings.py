@@ -252,8 +252,10 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
     """The largest of some errors relative to their scales, with the scenes in which it has this size; empty if there are none."""
     if errors.empty:
         return ""
-    first = errors.to_dict("records")[int(np.argmax(relative_sizes(errors, results.scenes)))]
-    equal = errors[(errors["metric"] == first["metric"]) & (errors["value"].abs() > SAME_SIZE * abs(first["value"]))]
+    sizes = np.array(relative_sizes(errors, results.scenes))
+    first = errors.to_dict("records")[int(np.argmax(sizes))]
+    similar = errors["value"].abs().between(SAME_SIZE * abs(first["value"]), abs(first["value"]) / SAME_SIZE)
+    equal = errors[(errors["metric"] == first["metric"]) & (sizes > SAME_SIZE * sizes.max()) & similar]
     of = "" if first["unit"] == "1" else f" {first['unit']}"
     names = _named(list(equal["scene"].unique()), "scene")
     return f"; largest error {quantity(first['metric'])} {formatted(abs(first['value']))}{of} at dt = {in_ms(first['dt'])} in {names}"

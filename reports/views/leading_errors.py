@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+import pandas as pd
 from scipy.stats import gmean
 
 from comparisons.measuring.metrics import METRICS
@@ -58,13 +59,12 @@ def leading_errors(results: Results) -> dict[str, Leading]:
 def step_times(results: Results) -> dict[str, float]:
     """The time per step [s], by engine: the geometric mean over the scenes and time steps in which all engines were timed.
 
-    Ratios of these times are therefore the geometric means of the ratios. NaN for an engine that was not timed. If there are no scenes and
-    time steps in which all engines were timed, the mean is over those of each engine.
+    Ratios of these times are therefore the geometric means of the ratios. NaN for an engine that was not timed, and for all if there are no
+    scenes and time steps in which all engines were timed.
     """
     timed = results.table[results.table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
     times = timed.pivot(index=["scene", "dt"], columns="engine", values="time_per_step")
-    common = times.dropna()
-    means = (common if len(common) else times).agg(gmean, nan_policy="omit")
+    means = times.dropna().agg(gmean) if len(times.dropna()) else pd.Series(dtype=float)
     return {engine: float(means.get(engine, math.nan)) for engine in results.engines}
 
 

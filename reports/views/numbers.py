@@ -4,6 +4,7 @@ import math
 from functools import cache
 
 from comparisons.judging.verdicts import WORDS
+from comparisons.measuring.symmetries import kind_of
 
 
 def formatted(value: float) -> str:
@@ -69,7 +70,8 @@ def subject(metric: str, kind: str, truth: str = "") -> str:
     """The subject of a row in words, such as `order of orientation error`; for a row of kind `baseline`, that of the accepted result."""
     words = metric.replace("_", " ")
     prefixed = {"order": f"order of {words}", "asymptotic_error": f"asymptotic {words}", "ensemble": f"mean {words}"}
-    prefixed |= {"symmetry": f"difference of the motion {words}", "determinism": f"difference of the motion {words}"}
+    if kind_of(metric) is not None:
+        return f"difference of the motion {words}"
     return prefixed.get(_accepted_kinds().get(truth, kind), words)
 
 

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
-from comparisons.symmetries.study import NAMES, STATUSES, Finding, Status
+from comparisons.measuring.symmetries import NAMES
+from comparisons.symmetries.study import STATUSES, Finding, Status
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
 MARKS: dict[Status, str] = {"kept": "✓", "rounding": "≈", "nearly kept": "~", "lost": "✗", "not run": "–"}

@@ -142,7 +142,7 @@ def _pendulum(rate: float, since_rest: Array, level: Array) -> tuple[Array, Arra
 
 
 def _states(scene: Scenario, stand: Stand, number: NDArray[np.intp], angle: Array, speed: Array) -> Array:
-    """States, shape (n, 13), of rockings by number, shape (n,), at angles ψ [rad] and speeds ψ' [rad/s]."""
+    """States, shape (n, 13), of the rocking motions with these numbers n, at angles ψ [rad] and speeds ψ' [rad/s], shapes (n,)."""
     side = np.where(number % 2 == 0, 1.0, -1.0)[:, None]
     pivot = stand.pivot + np.where(side > 0.0, 0.0, 2.0 * stand.half_width) * stand.outward
     sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]

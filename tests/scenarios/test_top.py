@@ -119,7 +119,19 @@ def test_motion_ends_where_the_floor_would_pull_or_another_corner_touches_it():
     low = falling(falling.horizon)
     corners = H * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     assert (low.position[0, 1] + rotate(low.orientation[0], corners)[:, 1]).min() > -1e-12
-    assert truth_for(cube(lean=0.35, spin=120.0, precession=25.0, nutation=20.0)).horizon < 1.0
+    assert truth_for(cube(lean=0.35, spin=120.0, precession=25.0, nutation=20.0)) is None  # it lifts off at once
+
+
+@pytest.mark.parametrize("duration", [0.5, 1.0, 2.0])
+def test_slow_top_is_known_until_another_corner_strikes(duration):
+    """It falls like a pendulum; the sampled times do not depend on the spin or on the duration."""
+    scene = cube(spin=0.01).model_copy(update={"duration": duration})
+    horizons = truth_for(scene).horizon
+    assert 0.1 < horizons < 0.5
+    corners = H * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    motion = truth_for(scene)(np.linspace(0.0, horizons, 50))
+    for corner in corners:
+        assert (motion.position + rotate(motion.orientation, corner))[:, 1].min() > -1e-12
 
 
 @pytest.mark.parametrize(

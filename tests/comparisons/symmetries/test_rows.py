@@ -1,5 +1,6 @@
 """Findings on symmetries as rows of a run: their verdicts, a stored run, baselines, and the commands that reproduce them."""
 
+import dataclasses
 import datetime
 import itertools
 
@@ -8,8 +9,9 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
+from comparisons.measuring.symmetries import AGAIN, BITWISE, NAMES
 from comparisons.symmetries.rows import with_symmetries
-from comparisons.symmetries.study import AGAIN, BITWISE, NAMES, Finding, symmetries
+from comparisons.symmetries.study import Finding, symmetries
 from reports.views.failures import failures
 
 SCENE, DTS = "spin-asymmetric", (8e-3, 4e-3)
@@ -103,3 +105,43 @@ def test_rounding_has_a_tolerance_of_its_size():
     assert rows.loc["turned by 1 rad", "tolerance"] == pytest.approx(0.3)
     assert rows.loc["mirrored", "tolerance"] == 1e-5
     assert set(rows["verdict"]) == {"passed"}
+
+
+def test_batch_that_breaks_down_costs_its_own_rows():
+    class Batchless(made.Exact):
+        name = "batchless"
+
+        def record_batch(self, members, dt, steps):
+            raise ValueError("no batches")
+
+    results = measured(Batchless())
+    rows = rows_of(results)
+    assert set(rows.loc[rows["verdict"] != "passed"].index) <= {"in a batch", "on one core"}
+    assert rows.loc["in a batch", "verdict"] == "crashed"
+    assert "no batches" in rows.loc["in a batch", "reason"]
+    assert rows.loc["turned by 1 rad", "verdict"] == "passed"
+    assert results.exit_code() == 3
+
+
+def test_engine_that_returns_nan_has_a_row_for_its_run_alone(tmp_path):
+    results = measured(made.engine_with("undefined", lambda state, time: state * (np.nan if time > 0.1 else 1.0)))
+    assert rows_of(results).empty
+    assert set(results.table["verdict"]) == {"diverged"}
+    ds.write_report(results, tmp_path / "run")
+    assert len(ds.load_results(tmp_path / "run").table) == len(results.table)
+
+
+def test_run_without_symmetries_is_not_compared_with_accepted_ones(stored):
+    accepted, _ = ds.accept(ds.load_results(stored), ds.Baseline(), "first", datetime.date(2026, 11, 24))
+    checked = ds.check(ds.run(SCENE, "mujoco", DTS), accepted).results
+    assert checked.exit_code() == 0
+    assert not checked.table.loc[checked.table["kind"] == "baseline", "metric"].isin(NAMES).any()
+
+
+@pytest.mark.parametrize("name", ["evil", "position_error", "with <b>=1"])
+def test_stored_run_with_another_name_of_a_symmetry_is_refused(stored, tmp_path, name):
+    results = ds.load_results(stored)
+    table = results.table.assign(metric=results.table["metric"].replace({"mirrored": name}))
+    ds.write_report(dataclasses.replace(results, table=table), tmp_path / "run")
+    with pytest.raises(ds.DropspinError, match=r"results\.parquet"):
+        ds.load_results(tmp_path / "run")

@@ -1,8 +1,10 @@
-"""The symmetries: for each, the scene that has the same motion, and the way back from its motion to that of the nominal scene."""
+"""Symmetries: for each, the scene that has the same motion, and the way back from its motion; and the names of repeated runs."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,3 +87,22 @@ SYMMETRIES = {
         _in("in milliseconds", time=1e3),
     )
 }
+
+AGAIN, BATCH, HALVES, NEW_PROCESS, ONE_CORE = "again", "in a batch", "in two halves", "in a new process", "on one core"
+REPEATS = (AGAIN, BATCH, NEW_PROCESS, ONE_CORE, HALVES)
+"""Runs of the same scene: after others in the same process, together with two others, in a new process, in a batch on one processor, and
+stopped and continued.
+"""
+BITWISE = (AGAIN, BATCH, NEW_PROCESS, ONE_CORE)
+"""Those that must give the same bits; a new simulation may continue from a state with other rounding errors."""
+NAMES = (*SYMMETRIES, *REPEATS)
+REPRESENTED = "with "
+"""How the name of another representation of body or floor begins, such as `with body=mesh`."""
+OTHER_REPRESENTATION = re.compile(rf"{REPRESENTED}[\w-]+=[\w-]+")
+
+
+def kind_of(name: str) -> Literal["symmetry", "determinism"] | None:
+    """The kind of the results of a symmetry or of a repeated run; None for any other name."""
+    if name in REPEATS:
+        return "determinism"
+    return "symmetry" if name in SYMMETRIES or OTHER_REPRESENTATION.fullmatch(name) else None

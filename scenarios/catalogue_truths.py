@@ -11,6 +11,7 @@ _SCENES = {
         "bounce-99",
         "bounce-9999",
         "bounce-elastic",
+        "bounce-threshold",
         "drop-ball",
         "drop-ball-brisk",
         "drop-ball-dull",
@@ -29,6 +30,7 @@ _SCENES = {
     "rocking": ("rest-long", "rock-block"),
     "rolling": ("roll-ball", "roll-ball-back", "roll-ball-side", "roll-slope"),
     "slipping": ("slip-stick",),
+    "top": ("top-nutating", "top-steady"),
     "tipping": ("tip-box",),
 }
 CATALOGUE_TRUTHS = {scene: truth for truth, scenes in _SCENES.items() for scene in scenes}

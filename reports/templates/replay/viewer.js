@@ -65,7 +65,7 @@
       this.readout = new Readout(this);
       this.home.replaceChildren(
         this.canvas,
-        made("p", { class: "quiet hint" }, `Motions at dt = ${rounded(1000 * this.dt, 3)} ms. ${HINT}`),
+        made("p", { class: "quiet hint" }, `Motions at dt = ${Number((1000 * this.dt).toPrecision(6))} ms. ${HINT}`),
         made("p", { class: "controls" }, this.button, button("◂ frame", "one frame back", () => this.step(-1)), button("frame ▸", "one frame on", () => this.step(1)),
           ...(this.hasFloor ? this.jumps : []), this.slider, this.clock),
         made("p", { class: "controls" }, labelled("speed", this.speed), labelled("loop", this.loop), labelled("engines", this.layout), labelled("follow", this.follow),

@@ -11,7 +11,6 @@ _SCENES = {
         "bounce-99",
         "bounce-9999",
         "bounce-elastic",
-        "bounce-threshold",
         "drop-ball",
         "drop-ball-brisk",
         "drop-ball-dull",

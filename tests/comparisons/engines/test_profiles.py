@@ -85,10 +85,8 @@ def test_mujoco_has_no_restitution_by_default():
 
 def test_error_of_the_defaults_alone_is_a_setting_error():
     """It does not vanish as dt → 0 and the calibrated profile does not have it; without that profile in the run it is a model error."""
-    ball, steps = (
-        load("drop-ball").model_copy(update={"duration": 0.8}),
-        [5e-4, 2.5e-4, 1.25e-4],
-    )  # by default no ball bounces at such steps; at coarser ones some do
+    ball = load("drop-ball").model_copy(update={"duration": 0.8})
+    steps = [5e-4, 2.5e-4, 1.25e-4]  # by default no ball bounces at such steps; at coarser ones some do
     both = run(ball, ["pybullet", "pybullet[profile=default]"], steps)
     lasting = both.asymptotic_errors("setting")
     assert set(lasting["engine"]) == {"pybullet[profile=default]"}

@@ -38,13 +38,6 @@ def quantity(metric: str) -> str:
     return metric.replace("_", " ").removesuffix(" error")
 
 
-def size(value: float, unit: str) -> str:
-    """The magnitude of a value with its unit, to three significant digits; a ratio below 10 in percent."""
-    if unit != "1":
-        return f"{abs(value):.3g} {unit}"
-    return f"{100.0 * abs(value):.3g} %" if abs(value) < 9.995 else f"{abs(value):.3g}"
-
-
 def duration(seconds: float) -> str:
     """A time in ms, µs or ns, to three significant digits."""
     scale, unit = next((scale, unit) for scale, unit in ((1e3, "ms"), (1e6, "µs"), (1e9, "ns")) if seconds * scale >= 1.0 or unit == "ns")

@@ -16,11 +16,11 @@ import numpy as np
 
 import dropspin as ds
 import reference_impl
-from comparisons.engines.document import Document, DocumentSimulation, reference_body, reference_world
-from comparisons.engines.mujoco_engine import MuJoCo, MuJoCoSimulation
+from comparisons.engines.document import Document, DocumentBatch, DocumentSimulation, reference_body, reference_world
+from comparisons.engines.mujoco_engine import MuJoCo, MuJoCoBatch, MuJoCoSimulation
 from comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
 from comparisons.running.engine_run import EngineRun, run_engine
-from comparisons.running.recording import EngineEntry
+from comparisons.running.inputs import EngineEntry
 
 DT = 4e-3
 JOBS = 10_000
@@ -71,11 +71,13 @@ class ProcessesHere:
 
 def run_cost() -> None:
     """Print the parts of a default run relative to its stepping and recording."""
-    for simulation, name in product((DocumentSimulation, MuJoCoSimulation, PyBulletSimulation), ("record", "advance")):
+    simulations = (DocumentSimulation, DocumentBatch, MuJoCoSimulation, MuJoCoBatch, PyBulletSimulation)
+    for simulation, name in product(simulations, ("record", "advance")):
         time_method(simulation, name, "stepping and recording")
     for engine in (Document, MuJoCo, PyBullet):
         time_method(engine, "prepare", "building")
-    time_method(Document, "record_batch", "stepping and recording")
+    for engine in (Document, MuJoCo):
+        time_method(engine, "prepare_batch", "building")
     import_module("comparisons.running.run").EngineProcesses = ProcessesHere
     core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
     ds.run(core[:1], "document")  # compiles

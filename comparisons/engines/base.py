@@ -120,15 +120,38 @@ class Simulation:
 
 
 class BatchSimulation:
-    """One scene from many starts at one time step, stepped together by the engine."""
+    """One scene from many starts at one time step, stepped together by the engine; a context manager.
+
+    Attributes:
+        velocity_lag: As that of a `Simulation` [s].
+    """
+
+    velocity_lag: float = 0.0
 
     def advance(self, steps: int) -> None:
         """Take some native steps and nothing else: this is what is timed."""
         raise NotImplementedError
 
     def states(self) -> Array:
-        """The state of each, as `Simulation.state` gives it, shape (size, 13)."""
+        """The state of each, as `Simulation.state` gives it, shape (size, 13); NumPy must be able to read the array."""
         raise NotImplementedError
+
+    def record(self, steps: int, every: int = 1) -> Array:
+        """States now and after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
+        rows = [np.array(self.states(), dtype=float)]
+        for _ in range(steps // every):
+            self.advance(every)
+            rows.append(np.array(self.states(), dtype=float))
+        return np.stack(rows, axis=1)
+
+    def close(self) -> None:
+        """Release what the simulation holds."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
 
 
 class NumericOption(NamedTuple):
@@ -220,6 +243,8 @@ class Engine:
 
     `symmetries` compares the motions.
     """
+    compiles: ClassVar[bool] = False
+    """Whether the engine compiles when a scene is first simulated; that is then done and timed apart from the simulations."""
     reasons: ClassVar[Mapping[str, str]] = {}
     """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
 
@@ -326,13 +351,5 @@ class Engine:
         raise NotImplementedError
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
-        """Build one scene from many starts; None if the engine cannot step them together."""
+        """Build one scene from many starts; None if the engine cannot step them together, and single simulations take their place."""
         return None
-
-    def record_batch(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
-        """Record one scene from many starts, shape (len(members), 1 + steps, 13); loops over single simulations unless overridden."""
-        motions = []
-        for member in members:
-            with self.prepare(member, dt) as simulation:
-                motions.append(simulation.record(steps))
-        return np.array(motions)

@@ -65,10 +65,6 @@ class Document(Engine):
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return DocumentSimulation(scene, dt, self.methods())
 
-    def record_batch(self, members: Sequence[Scenario], dt: float, steps: int) -> Array:
-        """All members in one call of the reference implementation."""
-        return DocumentBatch(members, dt, self.methods()).run(steps, every=1)
-
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
         return DocumentBatch(members, dt, self.methods())
 
@@ -109,22 +105,24 @@ class DocumentSimulation(Simulation):
 
 
 class DocumentBatch(BatchSimulation):
-    """A simulation of an ensemble by the reference implementation, in lanes and threads."""
+    """A simulation from many starts by the reference implementation, in lanes and threads."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
+        self.velocity_lag = 0.5 * dt
         scene = members[0]
         self._simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene), dt, methods)
         self._states = np.array([member.initial_state for member in members])
 
     def advance(self, steps: int) -> None:
-        self._states = self.run(steps, max(steps, 1))[:, -1]
+        self._states = self._simulator.run(self._states, steps, max(steps, 1))[:, -1]
 
     def states(self) -> Array:
         return self._states.copy()
 
-    def run(self, steps: int, every: int) -> Array:
-        """The current states and those after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
-        return self._simulator.run(self._states, steps, every)
+    def record(self, steps: int, every: int = 1) -> Array:
+        rows = self._simulator.run(self._states, steps, every)
+        self._states = rows[:, -1].copy()
+        return rows
 
 
 def reference_body(body: Body) -> reference_impl.Body:

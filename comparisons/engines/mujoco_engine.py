@@ -157,9 +157,7 @@ class MuJoCo(Engine):
         return self._prepare(scene, dt)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
-        if VERSION < BATCHES:
-            return None
-        return MuJoCoBatch([self._prepare(member, dt) for member in members])
+        return MuJoCoBatch(self._prepare(members[0], dt), members) if VERSION >= BATCHES else None
 
     def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
         form = Form(self.option("integrator"), self.option("body"), self.option("floor"))

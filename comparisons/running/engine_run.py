@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from comparisons.results.ensembles import EnsembleOutcome
 from comparisons.running.ensembles import run_ensemble
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.progress import OnSimulations
-from comparisons.running.recording import Breakdown, Recording, classify, record, time_steps
+from comparisons.running.recording import Breakdown, classify, record, record_batch, time_steps
 from comparisons.running.verification import verified_claims, verified_predictions, verified_refusal
 from scenarios import Scenario, Trajectory, truth_for
 
@@ -84,18 +84,14 @@ def run_engine(
             return found
         found.discretisation, found.order, found.precision = verified_claims(engine, scene)
         sets = perturbed(scene, starts, found.precision)
-        total = 1 + (len(starts) if len(starts) > 1 else 0) + sum(map(len, sets)) + TIMING_REPEATS
-        number = count(1)
-
-        def recorded(start: Scenario) -> Recording:
-            recording = record(engine, start, dt)
-            on_simulations(next(number), total)
-            return recording
-
-        own = recorded(scene)
+        others = [*(starts if len(starts) > 1 else []), *chain(*sets)]
+        total = 1 + len(others) + TIMING_REPEATS
+        own = record(engine, scene, dt)
+        on_simulations(1, total)
         found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
-        found.phases = [own.motion] if len(starts) == 1 else [recorded(start).motion for start in starts]
-        found.perturbed = [[recorded(start).motion for start in moved] for moved in sets]
+        motions = iter(record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else [])
+        found.phases = [own.motion] if len(starts) == 1 else [next(motions) for _ in starts]
+        found.perturbed = [[next(motions) for _ in moved] for moved in sets]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt)
         # The predicted error of a bounce is a mean over start phases.
         found.predicted = _predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Engine
+from comparisons.engines.base import Diverged, Engine
 from comparisons.judging.verdicts import Judgement
 from comparisons.measuring.comparison import Comparison, Unresolved
 from comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
@@ -38,6 +38,8 @@ def run_ensemble(engine: Engine, scene: Scenario, dt: float) -> EnsembleOutcome:
     for first in range(0, len(starts), BATCH_SIZE):
         batch = starts[first : first + BATCH_SIZE]
         for member, motion in zip(batch, record_batch(engine, batch, dt), strict=True):
+            if motion.first_bad_row is not None:
+                raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
             case = Comparison(member, motion)
             scale = _energy_scale(case)
             energies.append(case.energy[rows] / scale)

@@ -14,8 +14,11 @@ from comparisons.engines.exceptions import described, short
 from comparisons.engines.registry import engine as engine_named
 from comparisons.judging.verdicts import Verdict
 from comparisons.running.inputs import SceneLike, as_scene, verify_time_step
+from comparisons.running.progress import OnSimulations
 from comparisons.running.verification import (
     BATCH_ULPS,
+    verified_batch,
+    verified_lag,
     verified_limitations,
     verified_record,
     verified_refusal,
@@ -118,26 +121,37 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
     return Recording(motion, continuation, limitations, settings, seconds)
 
 
-def record_batch(engine: Engine, starts: Sequence[Scenario], dt: float) -> list[Trajectory]:
-    """Drive an engine through one scene from many starts, by its own way to take them together if it has one.
+def record_batch(
+    engine: Engine, starts: Sequence[Scenario], dt: float, on_simulations: OnSimulations = lambda done, total: None
+) -> list[Trajectory]:
+    """Drive an engine through one scene from many starts: together if it can, else one after another.
+
+    Args:
+        engine: The engine.
+        starts: The scene from each of its starts.
+        dt: Time step [s].
+        on_simulations: Called after each simulation, or once after a batch.
 
     Raises:
         BuildMismatch: A motion does not begin at its start, or a record is not one.
-        Diverged: The simulation broke down, or a motion is not finite.
+        Diverged: The simulation broke down.
     """
+    batch = engine.prepare_batch(starts, dt)
+    if batch is None:
+        motions = []
+        for number, start in enumerate(starts, 1):
+            motions.append(record(engine, start, dt).motion)
+            on_simulations(number, len(starts))
+        return motions
     steps = starts[0].steps(dt)
+    with batch:
+        lag = verified_lag(batch.velocity_lag, dt)
+        states = verified_batch(batch.record(steps), len(starts), steps + 1)
     times = dt * np.arange(steps + 1, dtype=float)
-    with engine.prepare(starts[0], dt) as simulation:
-        lag = simulation.velocity_lag
-    motions = []
-    for start, states in zip(starts, engine.record_batch(starts, dt, steps), strict=True):
-        verified = verified_record(states, steps + 1)
-        verify_start(engine, start, verified[0], BATCH_ULPS)
-        motion = Trajectory.from_states(times, verified, lag)
-        if motion.first_bad_row is not None:
-            raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
-        motions.append(motion)
-    return motions
+    for start, rows in zip(starts, states, strict=True):
+        verify_start(engine, start, rows[0], BATCH_ULPS)
+    on_simulations(len(starts), len(starts))
+    return [Trajectory.from_states(times, rows, lag) for rows in states]
 
 
 def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0) -> Recording | Breakdown:

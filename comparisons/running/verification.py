@@ -32,9 +32,7 @@ class BuildMismatch(Exception):
 
 def verify_build(engine: Engine, scene: Scenario, simulation: Simulation, dt: float) -> None:
     """Raise `BuildMismatch` unless state, mass, inertia and gravity equal the scene's to 8 ulp, a spin to 64, of the engine's precision."""
-    lag = simulation.velocity_lag
-    if isinstance(lag, bool) or not isinstance(lag, int | float | np.floating) or not abs(lag) <= dt:
-        raise BuildMismatch(f"velocity_lag is {lag!r}; it is a time in seconds of at most one step, {dt:g} s")
+    verified_lag(simulation.velocity_lag, dt)
     state = simulation.state()
     if state.shape != (13,):
         raise BuildMismatch(f"the state has shape {state.shape}, not (13,)")
@@ -44,6 +42,17 @@ def verify_build(engine: Engine, scene: Scenario, simulation: Simulation, dt: fl
         _verify_equal(engine, "mass", np.array([built.mass]), np.array([scene.body.mass]))
         _verify_equal(engine, "inertia", built.inertia, scene.body.inertia_tensor)
         _verify_equal(engine, "gravity", built.gravity, scene.acceleration)
+
+
+def verified_lag(lag: Any, dt: float) -> float:
+    """The time by which a simulation's velocity lags its position [s].
+
+    Raises:
+        BuildMismatch: It is not a time of at most one step.
+    """
+    if isinstance(lag, bool) or not isinstance(lag, int | float | np.floating) or not abs(float(lag)) <= dt:
+        raise BuildMismatch(f"velocity_lag is {lag!r}; it is a time in seconds of at most one step, {dt:g} s")
+    return float(lag)
 
 
 def verify_start(engine: Engine, scene: Scenario, state: NDArray[np.float64], ulps: int = ULPS) -> None:
@@ -76,6 +85,18 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
         row = int(np.argmax(off))
         raise BuildMismatch(f"the quaternion of row {row} has length {lengths[row]:.6g}; an orientation has length 1")
     return record
+
+
+def verified_batch(states: Any, size: int, rows: int) -> list[NDArray[np.float64]]:
+    """An engine's record of a batch as float64, each of its motions as in `verified_record`.
+
+    Raises:
+        BuildMismatch: It is not such a record.
+    """
+    batch = np.asarray(states)
+    if batch.ndim == 0 or len(batch) != size:
+        raise BuildMismatch(f"the record of a batch has shape {batch.shape}; {size} motions were asked for, shape ({size}, {rows}, 13)")
+    return [verified_record(motion, rows) for motion in batch]
 
 
 def verified_limitations(limitations: Any) -> tuple[KnownLimitation, ...]:

@@ -205,8 +205,12 @@ def _batched(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> Pair
         start[POSITION] += (share - 1.0) * scene.body.size * AWAY
         start[RATES] *= share
         others.append(scene.starting_at(start))
-    together = [motion.states for motion in record_batch(entry.adapter, [scene, *others], dt)]
-    return list(zip([own, *(_motion(entry, other, dt) for other in others)], together, strict=True))
+    together = record_batch(entry.adapter, [scene, *others], dt)
+    for motion in together:
+        if (broken := divergence(motion)) is not None:
+            raise _NotComparable(broken)
+    alone = [own, *(_motion(entry, other, dt) for other in others)]
+    return list(zip(alone, (motion.states for motion in together), strict=True))
 
 
 def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple[Pairs, Effects]:

@@ -87,7 +87,7 @@ Mine.__module__ Drifting.settings Drifting.settings Drifting.known_limitations D
 ATTRIBUTES = st.sampled_from(NAMED.split())
 CALLED_BY_DROPSPIN = r"""
 Mine.__init__ Mine.__post_init__ Mine.order_in Mine.discretisation Mine.predicted_error Mine.declines Mine.programs Mine.prepare
-Mine.prepare_batch Mine.record_batch Mine.option Mine.accuracy_levels Mine.refined Drifting.__init__ Drifting.advance Drifting.state
+Mine.prepare_batch Mine.option Mine.accuracy_levels Mine.refined Drifting.__init__ Drifting.advance Drifting.state
 Drifting.state Drifting.record Drifting.as_built Drifting.close Drifting.__enter__ Drifting.__exit__
 """
 METHODS = st.sampled_from(CALLED_BY_DROPSPIN.split())

@@ -136,9 +136,6 @@ class Substeps(Document):
         substeps = self.substeps(dt)
         return Substepped(super().prepare(scene, dt / substeps), substeps)
 
-    def record_batch(self, members, dt, steps):
-        return Engine.record_batch(self, members, dt, steps)
-
     def prepare_batch(self, members, dt):
         return None
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.engines.base import Diverged, Engine, Simulation
+from comparisons.engines.base import BatchSimulation, Diverged, Engine, Simulation
 from scenarios import load, names, truth_for
 from scenarios.rotations import multiply
 
@@ -47,6 +47,33 @@ class Exact(Engine):
 
     def prepare(self, scene, dt):
         return ExactSimulation(scene, dt, type(self).distort)
+
+
+class Together(BatchSimulation):
+    """Single simulations as a batch, whose record passes through a function."""
+
+    def __init__(self, simulations, change=lambda motions: motions):
+        self._simulations, self._change = simulations, change
+        self.velocity_lag = simulations[0].velocity_lag
+
+    def advance(self, steps):
+        for simulation in self._simulations:
+            simulation.advance(steps)
+
+    def states(self):
+        return np.array([simulation.state() for simulation in self._simulations])
+
+    def record(self, steps, every=1):
+        return self._change(np.array([simulation.record(steps, every) for simulation in self._simulations]))
+
+
+def in_batches(name, change, of=Exact):
+    """An engine whose batches pass their record, shape (size, rows, 13), through a function."""
+
+    def prepare_batch(self, members, dt):
+        return Together([self.prepare(member, dt) for member in members], change)
+
+    return type("Batched", (of,), {"name": name, "prepare_batch": prepare_batch, "__doc__": name})()
 
 
 def engine_with(name, distort):

@@ -367,9 +367,11 @@ LEAKS = {
 
 @pytest.mark.parametrize("fault", LEAKS)
 def test_batch_that_differs_from_single_simulations_fails(fault):
-    together = "motions = super().record_batch(members, dt, steps)"
-    batch = f"    def record_batch(self, members, dt, steps):\n        {together}\n        {LEAKS[fault]}\n        return motions\n\n"
-    found = not_passed(documented(("    def prepare(", f"{batch}    def prepare(")), "symmetries")
+    def changed(motions):
+        exec(LEAKS[fault])
+        return motions
+
+    found = not_passed(made.in_batches("batched", changed, type(documented())), "symmetries")
     outcome, message = found["symmetries"]
     assert outcome == "failed"
     assert message.startswith("a batch of three: ")

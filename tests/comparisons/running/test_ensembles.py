@@ -11,6 +11,7 @@ from comparisons.engines.registry import engine
 from comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from comparisons.results.store import load_results, save
 from comparisons.running.ensembles import judge_differences, judge_means, run_ensemble
+from comparisons.running.recording import record_batch
 from scenarios import load, members
 
 SCENE = load("drop-box-anyhow")
@@ -24,10 +25,25 @@ def outcome(values):
     return EnsembleOutcome(np.linspace(0, 1, 41), energy, values, values, energy)
 
 
-def test_batch_equals_single_runs_bit_for_bit():
-    """The reference implementation gives all members together the bits it gives each alone."""
-    drawn, document = members(FEW), engine("document")
-    np.testing.assert_array_equal(document.record_batch(drawn, 1e-3, 600), Engine.record_batch(document, drawn, 1e-3, 600))
+class Alone(Engine):
+    """An engine without its batches."""
+
+    name = "alone"
+
+    def __init__(self, name):
+        object.__setattr__(self, "options", {})
+        object.__setattr__(self, "_engine", engine(name))
+
+    def prepare(self, scene, dt):
+        return self._engine.prepare(scene, dt)
+
+
+@pytest.mark.parametrize("name", ["document", "document[contact=sequential,law=coulomb]", "mujoco", "mujoco[profile=default]"])
+def test_batch_equals_single_runs_bit_for_bit(name):
+    drawn = members(FEW)
+    together, alone = (record_batch(chosen, drawn, 1e-3) for chosen in (engine(name), Alone(name)))
+    for one, other in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(one.states, other.states)
 
 
 @pytest.mark.parametrize("name", ["document", "document[rotation=exact]", "mujoco", "mujoco[profile=default]"])
@@ -37,7 +53,7 @@ def test_timed_batch_ends_where_single_runs_end(name):
     together = chosen.prepare_batch(drawn, 1e-3)
     together.advance(400)
     together.advance(200)
-    alone = Engine.record_batch(chosen, drawn, 1e-3, 600)[:, -1]
+    alone = [motion.states[-1] for motion in record_batch(Alone(name), drawn, 1e-3)]
     np.testing.assert_allclose(together.states(), alone, rtol=0, atol=0.0 if name.startswith("document") else 1e-6)
 
 
@@ -95,15 +111,11 @@ def test_run_and_its_folder_keep_the_ensemble(tmp_path):
 def test_member_that_is_not_finite_costs_the_engines_row():
     """The engine diverged; the other engine's ensemble is complete."""
 
-    class Fails(made.Exact):
-        name = "fails"
+    def failing(motions):
+        motions[-1, 70:] = np.nan
+        return motions
 
-        def record_batch(self, drawn, dt, steps):
-            rows = engine("document").record_batch(drawn, dt, steps)
-            rows[-1, 70:] = np.nan
-            return rows
-
-    found = ds.run(FEW, [Fails(), "document"], [4e-3])
+    found = ds.run(FEW, [made.in_batches("fails", failing, made.Exact), "document"], [4e-3])
     [row] = found.table[found.table["engine"] == "fails"].to_dict("records")
     assert row["verdict"] == "diverged"
     assert "a start of the ensemble is not finite at t = 0.28 s" in row["reason"]
@@ -122,28 +134,14 @@ def test_ensemble_without_contact_has_no_rebound():
 
 def test_members_must_start_where_they_were_placed():
     """An engine that returns one motion for all members is refused."""
-
-    class Copies(made.Exact):
-        name = "copies"
-
-        def record_batch(self, drawn, dt, steps):
-            one = engine("document").record_batch(drawn[:1], dt, steps)
-            return np.repeat(one, len(drawn), axis=0)
-
-    found = ds.run(FEW, [Copies()], [4e-3]).table
+    copies = made.in_batches("copies", lambda motions: np.repeat(motions[:1], len(motions), axis=0))
+    found = ds.run(FEW, [copies], [4e-3]).table
     assert list(found["verdict"]) == ["crashed"]
     assert "at the start" in found["reason"].iloc[0]
 
 
 def test_batch_of_wrong_shape_costs_the_engines_row():
     """The message says what was returned and what was asked for."""
-
-    class Short(made.Exact):
-        name = "short"
-
-        def record_batch(self, drawn, dt, steps):
-            return engine("document").record_batch(drawn, dt, steps)[..., :12]
-
-    found = ds.run(FEW, [Short()], [4e-3]).table
+    found = ds.run(FEW, [made.in_batches("short", lambda motions: motions[..., :12])], [4e-3]).table
     assert list(found["verdict"]) == ["crashed"]
     assert "states of 13 numbers were asked for" in found["reason"].iloc[0]

@@ -108,17 +108,16 @@ def test_rounding_has_a_tolerance_of_its_size():
 
 
 def test_batch_that_breaks_down_costs_its_own_rows():
-    class Batchless(made.Exact):
-        name = "batchless"
+    def broken(motions):
+        if len(motions) == 3:
+            raise ValueError("no batches of three")
+        return motions
 
-        def record_batch(self, members, dt, steps):
-            raise ValueError("no batches")
-
-    results = measured(Batchless())
+    results = measured(made.in_batches("batchless", broken))
     rows = rows_of(results)
     assert set(rows.loc[rows["verdict"] != "passed"].index) <= {"in a batch", "on one core"}
     assert rows.loc["in a batch", "verdict"] == "crashed"
-    assert "no batches" in rows.loc["in a batch", "reason"]
+    assert "no batches of three" in rows.loc["in a batch", "reason"]
     assert rows.loc["turned by 1 rad", "verdict"] == "passed"
     assert results.exit_code() == 3
 

@@ -165,30 +165,22 @@ def test_noise_of_one_ulp_is_found_with_its_first_step():
 
 
 def test_batch_with_other_results_is_found():
-    class Batched(made.Exact):
-        name = "batched"
+    def pushed(motions):
+        motions[:, 1:, 0] += 1e-9
+        return motions
 
-        def record_batch(self, members, dt, steps):
-            motions = super().record_batch(members, dt, steps)
-            motions[:, 1:, 0] += 1e-9
-            return motions
-
-    assert lost(Batched(), "fall-spin") == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
+    assert lost(made.in_batches("pushed", pushed), "fall-spin") == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
 
 
 @pytest.mark.parametrize("scene", ["drop-ball", "fall-spin", "turn-box-flat"])
 def test_batch_that_swaps_two_members_is_found(scene):
     """Also of a body that starts at rest, and where their differences have opposite signs."""
 
-    class Swapping(made.Exact):
-        name = "swapping"
+    def swapped(motions):
+        motions[:, 1:] = motions[[1, 0, 2], 1:]
+        return motions
 
-        def record_batch(self, members, dt, steps):
-            motions = super().record_batch(members, dt, steps)
-            motions[:, 1:] = motions[[1, 0, 2], 1:]
-            return motions
-
-    assert lost(Swapping(), scene) == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
+    assert lost(made.in_batches("swapped", swapped), scene) == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
 
 
 def test_result_that_a_new_process_changes_is_found():
@@ -207,17 +199,13 @@ def test_result_that_a_new_process_changes_is_found():
 def test_result_that_depends_on_the_number_of_cores_is_found():
     """As of a sum that each thread begins anew."""
 
-    class Threaded(made.Exact):
-        name = "threaded"
-
-        def record_batch(self, members, dt, steps):
-            motions = super().record_batch(members, dt, steps)
-            motions[:, 1:, 0] *= 1.0 + np.finfo(float).eps * (len(os.sched_getaffinity(0)) == 1)
-            return motions
+    def summed(motions):
+        motions[:, 1:, 0] *= 1.0 + np.finfo(float).eps * (len(os.sched_getaffinity(0)) == 1)
+        return motions
 
     scene = load("fall-spin")
     moved = scene.starting_at(scene.initial_state + np.eye(13)[0])
-    assert lost(Threaded(), moved) == ({ONE_CORE} if len(os.sched_getaffinity(0)) > 1 else {BATCH})
+    assert lost(made.in_batches("threaded", summed), moved) == ({ONE_CORE} if len(os.sched_getaffinity(0)) > 1 else {BATCH})
 
 
 def test_boost_applies_where_nothing_slows_the_body():

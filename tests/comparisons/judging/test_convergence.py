@@ -50,6 +50,32 @@ def test_cause_and_order_of_the_attitude_error_are_those_of_the_method(engine, c
         assert abs(limit["value"]) <= limit["upper"]
 
 
+def test_irregular_convergence_is_no_model_error():
+    """The orientation errors [rad] of a turning box that PyBullet stopped irregularly at time steps of 16 to 1 ms.
+
+    The lengths alone seem to pass 0 and to approach 0.036 rad; no component of the rotation does.
+    """
+    measured = {
+        0.016: (0.06102862, 0.00046202, 0.06075899, -0.0003589),
+        0.008: (0.0491381, -0.00390358, 0.0439638, 0.00854031),
+        0.004: (0.03651882, -0.00193137, 0.02833807, -0.00096796),
+        0.002: (0.02364607, -0.00354537, 0.01834405, 0.00796453),
+        0.001: (0.00437256, 6.76060838e-08, 4.37256262e-03, -1.20820929e-07),
+    }
+    scene = ds.load("draw-2026-039")
+    series = [
+        SeriesPoint(dt, scene.steps(dt), average([length]), average([components]), 3e-8) for dt, (length, *components) in measured.items()
+    ]
+    found = study_convergence(scene, Claim("pybullet", None, np.float64), ds.METRICS["orientation_error"], series)
+    assert (found.cause, found.asymptotic_error.verdict) == ("unresolved", "measured")
+    assert "no component grows" in found.asymptotic_error.reason
+
+
+def average(parts):
+    """An average with these parts, without sampling noise."""
+    return Average(np.array(parts, ndmin=1), *np.zeros((2, *np.shape(parts))))
+
+
 def test_bounce_converges_at_first_order_after_averaging_start_phases():
     """With e = .9 all three engines: apex and restitution, at order 1 or at rounding."""
     found = ds.run("drop-ball-lively", ["document", "mujoco", "pybullet"])

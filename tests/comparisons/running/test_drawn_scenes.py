@@ -85,14 +85,3 @@ def test_an_engine_fitted_to_a_table_is_caught(change, families):
     failed = set(results.table.loc[results.table["verdict"] == "failed", "scene"])
     assert {scene.tags[1] for scene in scenes if scene.name in failed} == families
     assert results.exit_code() == 1
-
-
-def test_irregular_convergence_is_no_model_error():
-    """A turning box that PyBullet stops irregularly: 0.061, 0.049, 0.037, 0.024, 0.0044 rad at 16 to 1 ms, 0.0012 rad at 0.125 ms.
-
-    By itself the series seems to pass 0 and to approach 0.036 rad; no component of the rotation does.
-    """
-    table = ds.run("draw-2026-039", "pybullet").table
-    asymptotic = table[(table["kind"] == "asymptotic_error") & (table["metric"] == "orientation_error")].iloc[0]
-    assert (asymptotic["verdict"], asymptotic["cause"]) == ("measured", "unresolved")
-    assert "no component grows" in asymptotic["reason"]

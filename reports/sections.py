@@ -113,7 +113,7 @@ def read_section(folder: str) -> Section:
         detail = first_problem(_File, error) if isinstance(error, ValidationError) else getattr(error, "strerror", None) or str(error)
         raise DropspinError(
             f"{folder}: has no study, or a damaged one ({FILE}: {detail.removesuffix('.')}); "
-            "give a folder that dropspin tradeoff, limits or symmetries wrote."
+            "give a folder that dropspin tradeoff, limits, symmetries or reproduce wrote."
         ) from None
     return Section(**found.model_dump(by_alias=True, exclude_unset=True))
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from comparisons.published.results import Result
+from comparisons.published.sources import Source
 from comparisons.regressions.history import History
 from comparisons.results.stored_files import file_name
 from comparisons.robustness.study import RobustnessStudy
@@ -17,7 +19,7 @@ from reports.plots.figures import history_figure, limits_charts, tradeoff_charts
 from reports.plots.svg import save_svg
 from reports.replay.motions import replay_together
 from reports.sections import Section
-from reports.views import history, limits, symmetries, tradeoff
+from reports.views import history, limits, reproduce, symmetries, tradeoff
 from scenarios import Scenario, Trajectory
 
 
@@ -49,6 +51,24 @@ def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: P
         section.add_table(tradeoff.pareto_front_rows(one))
         section.add_list(tradeoff.sentences(one, within))
     section.write(folder, "tradeoff")
+
+
+def write_reproduced(chosen: Sequence[Source], results: Sequence[Result], folder: Path) -> None:
+    """Write `reproduce.csv`, `reproduce.json` and `reproduce.md`."""
+    write_table(folder, "reproduce", reproduce.COLUMNS, reproduce.rows(results))
+    section = Section("Published results")
+    for source in chosen:
+        own = [one for one in results if one.source == source.name]
+        title, *texts = reproduce.heading(source)
+        section.add_heading(title)
+        for text in texts:
+            section.add_text(text)
+        section.add_table(reproduce.table(own))
+        section.add_list(reproduce.notes(source, own))
+    section.add_heading("All sources")
+    section.add_table(reproduce.summary(results))
+    section.add_list([reproduce.LEGEND, reproduce.verdict(results)])
+    section.write(folder, "reproduce")
 
 
 def write_symmetries(found: Sequence[Finding], scenes: Mapping[str, Scenario], dt: float, folder: Path) -> None:

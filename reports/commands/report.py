@@ -15,7 +15,7 @@ from reports.terminal.safe import echo
     "studies",
     multiple=True,
     metavar="FOLDER",
-    help="Add a study: the folder that dropspin tradeoff, limits or symmetries wrote; repeat for more.",
+    help="Add a study: the folder that dropspin tradeoff, limits, symmetries or reproduce wrote; repeat for more.",
 )
 @click.option(
     "--plots", multiple=True, type=click.Choice(["svg", "png"]), help="Also write the plots as files of this format; repeat for both."

@@ -34,6 +34,7 @@ SOUND = {
     "metric": ["energy_error"],
     "axes": ["step", "spin"],
     "checks": ["protocol"],
+    "names": ["housner-block", "drake-free-body", "nesc-brick"],
     "seed": ["1"],
     "count": ["1"],
     "output": ["out", "out/deeper", "run", "out/../out", "./out/"],
@@ -75,7 +76,11 @@ def command_lines(draw: st.DrawFn) -> tuple[str, ...]:
     arguments: list[str] = []
     for parameter in command(name).params:
         if isinstance(parameter, click.Argument):
-            count = draw(st.sampled_from([1, 1, 1, 1, 2, 0])) if name not in ("run", "limits", "tradeoff") else draw(st.integers(1, 2))
+            count = (
+                draw(st.sampled_from([1, 1, 1, 1, 2, 0]))
+                if name not in ("run", "limits", "tradeoff", "reproduce")
+                else draw(st.integers(1, 2))
+            )
             arguments += [draw(values(parameter)) for _ in range(count)]
             continue
         if draw(st.sampled_from([True, False, False])) or parameter.required:

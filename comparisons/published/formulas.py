@@ -1,0 +1,215 @@
+"""Sources compared with exact solutions: rates that tools print, and formulas that sources give."""
+
+import csv
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.published.printed import agreement
+from comparisons.published.results import EXACT, Result, Status, compared
+from comparisons.published.sources import DATA, Source
+from scenarios import Scenario, Truth, load, truth_for
+from scenarios.mechanics import kinetic_energy
+from scenarios.rotations import about, rotate
+from scenarios.state import ORIENTATION, POSITION, SPIN
+from scenarios.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+RATES = ("roll", "pitch", "yaw")
+DECIMALS = 10
+"""Decimals to which formulas are compared; the exact solutions are rounded to 1e-14 of angles of some 50 rad."""
+EPSILON = float(np.finfo(np.float64).eps)
+
+
+def truth_of(scene: Scenario) -> Truth:
+    """The exact solution of a scene that has one."""
+    truth = truth_for(scene)
+    assert truth is not None, scene.name
+    return truth
+
+
+def body_rates(states: Array) -> Array:
+    """Angular velocities in the body frame [rad/s], shape (n, 3), of states, shape (n, 13)."""
+    back = states[:, ORIENTATION] * np.array([-1.0, -1.0, -1.0, 1.0])
+    rates: Array = rotate(back, states[:, SPIN])
+    return rates
+
+
+def nesc_brick(source: Source) -> list[Result]:
+    """The rates of each tool beside the exact ones: its largest error, and for tools that agree with each other, their common decimals."""
+    exact = truth_of(source.scene("brick"))
+    decimals = source.parameters["decimals"]
+    with (DATA / source.parameters["rates"]).open(encoding="utf-8", newline="") as file:
+        table = [(tool, list(rows)) for tool, rows in groupby(csv.DictReader(file), lambda row: row["tool"])]
+    results = []
+    for tool, rows in table:
+        times = np.array([float(row["time"]) for row in rows])
+        printed = np.array([[float(row[rate]) for rate in RATES] for row in rows])
+        rates = np.degrees(body_rates(exact.states(times)))
+        name = f"sim {tool}"
+        if tool in source.parameters["agree"]:
+            equal = int(sum(f"{a:.{decimals}f}" == f"{b:.{decimals}f}" for a, b in zip(printed.flat, rates.flat, strict=True)))
+            results.append(_count(source, name, f"{printed.size} rates, {decimals} decimals", printed.size, equal))
+        worst, rate = np.unravel_index(np.argmax(np.abs(printed - rates)), printed.shape)
+        text = rows[worst][RATES[rate]]
+        quantity = f"{RATES[rate]}, {times[worst]:.0f} s [deg/s]"
+        here = f"{rates[worst, rate]:.{len(text.partition('.')[2])}f}"
+        error = float(printed[worst, rate] - rates[worst, rate])
+        results.append(Result(source.name, name, quantity, text, here, EXACT, "error of the source", difference=error))
+    return results
+
+
+def _count(source: Source, tool: str, quantity: str, published: int, here: int) -> Result:
+    """How many of some values have equal digits."""
+    status = compared(published == here)
+    return Result(source.name, tool, quantity, f"{published} equal", f"{here} equal", EXACT, status, difference=float(here - published))
+
+
+def _digits(source: Source, tool: str, quantity: str, published: float, here: float) -> Result:
+    """A value of a formula beside that of the exact solution, to `DECIMALS`."""
+    found = agreement(f"{published:.{DECIMALS}f}", here)
+    return Result(source.name, tool, quantity, f"{published:.{DECIMALS}f}", found.here, EXACT, compared(found.agrees), "", found.difference)
+
+
+def kane_free_body(source: Source) -> list[Result]:
+    """Kane's solution of the axisymmetric body, and the simple rotations with which Drake tests it."""
+    scene = source.scene("cylinder")
+    truth = truth_of(scene)
+    *times, last = source.parameters["times"]
+    results = []
+    for time in times:
+        published = kane(scene, time)
+        here = _kane_values(truth, time, published)
+        equal = sum(f"{published[name]:.{DECIMALS}f}" == f"{here[name]:.{DECIMALS}f}" for name in published)
+        results.append(_count(source, "formula", f"{len(published)} values, {time:g} s", len(published), equal))
+    published = kane(scene, last)
+    here = _kane_values(truth, last, published)
+    results += [_digits(source, "formula", f"{name} at {last:g} s", published[name], here[name]) for name in published]
+    simple = source.parameters["simple"]
+    return results + [_simple_rotation(source, scene, axis, simple["rate"], simple["time"]) for axis in simple["axes"]]
+
+
+def kane(scene: Scenario, t: float) -> dict[str, float]:
+    """Orientation, angular velocity in the body frame [rad/s] and position [m] at a time [s], of a body that starts unturned.
+
+    Source: T. R. Kane, P. W. Likins & D. A. Levinson, Spacecraft Dynamics (1983), sections 1.13 and 3.1, as in Drake's `free_body.cc`.
+    """
+    wx, wy, wz = scene.start.angular_velocity
+    transverse, _, axial = map(float, np.diag(scene.body.inertia_tensor))
+    s = (transverse - axial) / transverse * wz
+    axial_rate = wz * axial / transverse
+    p = math.sqrt(wx**2 + wy**2 + axial_rate**2)
+    sp, cp, ss, cs = math.sin(p * t / 2), math.cos(p * t / 2), math.sin(s * t / 2), math.cos(s * t / 2)
+    position = np.array(scene.start.position) + np.array(scene.start.velocity) * t + 0.5 * scene.acceleration * t**2
+    return {
+        "qx": sp / p * (wx * cs + wy * ss),
+        "qy": sp / p * (wy * cs - wx * ss),
+        "qz": axial_rate / p * sp * cs + cp * ss,
+        "qw": cp * cs - axial_rate / p * sp * ss,
+        "ωx": wx * math.cos(s * t) + wy * math.sin(s * t),
+        "ωy": wy * math.cos(s * t) - wx * math.sin(s * t),
+        "ωz": wz,
+        **{axis: float(value) for axis, value in zip("xyz", position, strict=True)},
+    }
+
+
+def _kane_values(truth: Truth, t: float, published: Mapping[str, float]) -> dict[str, float]:
+    """The same values of the exact solution; of the two quaternions of the orientation, the one nearer to the published one."""
+    state = truth.states(np.array([t]))
+    quaternion = state[0, ORIENTATION]
+    sign = math.copysign(1.0, float(quaternion @ list(published.values())[:4]))
+    return dict(zip(published, map(float, [*(sign * quaternion), *body_rates(state)[0], *state[0, POSITION]]), strict=True))
+
+
+def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rate: float, time: float) -> Result:
+    """The largest error of the quaternion after a rotation about one axis, beside the bound of Drake's test."""
+    direction = np.array(axis) / np.linalg.norm(axis)
+    start = scene.start.model_copy(update={"angular_velocity": tuple((rate * direction).tolist())})
+    quaternion = truth_of(scene.model_copy(update={"start": start})).states(np.array([time]))[0, ORIENTATION]
+    expected = about(direction, np.array([rate * time]))[0]
+    error = float(min(np.abs(quaternion - expected).max(), np.abs(quaternion + expected).max()))
+    bound = f"≤ {source.parameters['simple']['bound_in_epsilon'] * EPSILON:.2g}"
+    found = agreement(bound, error)
+    quantity = f"quaternion, axis {' '.join(f'{component:g}' for component in axis)}"
+    return Result(source.name, "simple rotation", quantity, bound, f"{error:.2g}", EXACT, compared(found.agrees))
+
+
+def housner_block(source: Source) -> list[Result]:
+    """Housner's ratio of kinetic energies and period beside the exact solution of the block."""
+    results = []
+    for slope in source.parameters["slopes"]:
+        alpha = math.atan(slope)
+        scene = rocking_scene(alpha, 0.5)
+        impact = truth_of(scene).events[0]
+        before, after = (Trajectory.from_states(np.zeros(1), state[None]) for state in (impact.before, impact.after))
+        ratio = float((kinetic_energy(scene, after) / kinetic_energy(scene, before))[0])
+        results.append(_digits(source, "restitution", f"r, tan α = {slope:g}", housner_ratio(alpha), ratio))
+    for alpha, share, digits in source.parameters["periods"]:
+        published = housner_period(share)
+        exact = 4.0 * truth_of(rocking_scene(alpha, share)).events[0].time
+        found = agreement(f"{published:.{digits}g}", exact, digits)
+        is_slender = alpha == source.parameters["slender"]
+        status: Status = compared(found.agrees) if is_slender else "error of the source"
+        difference = found.difference if is_slender else published - exact
+        quantity = f"T [s], α = {alpha:g}, θ₀ = {share:g} α"
+        results.append(Result(source.name, "period", quantity, f"{published:.{digits}g}", found.here, EXACT, status, "", difference))
+    return results
+
+
+RADIUS, GRAVITY = 1.0, 9.81
+"""Half diagonal [m] of the block, and gravity [m/s²]; the ratio depends on neither, the period on both as √(R/g)."""
+
+
+def housner_ratio(alpha: float) -> float:
+    """Kinetic energy after the impact over that before it: [1 - (3/2) sin² α]²."""
+    return (1.0 - 1.5 * math.sin(alpha) ** 2) ** 2
+
+
+def housner_period(share: float) -> float:
+    """The period [s] of a slender block whose amplitude is a share of α: (4/p) arcosh 1/(1 - θ₀/α), p² = 3g/4R."""
+    return 4.0 / math.sqrt(0.75 * GRAVITY / RADIUS) * math.acosh(1.0 / (1.0 - share))
+
+
+def rocking_scene(alpha: float, share: float) -> Scenario:
+    """A solid block with tan α = width/height, which starts at rest, tilted about an edge by a share of α."""
+    half_width, half_height = RADIUS * math.sin(alpha), RADIUS * math.cos(alpha)
+    tilt = about(np.array([0.0, 0.0, 1.0]), np.array([-share * alpha]))[0]
+    centre = rotate(tilt, np.array([-half_width, half_height, 0.0]))
+    return load(
+        {
+            "name": "block",
+            "duration": 4.0,
+            "body": {"shape": "box", "half_extents": [half_width, half_height, half_width], "mass": 1.0},
+            "start": {"position": centre, "orientation": tilt},
+            "gravity": {"acceleration": [0.0, -GRAVITY, 0.0]},
+            "floor": {"restitution": 0.0, "friction": "infinite"},
+        }
+    )
+
+
+def bouncing_ball(source: Source) -> list[Result]:
+    """The heights that the source prints beside the exact bounces, and the time from which the ball lies still."""
+    scene = source.scene("bounces")
+    truth = truth_of(scene)
+    results = []
+    for time, text in source.parameters["heights"].items():
+        exact = float(truth.states(np.array([float(time)]))[0, POSITION][1]) - scene.body.rounding
+        error = float(text) - exact
+        here = f"{exact:.{DECIMALS}f}"
+        results.append(Result(source.name, "FMU", f"height at {time} s [m]", text, here, EXACT, "error of the source", "", error))
+    text, exact = source.parameters["rests_from"], truth.events[-1].time
+    return [
+        *results,
+        Result(source.name, "FMU", "at rest from [s]", text, f"{exact:.6f}", EXACT, "error of the source", "", float(text) - exact),
+    ]
+
+
+FORMULAS: Mapping[str, Callable[[Source], list[Result]]] = {
+    "nesc_brick": nesc_brick,
+    "kane_free_body": kane_free_body,
+    "housner_block": housner_block,
+    "bouncing_ball": bouncing_ball,
+}

@@ -1,0 +1,111 @@
+"""The published results that dropspin comes with: a TOML file in `data` for each source, with its citation, its scenes and its digits.
+
+The files have numbers and names only; every description is dropspin's own.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from scenarios import Scenario, load
+from scenarios.body import Table
+from scenarios.errors import UnknownName
+from scenarios.loading import read_toml
+
+DATA = Path(__file__).parent / "data"
+
+
+class Case(Table):
+    """Published values of one run.
+
+    Attributes:
+        case: What distinguishes it from the other runs, such as the time step that the source states.
+        dt: The time step with which it is run here [s].
+        printed: The digits of each quantity, as the source prints them; `< 1.01` for a bound, `0.25±0.0025` for a tolerance that the
+            source states, `–` for a value that the source does not have.
+    """
+
+    case: str
+    dt: float
+    printed: tuple[str, ...]
+
+
+class Group(Table):
+    """Published values of one tool in one scene.
+
+    Attributes:
+        tool: The tool that the source describes.
+        by: The engine that runs the scene here; empty if there is none.
+        why: Why this engine gives these values.
+        why_not: Why none can give them here; empty for values that are claimed to be reproducible.
+        since: The oldest version of the engine that gives these values; empty for any.
+        scene: The name of the scene.
+        quantities: Names of quantities, as in `quantities.py`.
+        cases: The runs.
+    """
+
+    tool: str
+    by: str = ""
+    why: str = ""
+    why_not: str = ""
+    since: str = ""
+    scene: str
+    quantities: tuple[str, ...]
+    cases: tuple[Case, ...]
+
+
+class Source(Table):
+    """One source of published results.
+
+    Attributes:
+        name: The name of its file.
+        title: What it is about.
+        citation: Authors, title, year.
+        place: The file or table, and the version in which it was read.
+        licence: The licence of that file.
+        setting: The scene and the definitions of the quantities.
+        remarks: Sentences on what was found, and on what is left out.
+        significant: Number of significant digits of every value, if the source drops trailing zeros; 0 if it does not.
+        formula: A function of `formulas.py` that compares the source with an exact solution; empty if there is none.
+        parameters: The numbers that this function needs.
+        scenes: The scenes by name, with the keys of a scene's file.
+        groups: The values that engines are compared with.
+    """
+
+    name: str
+    title: str
+    citation: str
+    place: str
+    licence: str
+    setting: str
+    remarks: tuple[str, ...] = ()
+    significant: int = 0
+    formula: str = ""
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    scenes: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    groups: tuple[Group, ...] = ()
+
+    def scene(self, name: str) -> Scenario:
+        """One of the scenes."""
+        return load({"name": name, **self.scenes[name]})
+
+
+def source_names() -> list[str]:
+    """The names of all sources, in the order of their output."""
+    return sorted(path.stem for path in DATA.glob("*.toml"))
+
+
+def sources(names: Iterable[str] = ()) -> list[Source]:
+    """The sources of some names; all without a name.
+
+    Raises:
+        UnknownName: There is no source of a name.
+    """
+    known = source_names()
+    chosen = list(dict.fromkeys(names)) or known
+    for name in chosen:
+        if name not in known:
+            raise UnknownName("source", name, known)
+    return [Source.model_validate({"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]

@@ -1,0 +1,113 @@
+"""The study of the command `dropspin reproduce`: run what a source describes, and compare the digits."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from comparisons.engines.mujoco_versions import numbers_of
+from comparisons.published.formulas import FORMULAS
+from comparisons.published.printed import ABSENT, SHOWN, agreement
+from comparisons.published.quantities import quantity
+from comparisons.published.results import Result, compared
+from comparisons.published.sources import Case, Group, Source, sources
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import EngineEntry, ignore
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import Breakdown, divergence, try_record
+from scenarios import Scenario
+
+RESOURCES = ResourceLimits(processor_time=60.0)
+
+
+class Measured(NamedTuple):
+    """The values of some quantities of one run, and the version of the engine."""
+
+    values: list[float]
+    version: str
+
+
+def reproduce(
+    names: Iterable[str] = (), *, on_progress: Callable[[str, float], None] | None = None, resources: ResourceLimits = RESOURCES
+) -> list[Result]:
+    """Run what published sources describe, and compare the values with the digits that they print.
+
+    Args:
+        names: Names of sources; all of them by default.
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one run.
+
+    Returns:
+        The results, source by source.
+
+    Raises:
+        UnknownName: There is no source of a name.
+    """
+    chosen, callback = sources(names), on_progress or ignore
+    total = sum(1 + sum(len(group.cases) for group in source.groups) for source in chosen)
+    results: list[Result] = []
+    done = 0
+    with EngineProcesses(resources) as processes:
+        for source in chosen:
+            callback(source.name, done / total)
+            results += FORMULAS[source.formula](source) if source.formula else []
+            done += 1
+            for group in source.groups:
+                entry = engine_entry(group.by) if group.by else EngineEntry("", None, "missing", group.why_not)
+                for case in group.cases:
+                    callback(f"{source.name}, {entry.label}", done / total)
+                    measured = _measure(processes, entry, source.scene(group.scene), case.dt, group.quantities)
+                    results += _of_case(source, group, case, measured)
+                    done += 1
+    return results
+
+
+def _measure(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str]) -> Measured | Breakdown:
+    """The quantities of a run in the engine's process."""
+    if entry.engine is None:
+        return Breakdown(entry.absence or "missing", entry.reason)
+    try:
+        return processes.call(entry, _measured, scene, dt, names)
+    except Failed as failure:
+        return Breakdown(failure.verdict, failure.reason)
+
+
+def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str]) -> Measured | Breakdown:
+    recording = try_record(entry.adapter, scene, dt)
+    if isinstance(recording, Breakdown):
+        return recording
+    values = [quantity(name)(scene, recording.motion) for name in names]
+    return divergence(recording.motion) or Measured(values, str(recording.settings.get("version", "")))
+
+
+def _of_case(source: Source, group: Group, case: Case, measured: Measured | Breakdown) -> list[Result]:
+    """The results of one run."""
+    results = []
+    for number, (name, printed) in enumerate(zip(group.quantities, case.printed, strict=True)):
+        result = Result(source.name, group.tool, f"{case.case}: {name}" if case.case else name, printed, "", group.by, "not run")
+        if isinstance(measured, Breakdown):
+            results.append(_without_value(result, group, measured))
+        else:
+            results.append(_with_value(result, source, group, measured.values[number], measured.version))
+    return results
+
+
+def _without_value(result: Result, group: Group, broken: Breakdown) -> Result:
+    """A result whose engine gave no value."""
+    if group.why_not:
+        return replace(result, status="not reproducible", reason=group.why_not)
+    return replace(result, reason=broken.reason, verdict=broken.verdict)
+
+
+def _with_value(result: Result, source: Source, group: Group, value: float, version: str) -> Result:
+    """A result whose engine gave a value."""
+    if result.published == ABSENT:
+        return replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
+    found = agreement(result.published, value, source.significant)
+    result = replace(result, here=found.here, difference=found.difference, status=compared(found.agrees))
+    if found.agrees:
+        return result
+    if group.why_not:
+        return replace(result, status="not reproducible", reason=group.why_not)
+    if group.since and numbers_of(version) < numbers_of(group.since):
+        return replace(result, status="not reproducible", reason=f"it needs version {group.since} or later; {version} is installed")
+    return result

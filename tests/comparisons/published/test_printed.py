@@ -1,0 +1,55 @@
+"""Printed digits: rounding to them, bounds and tolerances."""
+
+import math
+
+import pytest
+
+from comparisons.published.printed import agreement
+
+
+@pytest.mark.parametrize(
+    ("printed", "value", "here"),
+    [
+        ("0.0130708", 0.01307084999, "0.0130708"),
+        ("-5.25321665064", -5.253216650644, "-5.25321665064"),
+        ("93", 93.4, "93"),
+        ("5e-3", 0.0047645, "5e-3"),
+        ("1.86413e-06", 1.864129e-6, "1.86413e-6"),
+        ("0.5600215", 0.5600215, "0.5600215"),
+    ],
+)
+def test_a_value_is_rounded_to_the_printed_digits(printed, value, here):
+    found = agreement(printed, value)
+    assert found.here == here
+    assert found.difference == value - float(printed)
+
+
+@pytest.mark.parametrize(
+    ("printed", "value"),
+    [("0.0130708", 0.01307086), ("0.0130708", 0.01307074), ("93", 93.6), ("5e-3", 0.0044), ("5e-3", 0.0056), ("0.93", math.nan)],
+)
+def test_half_a_unit_of_the_last_digit_is_the_limit(printed, value):
+    assert not agreement(printed, value).agrees
+
+
+def test_dropped_zeros_are_compared_too():
+    """A source with six significant digits prints 0.049 for 0.0490000."""
+    assert agreement("0.049", 0.049000001, significant=6).agrees
+    assert not agreement("0.049", 0.0490001, significant=6).agrees
+    assert agreement("0.049", 0.0490001).agrees
+
+
+@pytest.mark.parametrize(
+    ("printed", "inside", "outside"),
+    [
+        ("< 1.01", 1.0099, 1.01),
+        ("> 0.7", 0.7001, 0.7),
+        ("≤ 1.8e-15", 1.8e-15, 1.81e-15),
+        ("0.25±0.0025", 0.24751, 0.2474),
+        ("0.25±0.0025", 0.25249, 0.2526),
+    ],
+)
+def test_bounds_and_tolerances_of_the_source(printed, inside, outside):
+    assert agreement(printed, inside).agrees
+    assert not agreement(printed, outside).agrees
+    assert not agreement(printed, math.nan).agrees

@@ -49,6 +49,8 @@ LIMITS = {"time_limit": ["1", "0.5", "1e8"], "budget": ["0.1", "0.05", "1e8"]}
 ALWAYS = {"run": ["--time-limit", "1"], "sweep": ["--time-limit", "1"], "limits": ["--time-limit", "1", "--axis", "step"]}
 ALWAYS |= {"tradeoff": ["--budget", "0.1"], "conform": ["--time-limit", "1"], "replay": ["--no-open"]}
 """Options without which a command takes minutes or opens a browser."""
+SLOW_WITHOUT = ("run", "limits", "tradeoff", "reproduce")
+"""Commands that take long without an argument."""
 WRITTEN = ("--output", "--baseline", "--junit", "--summary", "--gif")
 
 
@@ -76,11 +78,7 @@ def command_lines(draw: st.DrawFn) -> tuple[str, ...]:
     arguments: list[str] = []
     for parameter in command(name).params:
         if isinstance(parameter, click.Argument):
-            count = (
-                draw(st.sampled_from([1, 1, 1, 1, 2, 0]))
-                if name not in ("run", "limits", "tradeoff", "reproduce")
-                else draw(st.integers(1, 2))
-            )
+            count = draw(st.integers(1, 2) if name in SLOW_WITHOUT else st.sampled_from([1, 1, 1, 1, 2, 0]))
             arguments += [draw(values(parameter)) for _ in range(count)]
             continue
         if draw(st.sampled_from([True, False, False])) or parameter.required:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 from comparisons.engines.mujoco_versions import numbers_of
 from comparisons.published.formulas import FORMULAS
@@ -17,13 +16,6 @@ from comparisons.running.recording import Breakdown, divergence, try_record
 from scenarios import Scenario
 
 RESOURCES = ResourceLimits(processor_time=60.0)
-
-
-class Measured(NamedTuple):
-    """The values of some quantities of one run, and the version of the engine."""
-
-    values: list[float]
-    version: str
 
 
 def reproduce(
@@ -55,31 +47,34 @@ def reproduce(
                 entry = engine_entry(group.by) if group.by else EngineEntry("", None, "missing", group.why_not)
                 for case in group.cases:
                     callback(f"{source.name}, {entry.label}", done / total)
-                    measured = _measure(processes, entry, source.scene(group.scene), case.dt, group.quantities)
-                    results += _of_case(source, group, case, measured)
+                    results += _of_case(source, group, case, _measure(processes, entry, source, group, case.dt))
                     done += 1
     return results
 
 
-def _measure(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str]) -> Measured | Breakdown:
+def _measure(processes: EngineProcesses, entry: EngineEntry, source: Source, group: Group, dt: float) -> list[float] | Breakdown:
     """The quantities of a run in the engine's process."""
     if entry.engine is None:
         return Breakdown(entry.absence or "missing", entry.reason)
     try:
-        return processes.call(entry, _measured, scene, dt, names)
+        return processes.call(entry, _measured, source.scene(group.scene), dt, group.quantities, group.since)
     except Failed as failure:
         return Breakdown(failure.verdict, failure.reason)
 
 
-def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str]) -> Measured | Breakdown:
+def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str], since: str) -> list[float] | Breakdown:
+    if since:
+        with entry.adapter.prepare(scene, dt) as simulation:
+            version = str(simulation.settings["version"])
+        if numbers_of(version) < numbers_of(since):
+            return Breakdown("declined", f"it needs version {since} or later; {version} is installed")
     recording = try_record(entry.adapter, scene, dt)
     if isinstance(recording, Breakdown):
         return recording
-    values = [quantity(name)(scene, recording.motion) for name in names]
-    return divergence(recording.motion) or Measured(values, str(recording.settings.get("version", "")))
+    return divergence(recording.motion) or [quantity(name)(scene, recording.motion) for name in names]
 
 
-def _of_case(source: Source, group: Group, case: Case, measured: Measured | Breakdown) -> list[Result]:
+def _of_case(source: Source, group: Group, case: Case, measured: list[float] | Breakdown) -> list[Result]:
     """The results of one run."""
     results = []
     for number, (name, printed) in enumerate(zip(group.quantities, case.printed, strict=True)):
@@ -87,27 +82,23 @@ def _of_case(source: Source, group: Group, case: Case, measured: Measured | Brea
         if isinstance(measured, Breakdown):
             results.append(_without_value(result, group, measured))
         else:
-            results.append(_with_value(result, source, group, measured.values[number], measured.version))
+            results.append(_with_value(result, source, group, measured[number]))
     return results
 
 
 def _without_value(result: Result, group: Group, broken: Breakdown) -> Result:
     """A result whose engine gave no value."""
-    if group.why_not:
-        return replace(result, status="not reproducible", reason=group.why_not)
+    if group.why_not or broken.verdict == "declined":
+        return replace(result, status="not reproducible", reason=group.why_not or broken.reason)
     return replace(result, reason=broken.reason, verdict=broken.verdict)
 
 
-def _with_value(result: Result, source: Source, group: Group, value: float, version: str) -> Result:
+def _with_value(result: Result, source: Source, group: Group, value: float) -> Result:
     """A result whose engine gave a value."""
     if result.published == ABSENT:
         return replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
     found = agreement(result.published, value, source.significant)
     result = replace(result, here=found.here, difference=found.difference, status=compared(found.agrees))
-    if found.agrees:
-        return result
-    if group.why_not:
+    if group.why_not and not found.agrees:
         return replace(result, status="not reproducible", reason=group.why_not)
-    if group.since and numbers_of(version) < numbers_of(group.since):
-        return replace(result, status="not reproducible", reason=f"it needs version {group.since} or later; {version} is installed")
     return result

@@ -1,4 +1,4 @@
-"""The page on published results: it has the output of the command."""
+"""The page on published results: it has the output of the command, with MuJoCo and PyBullet."""
 
 import re
 

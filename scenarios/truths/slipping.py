@@ -1,4 +1,4 @@
-"""A box that stands on an edge falls over on a frictionless floor: the edge slips and the centre of mass falls vertically.
+"""A body that stands on an edge falls over on a frictionless floor: the edge slips and the centre of mass falls vertically.
 
 ψ is the angle at the edge between the vertical and the centre of mass, R their distance, k = I/(M R²). Energy is conserved:
 
@@ -11,8 +11,8 @@ With sin(ψ/2) = √s cosh u, s = sin²(ψ_rest/2), the time since rest is the i
 which is not an elliptic integral. It is integrated as a Chebyshev series and inverted by Newton's method.
 
 Source: the integrals of energy and of horizontal momentum; C. W. Clenshaw & A. R. Curtis, Numerische Mathematik 2 (1960), for the time.
-Valid for: a box that stands on one edge, with any horizontal velocity, at rest or rotating about the edge too slowly to pass the top; a
-frictionless floor; gravity straight down, no damping; until the box lands. The normal force is never negative.
+Valid for: a body that stands on one edge (see `on_one_edge`), with any horizontal velocity, at rest or rotating about the edge too slowly
+to pass the top; a frictionless floor; gravity straight down, no damping; until the body lands. The normal force is never negative.
 """
 
 import math
@@ -37,19 +37,19 @@ GUESS_POINTS = 500  # of the cubic, whose error of 1e-9 Newton's method squares
 
 
 def slipping(scene: Scenario) -> Truth | None:
-    """The exact solution of a box whose edge slips."""
+    """The exact solution of a body whose edge slips."""
     floor = scene.floor
     if floor is None or floor.friction != "none" or scene.damping is not None:
         return None
     stand = on_one_edge(scene)
-    if stand is None:
+    if stand is None or stand.slope != 0.0:
         return None
     falling = stand.speed * stand.radius * math.sin(stand.angle)
     if abs(scene.initial_state[8] + falling) > TOUCHING * abs(falling):
         return None
     at_start, at_end = math.sin(0.5 * stand.angle) ** 2, math.sin(0.5 * stand.flat) ** 2
     level = at_start - 0.25 * (stand.share + math.sin(stand.angle) ** 2) * stand.radius / stand.gravity * stand.speed**2
-    if level < MIN_LEVEL:
+    if level < MIN_LEVEL or (stand.speed < 0.0 < stand.behind[0]):
         return None
     since_rest = _time_since_rest(stand, level, at_end)
     rest = math.copysign(float(since_rest(math.acosh(math.sqrt(max(at_start / level, 1.0))))), -stand.speed)

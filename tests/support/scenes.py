@@ -5,6 +5,10 @@ import math
 import numpy as np
 
 from scenarios import load
+from scenarios.rotations import about, multiply, rotate
+
+UP, AXIS = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+G = 9.8
 
 
 def standing(half=(0.2, 0.5), lean=-0.2, speed=0.0, friction="infinite", heading=0.3, axes=(0, 1, 2), sideways=(0.0, 0.0), **more):
@@ -42,6 +46,38 @@ def standing(half=(0.2, 0.5), lean=-0.2, speed=0.0, friction="infinite", heading
             },
             "gravity": {"acceleration": [0.0, -9.8, 0.0]},
             "floor": {"restitution": 0.0, "friction": friction},
+        }
+        | more
+    )
+
+
+def regular(n, radius=0.2):
+    """The corners of a regular polygon, counterclockwise from the lowest."""
+    return [[radius * math.sin(2 * math.pi * k / n), -radius * math.cos(2 * math.pi * k / n)] for k in range(n)]
+
+
+def prism(corners, speed=0.0, slope=0.0, lean=0.0, masses=None, heading=0.0, half=0.1, **more):
+    """A prism on the edge of its first corner, rotated forward by `lean`. Forward is +x turned by the heading, downhill if slope > 0."""
+    masses = [1.0] * len(corners) if masses is None else masses
+    corners = np.array(corners) - np.average(corners, axis=0, weights=masses)
+    points = [[*corner, z] for corner in corners.tolist() for z in (-half, half)]
+    turn = multiply(about(UP, np.array(heading)), about(AXIS, np.array(-lean)))
+    to_centre = rotate(turn, np.array([*-corners[0], 0.0]))
+    spin = rotate(about(UP, np.array(heading)), -speed * AXIS)
+    gravity = rotate(about(UP, np.array(heading)), G * np.array([math.sin(slope), -math.cos(slope), 0.0]))
+    return load(
+        {
+            "name": "prism",
+            "duration": 2.0,
+            "body": {"shape": "vertices", "points": points, "masses": [0.5 * m for m in masses for _ in range(2)]},
+            "start": {
+                "position": (to_centre + np.array([0.7, 0.0, -0.4])).tolist(),
+                "orientation": turn.tolist(),
+                "velocity": np.cross(spin, to_centre).tolist(),
+                "angular_velocity": spin.tolist(),
+            },
+            "gravity": {"acceleration": gravity.tolist()},
+            "floor": {"restitution": 0.0, "friction": "infinite"},
         }
         | more
     )

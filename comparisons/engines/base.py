@@ -185,18 +185,19 @@ def may_tumble(scene: Scenario) -> bool:
     return bool(np.ptp(moments) > 1e-12 * moments[-1]) and (any(scene.start.angular_velocity) or scene.floor is not None)
 
 
-def refusal_of_shape(scene: Scenario, hull: str = "") -> str | None:
+def refusal_of_shape(scene: Scenario, hull: str = "", maps_vertices: bool = False) -> str | None:
     """Why the shape of a scene's body cannot strike a floor; None if it can, or need not.
 
     Args:
         scene: The scene.
         hull: What the engine calls a body of corners, if the shape is represented so; empty for spheres and boxes themselves.
+        maps_vertices: Whether the engine maps bodies of vertices onto a floor.
     """
     if scene.floor is None:
         return f"there is no shape without a floor, and no {hull}" if hull else None
     if isinstance(scene.body, Sphere) and hull:
         return f"a {hull} would only approximate a ball"
-    return None if isinstance(scene.body, (Sphere, Box)) else "only spheres and boxes are mapped onto a floor"
+    return None if maps_vertices or isinstance(scene.body, (Sphere, Box)) else "only spheres and boxes are mapped onto a floor"
 
 
 def calibrated_label(label: str) -> str | None:

@@ -21,11 +21,11 @@ from comparisons.engines.base import (
 from comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
 from comparisons.engines.mujoco_model import INTEGRATORS, Form, calibrated_specification, default_specification
 from comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
-from comparisons.engines.mujoco_versions import BATCHES, flight_of, numbers_of, refusal, refusal_of_boxes, solver
+from comparisons.engines.mujoco_versions import BATCHES, flight_of, numbers_of, refusal, refusal_of_boxes, refusal_of_meshes, solver
 from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.measuring.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
-from scenarios.body import Box, Sphere
+from scenarios.body import Box, Sphere, Vertices
 from scenarios.mechanics import is_diagonal
 
 VERSION = numbers_of(mujoco.__version__)
@@ -119,13 +119,14 @@ class MuJoCo(Engine):
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
         if scene.damping is not None and not is_diagonal(body.inertia_tensor):
             return "MuJoCo damps along the body's own axes; these are not principal axes"
-        if (unfit := refusal_of_shape(scene, "mesh" if self.option("body") == "mesh" else "")) is not None:
+        if (unfit := self._refusal_of_shape(scene)) is not None:
             return unfit
         if floor is None or self.option("profile") == "default":
             return None
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
             return f"contacts break down at coefficients of friction above {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
-        if isinstance(body, Box) and (too_old := refusal_of_boxes(VERSION)) is not None:
+        refusal_of_contacts = {Box: refusal_of_boxes, Vertices: refusal_of_meshes}.get(type(body))
+        if refusal_of_contacts is not None and (too_old := refusal_of_contacts(VERSION)) is not None:
             return too_old
         if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
             return "RK4 has no restitution in one step: the contact's damper acts in all stages; use integrator=euler, or spring_steps=20"
@@ -134,6 +135,13 @@ class MuJoCo(Engine):
         if floor.rest_speed > 0.0:
             return "MuJoCo has no speed below which restitution is 0 (floor.rest_speed)"
         return None
+
+    def _refusal_of_shape(self, scene: Scenario) -> str | None:
+        """Why the shape of a scene's body cannot strike a floor."""
+        unfit = refusal_of_shape(scene, "mesh" if self.option("body") == "mesh" else "", maps_vertices=True)
+        if unfit is None and scene.floor is not None and isinstance(scene.body, Vertices) and scene.body.resting_height == 0.0:
+            return "a body of vertices is mapped onto a floor as a mesh, and MuJoCo has no flat meshes"
+        return unfit
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python and as MJCF."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios import Scenario
-from scenarios.body import Box, Sphere
+from scenarios.body import Box, Sphere, Vertices
 from scenarios.mechanics import is_diagonal, principal_axes
 
 Array = NDArray[np.float64]
@@ -32,7 +32,8 @@ class Form:
 
     Attributes:
         integrator: A key of `INTEGRATORS`.
-        body: `geom`; `mesh`, a box as the convex hull of its corners; or `child`, with mass and shape on a fixed child of the free body.
+        body: `geom`; `mesh`, a box as the convex hull of its corners; or `child`, with mass and shape on a fixed child of the free
+            body. A body of vertices is always a mesh.
         floor: `plane`, or `box`, whose top is the floor.
     """
 
@@ -122,8 +123,8 @@ def _floor(form: Form) -> dict[str, Any]:
 
 
 def _add_shape(spec: Any, body: Any, scene: Scenario, form: Form, **properties: Any) -> None:
-    if form.body == "mesh":
-        spec.add_mesh(name="hull", uservert=scene.body.vertices.ravel().tolist())
+    if form.body == "mesh" or isinstance(scene.body, Vertices):
+        spec.add_mesh(name="hull", uservert=scene.body.hull.ravel().tolist())
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull", **properties)
     elif isinstance(scene.body, Sphere):
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[scene.body.radius, 0.0, 0.0], **properties)

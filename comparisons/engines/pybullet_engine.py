@@ -26,10 +26,10 @@ from comparisons.engines.pybullet_settings import (
     damping_properties,
     world_parameters,
 )
-from comparisons.engines.pybullet_simulation import LARGEST_TURN, Form, PyBulletSimulation
+from comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, Form, PyBulletSimulation
 from comparisons.measuring.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
-from scenarios.body import Box
+from scenarios.body import Box, Vertices
 from scenarios.mechanics import is_diagonal
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
@@ -37,7 +37,7 @@ FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision,
 
 
 class PyBullet(Engine):
-    """Bullet's rigid body on a plane (ball) or on a large box (bodies with corners); or with its defaults (profile=default)."""
+    """Bullet's rigid body on a plane, or on a large box (boxes); or with its defaults (profile=default)."""
 
     name = "pybullet"
     order = 1.0
@@ -100,8 +100,11 @@ class PyBullet(Engine):
             return f"Bullet's damping allows no decay faster than {FASTEST_DECAY:g} per second"
         if scene.damping is not None and self.is_multibody and not self.is_default:
             return "Bullet's multibodies damp by another law, k v (1 + |v|)"
-        if (unfit := refusal_of_shape(scene, "hull" if self.option("body") == "hull" else "")) is not None or floor is None:
+        is_hull = self.option("body") == "hull"
+        if (unfit := refusal_of_shape(scene, "hull" if is_hull else "", maps_vertices=True)) is not None or floor is None:
             return unfit
+        if isinstance(scene.body, Vertices) and not is_hull and len(scene.body.hull) > MOST_BALLS:
+            return f"PyBullet's compound shapes have at most {MOST_BALLS} parts; the convex hull has {len(scene.body.hull)} vertices"
         travel = np.linalg.norm(scene.start.position) + np.linalg.norm(scene.start.velocity) * scene.duration
         if isinstance(scene.body, Box) and travel + scene.body.size > FLOOR_HALF_SIZE:
             return f"the floor is a box of {2 * FLOOR_HALF_SIZE:g} m, and the body may leave it"

@@ -21,11 +21,13 @@ from comparisons.engines.pybullet_settings import (
     world_parameters,
 )
 from scenarios import Scenario
-from scenarios.body import Box, Sphere
+from scenarios.body import Box, Sphere, Vertices
 from scenarios.state import SPIN, VELOCITY
 
 ALMOST = 0.999
 NO_PUSH = 1e-6  # relative to what gravity adds in a step
+BALL = 1e-9  # of the body's size; the radius of the balls that are its vertices, which must not be 0
+MOST_BALLS = 16  # PyBullet drops all others without notice
 LARGEST_TURN = np.pi / 4  # rad a step; beyond it Bullet's rotation is too small
 
 
@@ -37,8 +39,8 @@ class Form:
         default: Whether Bullet keeps its defaults.
         multibody: Whether the body is a btMultiBody rather than a btRigidBody.
         unclamped: Whether the clamp of a multibody's speeds is removed.
-        body: `shape`, or `hull`, a box as the convex hull of its corners.
-        floor: `plane`, `box`, or `fitting`: with calibrated settings a box for bodies with corners, else a plane.
+        body: `shape`, or `hull`, a body with corners as their convex hull.
+        floor: `plane`, `box`, or `fitting`: with calibrated settings a box for boxes, else a plane.
     """
 
     default: bool
@@ -108,8 +110,13 @@ class PyBulletSimulation(Simulation):
     def _shape(self, scene: Scenario, form: Form) -> int:
         bullet, client = self._bullet, self._client
         if form.body == "hull":
-            corners = scene.body.vertices.tolist()
+            corners = scene.body.hull.tolist()
             return int(bullet.createCollisionShape(bullet.GEOM_MESH, vertices=corners, physicsClientId=client))
+        if isinstance(scene.body, Vertices):
+            # Bullet gives a convex hull one contact point per step: a prism that rolls leaves its course by 0.07 m in 1.7 m, at 1 ms.
+            balls = [bullet.GEOM_SPHERE] * len(scene.body.hull)
+            radii, places = [BALL * scene.body.size] * len(balls), scene.body.hull.tolist()
+            return int(bullet.createCollisionShapeArray(balls, radii=radii, collisionFramePositions=places, physicsClientId=client))
         if isinstance(scene.body, Sphere):
             return int(bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=scene.body.radius, physicsClientId=client))
         assert isinstance(scene.body, Box)
@@ -117,7 +124,7 @@ class PyBulletSimulation(Simulation):
 
     def _add_floor(self, scene: Scenario, contact: dict[str, float], form: Form) -> None:
         bullet, client = self._bullet, self._client
-        fits_plane = form.default or isinstance(scene.body, Sphere)
+        fits_plane = form.default or not isinstance(scene.body, Box)
         if form.floor == "plane" or (form.floor == "fitting" and fits_plane):
             shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0], physicsClientId=client)
             top = 0.0

@@ -26,6 +26,7 @@ _SCENES = {
     "edge-impact": ("drop-box-edge",),
     "free-rotor": ("fall-tilted", "spin-asymmetric", "spin-coin", "spin-dzhanibekov", "spin-needle"),
     "principal-spin": ("fall-spin", "spin-principal", "spin-principal-50", "spin-principal-500"),
+    "rimless-wheel": ("roll-prism", "roll-prism-slope"),
     "rocking": ("rest-long", "rock-block"),
     "rolling": ("roll-ball", "roll-ball-back", "roll-ball-side", "roll-slope"),
     "slipping": ("slip-stick",),

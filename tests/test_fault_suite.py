@@ -35,6 +35,7 @@ FRICTION = {
     "acceleration of 1 mm/s² along a hidden axis": "roll-ball-back",
     "gravity along a slope dropped": "roll-slope",
     "balls of 2/3 M r²": "roll-ball",
+    "landings on an edge that take 1 % less speed": "roll-prism-slope",
     "orientation that depends on the number of earlier simulations": "spin-asymmetric",
 }
 

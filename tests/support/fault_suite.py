@@ -9,8 +9,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
@@ -410,6 +412,21 @@ def hollow(scene):
     return with_body(moments=lambda m: m * 5.0 / 3.0)(scene) if scene.body.shape == "sphere" else scene
 
 
+def landings(share):
+    """Landings on an edge take only a share of the angular velocity that they should take."""
+
+    def plant(scene):
+        rocking = import_module("scenarios.truths.rocking")  # the package has a function of this name
+        ratio = rocking._ratio
+        with mock.patch.object(rocking, "_ratio", lambda *edges: 1.0 - share * (1.0 - ratio(*edges))):
+            wrong = rocking.rocking(scene)
+        if wrong is None:
+            return undistorted
+        return lambda rows, times, dt, truth: wrong(np.minimum(times, wrong.horizon)).states
+
+    return plant
+
+
 def at_rest_below(speed):
     """No restitution in impacts below a speed."""
 
@@ -545,6 +562,7 @@ FAULTS = [
     sliding("acceleration of 1 mm/s² along a hidden axis", plant=where_it_slides(attracted)),
     sliding("gravity along a slope dropped", change=level),
     sliding("balls of 2/3 M r²", change=hollow),
+    fault("landings on an edge that take 1 % less speed", plant=landings(0.99), extra=("roll-prism-slope",)),
     fault("no restitution below 1 m/s", change=at_rest_below(1.0), extra=("bounce-elastic",)),
     fault("mirrored: left-handed axes", distort=on_rows(lambda rows, t: rows * np.array([1, 1, -1, -1, -1, 1, 1, 1, 1, -1, -1, -1, 1]))),
 ]

@@ -64,6 +64,16 @@ class ProcessesHere:
     def __exit__(self, *error: object) -> None:
         pass
 
+    def start(self, entries: Sequence[EngineEntry]) -> None:
+        """There is no process to start."""
+
+    def abandon(self) -> None:
+        """There is no process to end."""
+
+    def call(self, entry: EngineEntry, work: Callable[..., Any], *given: Any) -> Any:
+        """Call a function with an engine."""
+        return work(entry, *given)
+
     def run_engine(self, entry: EngineEntry, scene: ds.Scenario, dt: float, starts: Sequence[ds.Scenario], _: object) -> EngineRun:
         """Run a scene with an engine."""
         return run_engine(entry, scene, dt, starts)
@@ -78,12 +88,13 @@ def run_cost() -> None:
         time_method(engine, "prepare", "building")
     for engine in (Document, MuJoCo):
         time_method(engine, "prepare_batch", "building")
-    import_module("comparisons.running.run").EngineProcesses = ProcessesHere
+    for module in ("run", "parallel"):
+        import_module(f"comparisons.running.{module}").EngineProcesses = ProcessesHere
     core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
-    ds.run(core[:1], "document")  # compiles
+    ds.run(core[:1], "document", jobs=1)  # compiles
     seconds.clear()
     start = time.perf_counter()
-    results = ds.run(core, ["document", "mujoco", "pybullet"])
+    results = ds.run(core, ["document", "mujoco", "pybullet"], jobs=1)
     seconds["all of the run"] = time.perf_counter() - start
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()

@@ -29,6 +29,7 @@ class Traits(BaseModel):
         numbers: Each numeric option's default and range.
         accuracy: The values of options that set the accuracy.
         options: The options that were given and differ from the defaults.
+        compiles: Whether it compiles when a scene is first simulated.
         code: A hash of every module that the adapter loads, outside the standard library and installed packages.
     """
 
@@ -41,6 +42,7 @@ class Traits(BaseModel):
     numbers: dict[Short, NumericOption]
     accuracy: dict[Short, tuple[Short | float, ...]]
     options: dict[Short, Short]
+    compiles: bool
     code: str | None
 
 
@@ -73,6 +75,7 @@ def traits(source: str, engine: Engine, loaded: frozenset[str]) -> Traits:
         "numbers": _plain(kind.numbers),
         "accuracy": _plain(kind.accuracy),
         "options": _plain(engine.options),
+        "compiles": kind.compiles,
         "code": adapter_code(kind, loaded),
     }
     try:
@@ -99,7 +102,8 @@ def code_of(engine: Engine) -> str | None:
 
 def stand_in(known: Traits) -> StandIn:
     """The stand-in of an engine."""
-    members = {"traits": known, "name": known.name, "choices": known.choices, "numbers": known.numbers, "accuracy": known.accuracy}
+    stated = ("name", "choices", "numbers", "accuracy", "compiles")
+    members = {"traits": known} | {attribute: getattr(known, attribute) for attribute in stated}
     kind: type[StandIn] = type("StandIn", (StandIn,), members)
     return kind(known.options)
 

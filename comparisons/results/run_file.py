@@ -70,6 +70,7 @@ class _Provenance(_Table):
     settings: dict[Text, dict[Text, dict[str, Any]]]
     settings_digests: Texts = {}
     named: list[Text] = []
+    compilation: dict[Text, Seconds] = {}
 
     @model_validator(mode="after")
     def _versions(self) -> Self:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,6 @@ class EngineRun:
         perturbed: From starts perturbed by a few ulp, set by set: an estimate of what rounding may do.
         limitations: Known limitations that the engine met.
         settings: The settings that it reported.
-        time_per_step: The least wall time of a native step [s].
         outcome: What became of the scene's ensemble.
         discretisation: The discretisation that the engine states for this scene.
         order: The order that it claims.
@@ -48,7 +47,6 @@ class EngineRun:
     perturbed: list[list[Trajectory]] = field(default_factory=list)
     limitations: Sequence[KnownLimitation] = ()
     settings: dict[str, Any] = field(default_factory=dict)
-    time_per_step: float = float("nan")
     outcome: EnsembleOutcome | None = None
     discretisation: str | None = None
     order: float | None = None
@@ -85,7 +83,7 @@ def run_engine(
         found.discretisation, found.order, found.precision = verified_claims(engine, scene)
         sets = perturbed(scene, starts, found.precision)
         others = [*(starts if len(starts) > 1 else []), *chain(*sets)]
-        total = 1 + len(others) + TIMING_REPEATS
+        total = 1 + len(others)
         own = record(engine, scene, dt)
         on_simulations(1, total)
         found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
@@ -95,11 +93,38 @@ def run_engine(
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt)
         # The predicted error of a bounce is a mean over start phases.
         found.predicted = _predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}
-        steps = scene.steps(dt)
-        found.time_per_step = min(time_steps(engine, scene, dt, steps)[0] for _ in range(TIMING_REPEATS)) / steps
     except Exception as error:  # whatever an engine raises costs its own row only
         found.breakdown = classify(error)
     return found
+
+
+class Timing(NamedTuple):
+    """The time that an engine's steps take.
+
+    Attributes:
+        per_step: The least wall time of a native step [s].
+        compilation: What the first simulation took longer than later ones [s]; 0 for an engine that does not compile.
+        breakdown: Why there is no time; None if there is one, or if the engine cannot take part or declines the scene.
+        ended: Whether the engine's process ended.
+    """
+
+    per_step: float = float("nan")
+    compilation: float = 0.0
+    breakdown: Breakdown | None = None
+    ended: bool = False
+
+
+def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
+    """Time whole simulations of a scene, native steps only, and compilation apart; a failure is part of the result."""
+    engine, steps = entry.adapter, scene.steps(dt)
+    try:
+        if verified_refusal(engine.declines(scene)) is not None:
+            return Timing()
+        first = time_steps(engine, scene, dt, steps) if engine.compiles else None
+        least = min(time_steps(engine, scene, dt, steps).stepping for _ in range(TIMING_REPEATS))
+    except Exception as error:  # whatever an engine raises costs its own row only
+        return Timing(breakdown=classify(error))
+    return Timing(least / steps, 0.0 if first is None else max(first.building + first.stepping - least, 0.0))
 
 
 def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:

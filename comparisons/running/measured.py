@@ -58,10 +58,11 @@ def measure(
     phases: Sequence[StartPhase],
     exact: Sequence[Trajectory | None],
     cases: Sequence[Comparison],
+    time_per_step: float = np.nan,
 ) -> list[Measured]:
     """Every metric of one engine at one time step, judged; a remark if it has no motion."""
     scene, truth = own
-    case = Case(scene.name, engine_run.label, dt, scene.steps(dt), engine_run.time_per_step)
+    case = Case(scene.name, engine_run.label, dt, scene.steps(dt), time_per_step)
     breakdown = breakdown_of(engine_run)
     if breakdown is not None:
         return [Measured(case.remark(breakdown.verdict, breakdown.reason))]

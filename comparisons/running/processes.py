@@ -3,8 +3,7 @@
 An engine of one's own is imported and constructed in its process, with the working directory on Python's path, and nowhere else.
 A segmentation fault ends the engine's process, not the run; an endless loop ends at a limit of processor time, which other load on the
 machine does not use up; a leak ends at a limit of memory; output of an engine is dropped. A process that ended is replaced for the next
-piece of work; each leads a process group, with which the engine's own children end. One engine runs at a time, so that timings are not
-disturbed.
+piece of work; each leads a process group, with which the engine's own children end.
 """
 
 import ctypes
@@ -48,6 +47,8 @@ NEAR_LIMIT = 0.5
 """Share of the memory limit above which a crash mentions it."""
 WALL_TIME_FACTOR = 10.0
 """Wall time allowed over processor time allowed: an engine that sleeps forever uses no processor time."""
+COMPILATION = 600.0
+"""Processor time allowed for compiling, beyond that for the work [s], of an engine that compiles."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,12 @@ class EngineProcesses:
         except Failed as failure:
             return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
 
+    def start(self, entries: Sequence[EngineEntry]) -> None:
+        """Start the processes of engines: a process that is forked while another thread compiles or imports may wait for it forever."""
+        for entry in entries:
+            self._pools[entry.label] = self._pool(entry)
+            wait([self._pools[entry.label].schedule(int)])
+
     def call(
         self,
         entry: EngineEntry,
@@ -154,9 +161,8 @@ class EngineProcesses:
             self._pools[entry.label] = self._pool(entry)
         self._processes[entry.label].value = 0
         self._counts[entry.label][:] = [0, 0]
-        task = self._pools[entry.label].schedule(
-            _call, args=[work, given, self._resources.processor_time], timeout=WALL_TIME_FACTOR * self._resources.processor_time
-        )
+        allowed = self._resources.processor_time + (COMPILATION if entry.engine is not None and entry.engine.compiles else 0.0)
+        task = self._pools[entry.label].schedule(_call, args=[work, given, allowed], timeout=WALL_TIME_FACTOR * allowed)
         largest = 0
         try:
             while not wait([task], timeout=POLL).done:
@@ -170,10 +176,10 @@ class EngineProcesses:
             result: Result = task.result()
         except OutOfTime:
             self._end_group(entry.label)
-            raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * self._resources.processor_time:g} s of wall time") from None
+            raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * allowed:g} s of wall time") from None
         except ProcessExpired as end:
             self._end_group(entry.label)
-            verdict, reason = self._verdict(end.exitcode)
+            verdict, reason = _verdict(end.exitcode, allowed)
             if largest > NEAR_LIMIT * self._resources.memory:
                 reason += f"; it used {largest / GIB:.1f} GiB of memory, and its limit is {self._resources.memory / GIB:g} GiB"
             raise Failed(verdict, reason) from None
@@ -213,14 +219,6 @@ class EngineProcesses:
         pool.join()
         self._end_group(entry.label)
 
-    def _verdict(self, exit_code: int | None) -> tuple[Verdict, str]:
-        """The verdict and the reason for an engine whose process ended."""
-        if exit_code == -signal.SIGXCPU:
-            return "timed_out", f"not done after {self._resources.processor_time:g} s of processor time"
-        if exit_code is not None and exit_code < 0:
-            return "crashed", f"its process was ended by {signal.Signals(-exit_code).name}"
-        return "crashed", f"its process ended with exit code {exit_code}"
-
     def _pool(self, entry: EngineEntry) -> ProcessPool:
         context = get_context(self._start_method)
         # Without a lock: the parent would wait forever for a process that is killed while it holds one.
@@ -244,6 +242,15 @@ class EngineProcesses:
         self._closed = True
         for label in list(self._processes):
             self._end_group(label)
+
+
+def _verdict(exit_code: int | None, allowed: float) -> tuple[Verdict, str]:
+    """The verdict and the reason for an engine whose process ended, which was allowed some processor time [s]."""
+    if exit_code == -signal.SIGXCPU:
+        return "timed_out", f"not done after {allowed:g} s of processor time"
+    if exit_code is not None and exit_code < 0:
+        return "crashed", f"its process was ended by {signal.Signals(-exit_code).name}"
+    return "crashed", f"its process ended with exit code {exit_code}"
 
 
 _busy: list["ctypes.c_long"] = []

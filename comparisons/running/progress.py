@@ -11,10 +11,11 @@ class Progress(NamedTuple):
         scene: Name of the scene.
         engine: Label of the engine.
         dt: Time step [s].
-        done: Simulations done: from the start phases, from perturbed starts, and for the timing.
+        done: Simulations done: from the start phases, and from perturbed starts.
         total: Simulations to do; 0 before the first.
         finished: Whether all is done that was asked for at this time step.
         added: Whether the time step or the engine was added to extrapolate an error, beyond what was asked for.
+        timing: Whether the engine's steps are being timed, before all other work.
     """
 
     scene: str
@@ -24,6 +25,7 @@ class Progress(NamedTuple):
     total: int = 0
     finished: bool = False
     added: bool = False
+    timing: bool = False
 
 
 OnProgress = Callable[[Progress], None]

@@ -4,7 +4,8 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,16 +179,27 @@ def divergence(motion: Trajectory) -> Breakdown | None:
     return None if bad is None else Breakdown("diverged", f"the state is not finite at t = {motion.t[bad]:g} s")
 
 
-def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> tuple[float, Array]:
-    """The wall time of native stepping until the state is there [s], and this state, shape (13,).
+class TimedSteps(NamedTuple):
+    """Wall times of building a simulation and of stepping until the state is there [s], and this state, shape (13,)."""
+
+    building: float
+    stepping: float
+    state: Array
+
+
+def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> TimedSteps:
+    """Time native steps.
 
     An engine may return from `advance` before its steps are done, and wait for them when the state is read.
 
     Raises:
         Diverged: The simulation broke down.
     """
+    times = [time.perf_counter()]
     with engine.prepare(scene, dt) as simulation:
-        start = time.perf_counter()
+        times.append(time.perf_counter())
         simulation.advance(steps)
         state = simulation.state()
-        return time.perf_counter() - start, state
+        times.append(time.perf_counter())
+    building, stepping = (later - earlier for earlier, later in pairwise(times))
+    return TimedSteps(building, stepping, state)

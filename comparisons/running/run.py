@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from threading import Lock
 from typing import Any, NamedTuple
 
 from comparisons.engines.base import Engine
@@ -12,11 +13,14 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
 from comparisons.results.provenance import provenance
 from comparisons.results.results import Results, joined
+from comparisons.running.engine_run import Timing, time_engine
 from comparisons.running.entries import CONSTRUCTION, engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
-from comparisons.running.processes import EngineProcesses, ResourceLimits
+from comparisons.running.parallel import as_jobs, work_in_parallel
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.progress import OnProgress, Progress
-from comparisons.running.scene_run import run_scene
+from comparisons.running.recording import Breakdown
+from comparisons.running.scene_run import Timings, run_scene
 from comparisons.running.start_phases import StartPhase
 from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
@@ -32,6 +36,7 @@ def run(
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
     keep: Callable[[Results], None] | None = None,
     done: Iterable[Results] = (),
+    jobs: int | None = None,
 ) -> Results:
     """Run every scene with every engine at every time step, measure, and judge.
 
@@ -42,11 +47,13 @@ def run(
             results, and one that cannot be imported or constructed `broken`.
         dt: One time step or several [s]; three or more that span a factor of four give orders and asymptotic errors.
         on_progress: Called with scene, engine, time step and the simulations done: before and while an engine works, twice a second, and
-            with `finished` after each of the len(scenes) * len(engines) * len(dt) pieces of work.
+            with `finished` after each of the len(scenes) * len(engines) * len(dt) pieces of work; in any thread, but in one at a time.
         resources: The processor time [s] and memory [bytes] that an engine may use for one of these pieces; each engine runs in a process
             of its own.
         keep: Called with the results of each scene as soon as it is done.
         done: Results of scenes from an earlier run. Those with the same request, versions and machine are not run again.
+        jobs: Number of scenes to run at a time; by default, the number of processors that this process may use. It changes no result: steps
+            are timed before, while nothing else runs.
 
     Returns:
         The measurements with their verdicts, predictions, agreements of engines, and the motions.
@@ -58,18 +65,63 @@ def run(
     entries, dts = prepared.entries, prepared.dts
     stamp = _stamp(prepared, resources)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if not what_changed(part.provenance, stamp)}
-    report, keep = on_progress or ignore, keep or ignore
-    parts = []
+    parts: dict[str, Results] = {}
+    pending: list[StartPhase] = []
+    lock, keep = Lock(), keep or ignore
+
+    def report(progress: Progress) -> None:
+        if on_progress is not None:
+            with lock:
+                on_progress(progress)
+
+    for scene, truth in zip(prepared.scenes, prepared.truths, strict=True):
+        if scene.model_dump_json() in earlier:
+            parts[scene.name] = replace(earlier[scene.model_dump_json()], scenes={scene.name: scene})
+            for entry, step in product(entries, dts):
+                report(Progress(scene.name, entry.label, step, finished=True))
+        else:
+            pending.append(StartPhase(scene, truth))
+    timings = _timings([own.scene for own in pending], entries, dts, resources, report)
+
+    def of_scene(own: StartPhase, processes: EngineProcesses, _: Callable[[], None]) -> Results:
+        return run_scene(own, entries, dts, processes, report, stamp, timings)
+
+    def on_done(own: StartPhase, part: Results) -> None:
+        parts[own.scene.name] = part
+        keep(part)
+
+    present = [entry for entry in entries if not entry.absence]
+    work_in_parallel(iter(pending), of_scene, min(as_jobs(jobs), max(len(pending), 1)), resources, on_done, entries=present)
+    stamp["compilation"] = _compilation(timings)
+    return joined([parts[scene.name] for scene in prepared.scenes], stamp)
+
+
+def _timings(
+    scenes: Sequence[Scenario], entries: Sequence[EngineEntry], dts: Sequence[float], resources: ResourceLimits, on_progress: OnProgress
+) -> Timings:
+    """The time that the steps of each engine take, measured while nothing else runs."""
+    found = {}
     with EngineProcesses(resources) as processes:
-        for scene, truth in zip(prepared.scenes, prepared.truths, strict=True):
-            if scene.model_dump_json() in earlier:
-                parts.append(replace(earlier[scene.model_dump_json()], scenes={scene.name: scene}))
-                for entry, step in product(entries, dts):
-                    report(Progress(scene.name, entry.label, step, finished=True))
-                continue
-            parts.append(run_scene(StartPhase(scene, truth), entries, dts, processes, report, stamp))
-            keep(parts[-1])
-    return joined(parts, stamp)
+        for scene, entry, dt in product(scenes, entries, dts):
+            on_progress(Progress(scene.name, entry.label, dt, timing=True))
+            if entry.absence:
+                timing = Timing()
+            else:
+                try:
+                    timing = processes.call(entry, time_engine, scene, dt)
+                except Failed as failure:
+                    timing = Timing(breakdown=Breakdown(failure.verdict, failure.reason), ended=True)
+            found[scene.name, entry.label, dt] = timing
+    return found
+
+
+def _compilation(timings: Timings) -> dict[str, float]:
+    """The longest time that each engine took to compile a scene [s], of engines that compile."""
+    found: dict[str, float] = {}
+    for (_, label, _), timing in timings.items():
+        if timing.compilation > 0.0:
+            found[label] = max(found.get(label, 0.0), timing.compilation)
+    return found
 
 
 class PreparedRun(NamedTuple):

@@ -15,15 +15,18 @@ from comparisons.measuring.metrics import METRICS
 from comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from comparisons.results.measurement import Case, Measurement, as_table
 from comparisons.results.results import Results, TrajectoryKey
-from comparisons.running.engine_run import EngineRun
+from comparisons.running.engine_run import EngineRun, Timing
 from comparisons.running.ensembles import judge_differences, judge_means
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
 from comparisons.running.processes import EngineProcesses
-from comparisons.running.progress import OnProgress, Progress, reporter
+from comparisons.running.progress import OnProgress, OnSimulations, Progress, reporter
 from comparisons.running.start_phases import StartPhase
 from comparisons.running.studies import study_engine
 from scenarios import Trajectory
+
+Timings = Mapping[tuple[str, str, float], Timing]
+"""By scene, engine and time step."""
 
 
 @dataclass
@@ -48,6 +51,7 @@ def run_scene(
     processes: EngineProcesses,
     on_progress: OnProgress,
     stamp: Mapping[str, Any],
+    timings: Timings,
 ) -> Results:
     """Run one scene with every engine at every time step.
 
@@ -58,6 +62,7 @@ def run_scene(
         processes: The engines' processes.
         on_progress: Called before, while and after each engine works.
         stamp: The run's provenance.
+        timings: The time that the engines' steps take.
     """
     scene = own.scene
     labels = tuple(entry.label for entry in entries)
@@ -68,9 +73,10 @@ def run_scene(
         for entry in entries:
             progress = Progress(scene.name, entry.label, dt)
             on_progress(progress)
-            engine_run = processes.run_engine(entry, scene, dt, [phase.scene for phase in phases], reporter(progress, on_progress))
+            timing = timings[scene.name, entry.label, dt]
+            engine_run = _run(processes, entry, own, dt, phases, timing, reporter(progress, on_progress))
             cases = [] if breakdown_of(engine_run) else compare(engine_run.phases, phases, exact)
-            found.measured[entry.label] += measure(own, dt, engine_run, phases, exact, cases)
+            found.measured[entry.label] += measure(own, dt, engine_run, phases, exact, cases, timing.per_step)
             _collect(found, own, dt, engine_run)
             compared.append((engine_run, cases))
             on_progress(progress._replace(finished=True))
@@ -84,6 +90,22 @@ def run_scene(
     table, predictions, agreements = map(as_table, (found.means + _with_convergence(found, labels), found.predictions, found.agreements))
     provenance = {**stamp, "settings": found.settings}
     return Results(table, {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance, predictions, agreements)
+
+
+def _run(
+    processes: EngineProcesses,
+    entry: EngineEntry,
+    own: StartPhase,
+    dt: float,
+    phases: Sequence[StartPhase],
+    timing: Timing,
+    on_simulations: OnSimulations,
+) -> EngineRun:
+    """Run a scene with an engine, unless its process ended while it was timed."""
+    if timing.ended:
+        return EngineRun(entry.label, timing.breakdown)
+    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases], on_simulations)
+    return engine_run if engine_run.breakdown else replace(engine_run, breakdown=timing.breakdown)
 
 
 def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRun) -> None:

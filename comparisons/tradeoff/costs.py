@@ -43,10 +43,10 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
 def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
     """Wall time of some time steps [s]; NaN if the state after them is not finite."""
     try:
-        taken, state = time_steps(entry.adapter, scene, dt, steps)
+        timed = time_steps(entry.adapter, scene, dt, steps)
     except Diverged:
         return math.nan
-    return taken if np.isfinite(state).all() else math.nan
+    return timed.stepping if np.isfinite(timed.state).all() else math.nan
 
 
 def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float]) -> list[float]:
@@ -70,10 +70,11 @@ def _timed_batch(engine: Engine, scene: Scenario, dt: float, steps: int) -> floa
         batch = engine.prepare_batch(members, dt)
         if batch is None:
             return math.nan
-        start = time.perf_counter()
-        batch.advance(steps)
-        states = batch.states()
-        timings.append(time.perf_counter() - start)
+        with batch:
+            start = time.perf_counter()
+            batch.advance(steps)
+            states = np.asarray(batch.states())
+            timings.append(time.perf_counter() - start)
         if not np.isfinite(states).all():
             return math.nan
     return min(timings[1:]) / BATCH  # the first round compiles

@@ -69,3 +69,9 @@ def seconds_option(name: str, default: float, of: str, least: float = 0.0) -> Ca
 def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
     """The option `--time-limit` of an engine's process."""
     return seconds_option("--time-limit", default, f"that {of}.", least=0.01)
+
+
+def jobs_option(pieces: str) -> Callable[[Command], Command]:
+    """The option `-j`: how many pieces of work to do at a time."""
+    text = f"Number of {pieces} to run at a time; it changes no result. [default: the number of processors]"
+    return click.option("-j", "--jobs", type=click.IntRange(min=1), metavar="N", help=text)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, baseline_option, time_limit_option
+from reports.commands.options import as_json, baseline_option, jobs_option, time_limit_option
 from reports.terminal.safe import echo
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
 @click.option("--seed", type=int, metavar="SEED", help="Seed of the random scenes. [default: a fresh seed, which is printed]")
 @click.option("--symmetries", "test_symmetries", is_flag=True, help="Also test the symmetries of each scene at the finest time step.")
 @time_limit_option(300.0, "an engine may use for one scene at one time step")
+@jobs_option("scenes")
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that are already measured are not run again.")
 @click.option("-v", "--verbose", is_flag=True, help="Also print a table of every metric for each scene.")
@@ -55,6 +56,7 @@ def run_command(
     seed: int | None,
     test_symmetries: bool,
     time_limit: float,
+    jobs: int | None,
     baseline: str | None,
     resume: bool,
     verbose: bool,
@@ -89,7 +91,7 @@ def run_command(
         echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
     file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
     show = None if json_output else print_table if verbose else print_summary
-    results = _run(loaded, drawn, engines, dts, output, time_limit, resume, show, test_symmetries=test_symmetries)
+    results = _run(loaded, drawn, engines, dts, output, time_limit, jobs, resume, show, test_symmetries=test_symmetries)
     checked = _checked(results, file, json_output)
     if json_output:
         echo(json_rows(checked.results.table))
@@ -107,6 +109,7 @@ def _run(
     dts: tuple[float, ...],
     output: str,
     time_limit: float,
+    jobs: int | None,
     resume: bool,
     show: "Callable[[Results], None] | None",
     *,
@@ -133,7 +136,9 @@ def _run(
                     show_progress(progress)
 
                 resources = ResourceLimits(processor_time=time_limit)
-                results = run(scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=earlier)
+                results = run(
+                    scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=earlier, jobs=jobs
+                )
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
                 echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)

@@ -22,22 +22,27 @@ def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
         seen: set[str] = set()
 
         def line(progress: Progress) -> None:
-            if progress.scene not in seen:
-                seen.add(progress.scene)
+            what = "" if progress.timing else progress.scene
+            if what not in seen:
+                seen.add(what)
+                if progress.timing:
+                    echo("timing the steps of each engine", err=True)
+                    return
                 elapsed = _duration(time.monotonic() - start)
-                echo(f"running {progress.scene} (scene {len(seen)} of {scenes}, {elapsed} elapsed)", err=True)
+                echo(f"running {progress.scene} (scene {len(seen - {''})} of {scenes}, {elapsed} elapsed)", err=True)
 
         yield line
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console, transient=True) as bar:
         task, finished = bar.add_task("starting", total=float(scenes * pieces)), 0
+        shares: dict[str, float] = {}  # of the pieces of work that are not finished, by scene
 
         def advance(progress: Progress) -> None:
             nonlocal finished
             finished += progress.finished
-            share = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
-            bar.update(task, completed=finished + share, description=safe(_described(progress)))
+            shares[progress.scene] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
+            bar.update(task, completed=finished + sum(shares.values()), description=safe(_described(progress)))
 
         yield advance
 
@@ -122,6 +127,8 @@ def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
 
 def _described(progress: Progress) -> str:
     """Scene, engine, time step, and the number of the simulation."""
+    if progress.timing:
+        return f"timing {progress.engine} in {progress.scene}, {in_ms(progress.dt)}"
     start = f", start {min(progress.done + 1, progress.total)} of {progress.total}" if progress.total and not progress.finished else ""
     return f"{progress.scene}, {progress.engine}, {in_ms(progress.dt)}{' (added)' if progress.added else ''}{start}"
 

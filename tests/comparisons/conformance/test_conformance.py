@@ -435,5 +435,5 @@ def test_engine_that_does_not_wait_for_its_steps_is_found(monkeypatch):
 def test_timing_ends_when_the_state_is_there(monkeypatch):
     clock = Clock()
     monkeypatch.setattr(recording, "time", clock)
-    seconds, _ = time_steps(working_in(clock, 1e-6, 2e-4), load("spin-principal"), 1e-3, 10)
+    seconds = time_steps(working_in(clock, 1e-6, 2e-4), load("spin-principal"), 1e-3, 10).stepping
     assert seconds == pytest.approx(10 * (1e-6 + 2e-4))

@@ -103,7 +103,9 @@ def test_json_of_a_run_is_the_table_to_the_last_digit(tmp_path):
             assert row["value"] == float(kept["value"])
             assert (row["upper"] is None) == (kept["upper"] == "")
     assert any(0 < abs(row["value"]) < 1e-11 for row in rows)
-    assert re.fullmatch(r"running spin-principal \(scene 1 of 1, \d+ s elapsed\)\nwriting the report\n", done.stderr)
+    assert re.fullmatch(
+        r"timing the steps of each engine\nrunning spin-principal \(scene 1 of 1, \d+ s elapsed\)\nwriting the report\n", done.stderr
+    )
 
 
 def test_expectations_for_other_steps_are_not_called_missing(tmp_path):
@@ -130,7 +132,22 @@ def test_an_expectation_that_would_never_be_judged_is_refused(expectation, messa
         assert "gate.toml: expect[0]" in done.stderr
 
 
-INTERRUPTED = ("run", "spin-principal", "fall-spin", "drop-ball", "-e", "mujoco", "-e", "pybullet", "--dt", "0.004", "--dt", "0.002")
+INTERRUPTED = (
+    "run",
+    "-j",
+    "1",
+    "spin-principal",
+    "fall-spin",
+    "drop-ball",
+    "-e",
+    "mujoco",
+    "-e",
+    "pybullet",
+    "--dt",
+    "0.004",
+    "--dt",
+    "0.002",
+)
 
 
 def rows_of(folder):

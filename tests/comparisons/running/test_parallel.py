@@ -1,0 +1,88 @@
+"""Scenes on several processors: the same results bit for bit, and failures that cost their own rows."""
+
+import os
+import signal
+import time
+
+import pandas as pd
+import pytest
+from support import engines as made
+
+import dropspin as ds
+from comparisons.running import processes
+
+SCENES = ["drop-ball", "spin-asymmetric", "fall-tilted"]
+DTS = [8e-3, 4e-3, 2e-3]
+
+
+def test_results_do_not_depend_on_the_number_of_jobs():
+    one, several = (ds.run(SCENES, ["document", "mujoco"], DTS, jobs=jobs) for jobs in (1, 3))
+    for name in ("table", "agreements", "predictions"):
+        first, second = (getattr(results, name).drop(columns="time_per_step") for results in (one, several))
+        pd.testing.assert_frame_equal(first, second, check_exact=True)
+    assert list(one.scenes) == list(several.scenes) == SCENES
+    assert (several.measurements["time_per_step"] > 0.0).all()
+    for key, motion in one.trajectories.items():
+        assert (motion.states == several.trajectories[key].states).all()
+
+
+@pytest.mark.parametrize("jobs", [0, -1, 1.5, True, "2"])
+def test_number_of_jobs_that_is_none_is_refused(jobs):
+    with pytest.raises(ds.DropspinError, match=r"jobs: got .*; give a whole number above 0"):
+        ds.run("fall-spin", "document", 0.01, jobs=jobs)
+
+
+class Killed(made.Exact):
+    """Ends its process in one scene."""
+
+    name = "killed"
+
+    def prepare(self, scene, dt):
+        if scene.name == "fall-spin":
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().prepare(scene, dt)
+
+
+def test_engine_that_ends_its_process_costs_its_own_rows_and_is_tried_once(monkeypatch):
+    called = []
+    run_engine = processes.EngineProcesses.run_engine
+    monkeypatch.setattr(processes.EngineProcesses, "run_engine", lambda *given: called.append(given[1].label) or run_engine(*given))
+    table = ds.run(["fall-spin", "spin-principal"], [Killed(), "document"], 0.01, jobs=2).table
+    broken = table[table["verdict"] == "crashed"]
+    assert list(zip(broken["scene"], broken["engine"], strict=True)) == [("fall-spin", "killed")]
+    assert "ended by SIGKILL" in broken["reason"].iloc[0]
+    assert sorted(called) == ["document", "document", "killed"]
+
+
+class Compiling(made.Exact):
+    """Compiles when its process first simulates."""
+
+    name = "compiling"
+    compiles = True
+    compiled = False
+
+    def prepare(self, scene, dt):
+        if not Compiling.compiled:
+            until = time.process_time() + 3.0
+            while time.process_time() < until:
+                pass
+            Compiling.compiled = True
+        return super().prepare(scene, dt)
+
+
+class SlowAtFirst(Compiling):
+    """The same without saying so."""
+
+    name = "slow-at-first"
+    compiles = False
+
+
+def test_compilation_is_measured_apart_and_not_limited():
+    """It takes longer than the limit, which ends an engine that does not say that it compiles."""
+    limit = ds.ResourceLimits(processor_time=0.5)
+    results = ds.run("fall-spin", [Compiling(), SlowAtFirst()], 0.01, resources=limit)
+    assert results.provenance["compilation"].keys() == {"compiling"}
+    assert results.provenance["compilation"]["compiling"] > 2.0
+    of = results.table.set_index("engine")
+    assert set(of.loc["compiling", "verdict"]) == {"passed", "measured"}
+    assert of.loc["slow-at-first", "verdict"] == "timed_out"

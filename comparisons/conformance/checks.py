@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import cast
 
 from comparisons.conformance.clock import check_time, check_velocity_lag
+from comparisons.conformance.compilation import check_compilation
 from comparisons.conformance.exceptions import described, whole_traceback
 from comparisons.conformance.isolation import check_files, check_repeats
 from comparisons.conformance.motion import check_motion
@@ -21,6 +22,7 @@ from comparisons.running.verification import BuildMismatch
 from scenarios.errors import UnknownName
 
 CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
+    "compilation": check_compilation,
     "claims": check_claims,
     "declines": check_refusals,
     "builds what is meant": check_builds,

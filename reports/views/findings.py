@@ -216,7 +216,7 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
         parts = [
             _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
             *(profile.clause for profile in profiles if profile.engine == engine),
-            *_cost(engine, times),
+            *_cost(engine, times, results.provenance.get("compilation", {}).get(engine)),
         ]
         sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
         if len(opened):
@@ -269,15 +269,17 @@ def _named(names: Collection[str], kind: str) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def _cost(engine: str, times: Mapping[str, float]) -> list[str]:
-    """The time per step of an engine, and its ratio to that of the fastest engine."""
+def _cost(engine: str, times: Mapping[str, float], compilation: float | None) -> list[str]:
+    """The time per step of an engine, its ratio to that of the fastest engine, and the time to compile a scene [s] if it compiles."""
     timed = {label: time for label, time in times.items() if not math.isnan(time)}
     if engine not in timed:
         return []
     absolute = f"{duration(float(f'{timed[engine]:.2g}'))} per step"
     fastest = min(timed, key=timed.__getitem__)
     ratio = float(f"{timed[engine] / timed[fastest]:.2g}")
-    return [absolute if engine == fastest or ratio == 1.0 else f"{absolute}, {ratio:g} times that of {fastest}"]
+    relative = "" if engine == fastest or ratio == 1.0 else f", {ratio:g} times that of {fastest}"
+    compiling = "" if compilation is None else f", after compiling a scene for up to {duration(float(f'{compilation:.2g}'))}"
+    return [f"{absolute}{relative}{compiling}"]
 
 
 def _scenes(count: int) -> str:

@@ -39,8 +39,9 @@ def quantity(metric: str) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time in ms, µs or ns, to three significant digits."""
-    scale, unit = next((scale, unit) for scale, unit in ((1e3, "ms"), (1e6, "µs"), (1e9, "ns")) if seconds * scale >= 1.0 or unit == "ns")
+    """A time in s, ms, µs or ns, to three significant digits."""
+    units = ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns"))
+    scale, unit = next((scale, unit) for scale, unit in units if seconds * scale >= 1.0 or unit == "ns")
     return f"{seconds * scale:.3g} {unit}"
 
 

@@ -437,3 +437,45 @@ def test_timing_ends_when_the_state_is_there(monkeypatch):
     monkeypatch.setattr(recording, "time", clock)
     seconds = time_steps(working_in(clock, 1e-6, 2e-4), load("spin-principal"), 1e-3, 10).stepping
     assert seconds == pytest.approx(10 * (1e-6 + 2e-4))
+
+
+def compiling_in(clock, compiles, first, again=0.0):
+    """An engine that needs these times [s] of a clock to build its first simulation, and another number of steps than before."""
+
+    class Compiling(made.Exact):
+        name = "compiling"
+
+        def prepare(self, scene, dt):
+            simulation = made.ExactSimulation(scene, dt)
+            clock.now += 0.1 if known else first
+            advance = simulation.advance
+
+            def advanced(steps):
+                clock.now += again * (bool(known) and steps not in known)
+                known.add(steps)
+                advance(steps)
+
+            simulation.advance = advanced
+            return simulation
+
+    known = set()
+    Compiling.compiles = compiles
+    return Compiling()
+
+
+@pytest.mark.parametrize(
+    ("compiles", "first", "again", "outcome", "message"),
+    [
+        (False, 9.0, 0.0, "passed", "the engine does not compile for long"),
+        (False, 62.1, 0.0, "noted", "the first simulation takes 62 s longer than the second; set compiles = True"),
+        (True, 62.1, 0.0, "passed", "a scene compiles in 62 s; a simulation of 24 steps then takes 1e+02 ms"),
+        (True, 62.1, 60.0, "noted", "; with another number of steps it compiles again, for 60 s"),
+    ],
+)
+def test_compilation_is_measured_and_stated(monkeypatch, compiles, first, again, outcome, message):
+    clock = Clock()
+    monkeypatch.setattr(recording, "time", clock)
+    engine_ = compiling_in(clock, compiles, first, again)
+    found = run_check(EngineEntry(engine_.label, engine_), "compilation")
+    assert found.outcome == outcome
+    assert message in found.message

@@ -103,9 +103,9 @@ def test_json_of_a_run_is_the_table_to_the_last_digit(tmp_path):
             assert row["value"] == float(kept["value"])
             assert (row["upper"] is None) == (kept["upper"] == "")
     assert any(0 < abs(row["value"]) < 1e-11 for row in rows)
-    assert re.fullmatch(
-        r"timing the steps of each engine\nrunning spin-principal \(scene 1 of 1, \d+ s elapsed\)\nwriting the report\n", done.stderr
-    )
+    timing, running, writing = done.stderr.splitlines()
+    assert (timing, writing) == ("timing the steps of each engine", "writing the report")
+    assert re.fullmatch(r"running spin-principal \(scene 1 of 1, \d+ s elapsed\)", running)
 
 
 def test_expectations_for_other_steps_are_not_called_missing(tmp_path):

@@ -5,7 +5,10 @@ BIN    := $(VENV)/bin
 IS_NEW := -c 'import sys; sys.exit(sys.version_info < (3, 11))'
 PYTHON ?= $(shell for python in python3.11 python3; do "$$python" $(IS_NEW) 2> /dev/null && echo "$$python" && break; done)
 
-.PHONY: report test test-browser test-all fuzz faults coverage bench examples docs lint clean
+# Extras that are too large for the environment of `make test`, or exclude one another: each is tested in its own environment.
+HEAVY_ENGINES := mjx mujoco-warp newton
+
+.PHONY: report test test-browser test-engines test-all fuzz faults coverage bench examples docs lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
@@ -18,6 +21,11 @@ test-browser: $(VENV)/.installed-browser  ## the report and the replay in a real
 
 test-all: lint test test-browser docs ## everything, and the studies that take minutes
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+
+test-engines: $(HEAVY_ENGINES:%=test-engine-%)  ## adapters of engines with an environment of their own; one alone: make test-engine-mjx
+
+test-engine-%: .venvs/%/.installed
+	.venvs/$*/bin/python -m pytest tests/heavy_engines --engine $*
 
 fuzz: $(VENV)/.installed-dev          ## commands with damaged files, wrong adapters and odd options: FUZZ_CASES=2000 FUZZ_SEED=0
 	FUZZ_CASES=$(or $(FUZZ_CASES),2000) $(BIN)/python -m pytest -n 2 --dist worksteal tests/fuzz
@@ -46,7 +54,7 @@ lint: $(VENV)/.installed-dev          ## style, types, import contracts
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf $(VENV) out
+	rm -rf $(VENV) .venvs out
 
 $(VENV)/bin/python:
 	@"$(PYTHON)" $(IS_NEW) 2> /dev/null || \
@@ -68,6 +76,14 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev
 	touch $@
+
+.venvs/%/.installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m venv .venvs/$*
+	.venvs/$*/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	.venvs/$*/bin/python -m pip install --quiet --disable-pip-version-check --group test --editable '.[$*]'
+	touch $@
+
+.PRECIOUS: .venvs/%/.installed
 
 $(VENV)/.installed-browser: $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group browser

@@ -245,7 +245,10 @@ class Engine:
     `symmetries` compares the motions.
     """
     compiles: ClassVar[bool] = False
-    """Whether the engine compiles when a scene is first simulated; that is then done and timed apart from the simulations."""
+    """Whether the engine compiles when a scene is first simulated; that is then done and timed apart from the simulations.
+
+    A batch may then differ from single simulations by rounding.
+    """
     reasons: ClassVar[Mapping[str, str]] = {}
     """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
 

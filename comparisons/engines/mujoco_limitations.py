@@ -16,14 +16,23 @@ from scenarios.trajectory import Trajectory
 AT_REST = 1e-3  # m/s; a slip that friction has stopped, and a body that rests, may still have this speed
 
 
-def limitations_met(scene: Scenario, states: Array, dt: float) -> Iterator[KnownLimitation]:
-    """The limitations that a motion met; states have shape (n, 13), one for each time step dt [s]."""
+def limitations_met(scene: Scenario, states: Array, dt: float, *, estimated: bool = False) -> Iterator[KnownLimitation]:
+    """The limitations that a motion met.
+
+    Args:
+        scene: The scene.
+        states: Shape (n, 13), one for each time step.
+        dt: Time step [s].
+        estimated: Whether the regularisation of a contact has MuJoCo's estimate of its inverse inertia, which is exact for balls alone, and
+            never larger than the exact one.
+    """
     if scene.floor is None:
         return
     before, after = states[:-1], states[1:]
     arms = rotate(before[:, None, ORIENTATION], scene.body.vertices) - [0.0, scene.body.rounding, 0.0]
     touching = before[:, None, 1] + arms[..., 1] <= 0.0
-    if float(-states[:, 8].min()) > AT_REST and (scene.floor.friction != "none" or (touching.sum(axis=1) > 1).any()):
+    box = int(estimated and not scene.body.rounding)
+    if float(-states[:, 8].min()) > AT_REST and (scene.floor.friction != "none" or (touching.sum(axis=1) > 1 - box).any()):
         yield _of_impedance(scene, before, arms, touching)
     if isinstance(scene.floor.friction, float):
         velocities = after[:, None, VELOCITY] + cross(after[:, None, SPIN], arms)

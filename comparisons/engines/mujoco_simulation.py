@@ -29,10 +29,7 @@ class MuJoCoSimulation(Simulation):
         self._model = specification.compile()
         self.velocity_lag = 0.0 if settings["integrator"] == "rk4" else 0.5 * self._model.opt.timestep
         self.settings = {"version": mujoco.__version__, **settings}
-        if scene.damping is not None:
-            rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)
-            rates[3:] *= np.diag(scene.body.inertia_tensor)
-            self._model.dof_damping[:] = rates
+        set_damping(self._model, scene)
         self._data = mujoco.MjData(self._model)
         _place(self._data, scene)
         self._steps = 0
@@ -45,14 +42,14 @@ class MuJoCoSimulation(Simulation):
 
     def state(self) -> Array:
         rows = np.concatenate([self._data.qpos, self._data.qvel])[None]
-        return _to_world(rows)[0]
+        return to_world(rows)[0]
 
     def record(self, steps: int, every: int = 1) -> Array:
         with _quiet():
             rows = self._each_step(steps) if every == 1 and steps else self._some_steps(steps, every)
         _raise_if_bad([self._data], f"in step {self._steps + _last_good_row(rows) * every + 1}")
         self._steps += (len(rows) - 1) * every
-        states = _to_world(rows)
+        states = to_world(rows)
         self.known_limitations = (
             list(limitations_met(self._scene, states, self._model.opt.timestep))
             if every == 1 and self.settings["profile"] == "calibrated"
@@ -106,7 +103,7 @@ class MuJoCoBatch(BatchSimulation):
         self._now = self._rolled_out(steps)[:, -1].copy() if steps else self._now
 
     def states(self) -> Array:
-        return _to_world(self._now[:, ROW])
+        return to_world(self._now[:, ROW])
 
     def record(self, steps: int, every: int = 1) -> Array:
         if not steps:
@@ -114,7 +111,7 @@ class MuJoCoBatch(BatchSimulation):
         first, later = self._now, self._rolled_out(steps)
         self._now = later[:, -1].copy()
         rows = np.concatenate([first[:, np.newaxis, ROW], later[:, every - 1 :: every, ROW]], axis=1)
-        return _to_world(rows.reshape(-1, 13)).reshape(rows.shape)
+        return to_world(rows.reshape(-1, 13)).reshape(rows.shape)
 
     def _rolled_out(self, steps: int) -> Array:
         """Full states after each step, shape (size, steps, n)."""
@@ -126,11 +123,8 @@ class MuJoCoBatch(BatchSimulation):
 
 def _place(data: Any, scene: Scenario) -> None:
     """Write a scene's start into the positions and velocities of the free body."""
-    start = scene.initial_state
-    data.qpos[0:3] = start[POSITION]
-    data.qpos[3:7] = start[WXYZ]
-    data.qvel[0:3] = start[VELOCITY]
-    data.qvel[3:6] = rotate(conjugate(start[ORIENTATION]), start[SPIN])
+    start = from_world(scene.initial_state)
+    data.qpos[:], data.qvel[:] = start[:7], start[7:]
 
 
 def _full_state(model: Any, data: Any) -> Array:
@@ -152,8 +146,22 @@ def _last_good_row(rows: Array) -> int:
     return max(0, int(np.argmax(bad)) - 1)
 
 
-def _to_world(rows: Array) -> Array:
-    """States from rows of [position, quaternion w x y z, velocity, angular velocity in the body frame], shape (n, 13)."""
+def set_damping(model: Any, scene: Scenario) -> None:
+    """Give a compiled model the scene's damping."""
+    if scene.damping is not None:
+        rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)
+        rates[3:] *= np.diag(scene.body.inertia_tensor)
+        model.dof_damping[:] = rates
+
+
+def from_world(states: Array) -> Array:
+    """MuJoCo's coordinates, [position, quaternion w x y z, velocity, angular velocity in the body frame], of states, shape (..., 13)."""
+    spins = rotate(conjugate(states[..., ORIENTATION]), states[..., SPIN])
+    return np.concatenate([states[..., POSITION], states[..., WXYZ], states[..., VELOCITY], spins], axis=-1)
+
+
+def to_world(rows: Array) -> Array:
+    """States from MuJoCo's coordinates, as `from_world` returns them, shape (n, 13)."""
     states = np.empty_like(rows)
     states[:, POSITION] = rows[:, 0:3]
     states[:, WXYZ] = rows[:, 3:7]

@@ -192,7 +192,9 @@ def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str
     if name == HALVES:
         return _halves(entry, scene, dt, own)
     if name == BATCH:
-        return _batched(entry, scene, dt, own), None
+        # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
+        effects = (lambda: _effects(entry, scene, dt, own, _perturbed(scene, entry))) if entry.adapter.compiles else None
+        return _batched(entry, scene, dt, own), effects
     other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
     return [(own, _motion(other, scene, dt))], lambda: _effects(entry, scene, dt, own, _perturbed(scene, entry))
 

@@ -377,6 +377,17 @@ def test_batch_that_differs_from_single_simulations_fails(fault):
     assert message.startswith("a batch of three: ")
 
 
+@pytest.mark.parametrize(("excess", "outcomes"), [(1e-15, set()), (1e-9, {"failed"})])
+def test_batch_of_an_engine_that_compiles_may_differ_by_rounding_alone(excess, outcomes):
+    def changed(motions):
+        motions[1:, 1:] *= 1.0 + excess
+        return motions
+
+    compiling = type("Compiling", (type(documented()),), {"compiles": True})
+    found = not_passed(made.in_batches("batched", changed, compiling), "symmetries")
+    assert {outcome for outcome, _ in found.values()} == outcomes
+
+
 def test_lost_symmetry_is_noted_with_its_first_step():
     """A hidden acceleration along an axis of the world."""
     pushed = documented((RETURN, f"x = x + np.array([1e-2 * self.data.time, 0.0, 0.0])\n        {RETURN}"))

@@ -1,0 +1,176 @@
+"""The engine `mjx`: MJX, MuJoCo's algorithms in JAX, with the calibrated contacts of `mujoco`; compiled for each kind of scene.
+
+Models are arguments of the compiled functions, not constants in them: scenes that differ in numbers alone, such as sizes, time steps and
+starts, share one compilation.
+"""
+
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from io import StringIO
+from typing import Any, ClassVar
+
+import jax
+import mujoco
+import numpy as np
+from jax import numpy as jnp
+
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, version
+from comparisons.engines.mujoco_contact import contact
+from comparisons.engines.mujoco_engine import REASONS, MuJoCo
+from comparisons.engines.mujoco_limitations import limitations_met
+from comparisons.engines.mujoco_model import Form, calibrated_specification
+from comparisons.engines.mujoco_simulation import from_world, set_damping, to_world
+from comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
+from scenarios import Scenario
+from scenarios.rotations import rotate
+
+with redirect_stdout(StringIO()):  # it prints that Warp is not installed, which it does not need
+    from mujoco import mjx
+
+CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
+STICKING = 1e4
+"""Friction of a floor that grips, in single precision; with 1e5 a gripping corner can become NaN, with 1e3 a turning box slips."""
+CHUNK = 1000
+"""States that one call of the compiled function records at most."""
+
+
+class MJX(Engine):
+    """MJX's free body and, where the scene has a floor, one contact pair."""
+
+    name, compiles = "mjx", True
+    choices: ClassVar = {"precision": ("float32", "float64"), "integrator": ("euler", "implicitfast", "rk4")}
+    reasons: ClassVar = {name: REASONS[name] for name in ("solref", "solimp", "solreffriction", "condim", "friction", "jacobian")} | {
+        "cone": "elliptic, or pyramidal without friction, where it has no effect: MJX has no elliptic contacts of one dimension",
+        "eulerdamp": "disable: without damping MJX need not compute the acceleration from the contact force again, which in single "
+        "precision errs by 8.5e-4 of a rebound",
+    }
+
+    @property
+    def precision(self) -> type:  # type: ignore[override]  # it depends on the option
+        """JAX's default is single precision."""
+        return np.float64 if self.option("precision") == "float64" else np.float32
+
+    @property
+    def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
+        """That of MuJoCo's manual."""
+        return self._mujoco.order
+
+    @property
+    def _mujoco(self) -> MuJoCo:
+        return MuJoCo({"integrator": self.option("integrator")})
+
+    def discretisation(self, scene: Scenario) -> str | None:
+        """MuJoCo's, but the gyroscopic term is explicit in `implicitfast` too, and RK4's rotations are those of MuJoCo before 4.0."""
+        if self.option("integrator") == "rk4":
+            return RUNGE_KUTTA_SINCE[max(since for since in RUNGE_KUTTA_SINCE if since <= numbers_of(version("mujoco-mjx")))]
+        return MuJoCo().discretisation(scene)
+
+    def declines(self, scene: Scenario) -> str | None:
+        recomputed = self.option("integrator") == "implicitfast" or scene.damping is not None
+        if scene.floor is not None and recomputed and self.precision is np.float32:
+            return (
+                "with damping or implicitfast, MJX computes accelerations from contact forces, whose rounding errors in single precision "
+                "change a rebound by 8.5e-4; use precision=float64"
+            )
+        return self._mujoco.declines(scene)
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return MJXSimulation(scene, dt, self.option("integrator"), self.precision)
+
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
+        return MJXBatch(MJXSimulation(members[0], dt, self.option("integrator"), self.precision), members)
+
+
+class MJXSimulation(Simulation):
+    """A model and its data on JAX's default device."""
+
+    def __init__(self, scene: Scenario, dt: float, integrator: str, precision: type) -> None:
+        jax.config.update("jax_enable_x64", precision is np.float64)  # for the whole process; each engine has one of its own
+        self.velocity_lag = 0.0 if integrator == "rk4" else 0.5 * dt
+        self._scene, self._dt, floor = scene, dt, scene.floor
+        pair = {} if floor is None else contact(floor.restitution, floor.friction, dt)
+        if floor is not None and floor.friction == "infinite" and precision is np.float32:
+            pair["friction"][:2] = [STICKING, STICKING]
+        spec = calibrated_specification(scene, dt, Form(integrator), pair, {})
+        solver: dict[str, str] = {}
+        if pair:
+            solver |= {"cone": "pyramidal" if pair["condim"] == 1 else "elliptic", "jacobian": "dense"}
+            spec.option.cone = CONES[solver["cone"]]
+        if scene.damping is None:
+            solver["eulerdamp"] = "disable"
+            spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        model = spec.compile()
+        set_damping(model, scene)
+        # The radii are a constant of the compiled functions, which use them for height fields alone.
+        self.model = mjx.put_model(model).tree_replace({"_impl.geom_rbound_hfield": np.zeros(model.ngeom)})
+        row = jnp.array(from_world(scene.initial_state))
+        self.data = mjx.make_data(self.model).replace(qpos=row[:7], qvel=row[7:])
+        device = jax.devices()[0]
+        self.settings = {
+            "version": version("mujoco-mjx"),
+            "mujoco": mujoco.__version__,
+            "jax": jax.__version__,
+            "device": f"{device.platform} ({device.device_kind})",
+            "precision": np.dtype(precision).name,
+            "integrator": integrator,
+            **solver,
+            **pair,
+        }
+
+    def advance(self, steps: int) -> None:
+        self.data, _ = _recorded(self.model, self.data, 1, steps)
+        self.data.qpos.block_until_ready()
+
+    def state(self) -> Array:
+        return to_world(np.concatenate([self.data.qpos, self.data.qvel], dtype=float)[None])[0]
+
+    def record(self, steps: int, every: int = 1) -> Array:
+        found, left = [self.state()[None]], steps // every
+        while left:
+            self.data, rows = _recorded(self.model, self.data, min(left, CHUNK), every)
+            found.append(to_world(np.asarray(rows[: min(left, CHUNK)], dtype=float)))
+            left -= min(left, CHUNK)
+        states = np.concatenate(found)
+        self.known_limitations = list(limitations_met(self._scene, states, self._dt, estimated=True)) if every == 1 else []
+        return states
+
+    def as_built(self) -> AsBuilt:
+        axes = rotate(np.array(self.model.body_iquat[1], dtype=float)[[1, 2, 3, 0]], np.eye(3))
+        inertia = axes.T @ np.diag(np.array(self.model.body_inertia[1], dtype=float)) @ axes
+        return AsBuilt(float(self.model.body_mass[1]), inertia, np.array(self.model.opt.gravity, dtype=float))
+
+
+class MJXBatch(BatchSimulation):
+    """Starts that one vectorised program steps together."""
+
+    def __init__(self, first: MJXSimulation, members: Sequence[Scenario]) -> None:
+        self.velocity_lag, self._model = first.velocity_lag, first.model
+        rows = jnp.array(from_world(np.array([member.initial_state for member in members])))
+        self._data = jax.vmap(lambda row: first.data.replace(qpos=row[:7], qvel=row[7:]))(rows)
+
+    def advance(self, steps: int) -> None:
+        self._data = _advanced_together(self._model, self._data, steps)
+        self._data.qpos.block_until_ready()
+
+    def states(self) -> Array:
+        return to_world(np.concatenate([self._data.qpos, self._data.qvel], axis=1, dtype=float))
+
+
+def _advanced(model: Any, data: Any, steps: Any) -> Any:
+    return jax.lax.fori_loop(0, steps, lambda _, now: mjx.step(model, now), data)
+
+
+_advanced_together = jax.jit(jax.vmap(_advanced, in_axes=(None, 0, None)))
+
+
+def _recording(model: Any, data: Any, count: Any, every: Any) -> tuple[Any, Any]:
+    """The data after `count` times `every` steps, and the coordinates after each `every`, in the first rows of an array (CHUNK, 13)."""
+
+    def step(row: Any, found: Any) -> Any:
+        now = _advanced(model, found[0], every)
+        return now, found[1].at[row].set(jnp.concatenate([now.qpos, now.qvel]))
+
+    return jax.lax.fori_loop(0, count, step, (data, jnp.zeros((CHUNK, 13))))
+
+
+_recorded = jax.jit(_recording)

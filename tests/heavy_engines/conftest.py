@@ -1,0 +1,21 @@
+"""The option --engine: the engine whose adapter is tested, in an environment that has it."""
+
+from comparisons.results.provenance import versions
+
+
+def pytest_addoption(parser):
+    parser.addoption("--engine", required=True, help="the engine's name, as in `dropspin list engines`")
+
+
+def pytest_report_header():
+    """The versions that are tested."""
+    return ", ".join(f"{package} {version}" for package, version in versions().items() if version)
+
+
+def pytest_generate_tests(metafunc):
+    """Each label of the engine is a case."""
+    if "case" in metafunc.fixturenames:
+        from support.heavy_engines import CASES
+
+        cases = CASES[metafunc.config.getoption("engine")]
+        metafunc.parametrize("case", cases, ids=[case.label for case in cases])

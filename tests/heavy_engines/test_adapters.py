@@ -1,0 +1,68 @@
+"""Adapters of engines with an environment of their own: conformance, flight, one bounce, batches, precision."""
+
+import json
+
+import numpy as np
+import pytest
+from support import cli
+
+import scenarios
+from comparisons.conformance.checks import CHECKS
+from comparisons.engines.registry import engine
+from comparisons.running.recording import simulate
+from comparisons.running.run import measure
+
+STEPS = 100
+DT = 2e-3
+
+
+def test_adapter_conforms(case, tmp_path):
+    """Every check passes, or notes a peculiarity of the engine."""
+    done = cli.spawn("conform", case.label, "--json", "--time-limit", 600, cwd=tmp_path, timeout=3600.0)
+    found = json.loads(done.stdout)
+    assert [row for row in found if row["outcome"] not in ("passed", "noted", "declined")] == []
+    assert [row["check"] for row in found] == list(CHECKS)
+    assert done.returncode == 0
+
+
+def shortened(name, duration):
+    return scenarios.load(name).model_copy(update={"duration": duration})
+
+
+def test_free_rotation_has_the_error_that_was_measured(case):
+    """Against the exact asymmetric rotor, to a twentieth; so an integrator that changes is noticed."""
+    scene = shortened("spin-asymmetric", 1.0)
+    error = measure(scene, simulate(scene, case.label, DT))["orientation_error"]
+    assert error == pytest.approx(case.turned, rel=0.05)
+
+
+def test_ball_rebounds_with_the_restitution_of_the_scene(case):
+    scene = shortened("drop-ball", 0.8)
+    if case.restitution is None:
+        assert engine(case.label).declines(scene)
+        return
+    assert abs(measure(scene, simulate(scene, case.label, DT))["restitution_error"]) <= case.restitution
+
+
+def test_batch_takes_the_steps_of_single_simulations(case):
+    """Of three starts that differ in each number."""
+    chosen, scene = engine(case.label), scenarios.load("spin-asymmetric")
+    start = scene.initial_state
+    members = [scene.starting_at(start + 0.01 * k * np.repeat([1.0, 0.0, 1.0], [3, 4, 6])) for k in range(3)]
+    together = chosen.prepare_batch(members, DT)
+    together.advance(STEPS // 2)
+    together.advance(STEPS - STEPS // 2)
+    for member, state in zip(members, np.asarray(together.states(), dtype=float), strict=True):
+        with chosen.prepare(member, DT) as simulation:
+            simulation.advance(STEPS)
+            np.testing.assert_allclose(state, simulation.state(), rtol=0, atol=case.batch * float(np.finfo(chosen.precision).eps))
+
+
+def test_state_has_the_precision_that_is_claimed(case):
+    """Position and velocity are numbers of single precision if, and only if, the engine claims it."""
+    chosen = engine(case.label)
+    with chosen.prepare(scenarios.load("fall-spin"), DT) as simulation:
+        simulation.advance(STEPS)
+        linear = simulation.state()[[0, 1, 2, 7, 8, 9]]
+        assert simulation.settings["version"]
+    assert np.array_equal(linear, linear.astype(np.float32)) == (chosen.precision is np.float32)

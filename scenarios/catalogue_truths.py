@@ -11,6 +11,7 @@ _SCENES = {
         "bounce-99",
         "bounce-9999",
         "bounce-elastic",
+        "bounce-threshold",
         "drop-ball",
         "drop-ball-brisk",
         "drop-ball-dull",

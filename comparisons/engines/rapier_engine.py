@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, may_tumble, refusal_of_shape, version
 from comparisons.measuring.predictions import spins_steadily
 from scenarios import Scenario, truth_for
-from scenarios.body import Box, Sphere
+from scenarios.body import Sphere
 from scenarios.mechanics import principal_axes
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, PARTS
@@ -53,8 +53,6 @@ class Rapier(Engine):
             return unfit
         if floor.rest_speed > 0.0:
             return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
-        if isinstance(body, Box) and not isinstance(floor.friction, str):
-            return "Rapier's friction on a sliding face depends on the direction and turns the motion by up to 3 degrees"
         if floor.restitution == 0.0:
             return None
         if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):

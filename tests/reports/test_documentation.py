@@ -85,7 +85,7 @@ def test_page_on_choosing_a_step_shows_the_output_of_its_commands(tmp_path):
 
 
 FINDING = re.compile(
-    r"^- .+: (?P<order>order of )?`(?P<name>\w+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
+    r"^- .+: (?P<order>order of )?`(?P<name>[\w ]+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
     r"  `dropspin (?P<command>run .+)`$",
     re.MULTILINE,
 )
@@ -112,6 +112,7 @@ def test_commands_of_the_page_on_engines_measure_the_values_printed_there(comman
     finest = min((one["dt"] for one in results if one["dt"]), default=None)
     for row in findings()[command]:
         kinds = {"order"} if row["order"] else {"asymptotic_error"} if row["relation"] == "→" else {"truth", "invariant"}
+        kinds = {"symmetry"} if "--symmetries" in command else kinds
         if row["value"] is None:
             assert {one["verdict"] for one in results} == {row["name"]}
             continue

@@ -667,7 +667,7 @@ def scenes_with(*wanted: str) -> list[str]:
 def failed_checks(number: int, scenes: Sequence[str] = ()) -> list[tuple[str, str]]:
     """The scenes, by default those that the engine is meant for, and the checks in them that it fails."""
     with np.errstate(all="ignore"):
-        found = run(scenes or scenes_with("core", *ENGINES[number].extra), ENGINES[number])
+        found = run(scenes or scenes_with("core", *ENGINES[number].extra), ENGINES[number], jobs=1)  # one engine on each processor
     bad = found.table[found.table["verdict"].isin(["failed", "crashed", "diverged"])]
     return [(row.scene, f"{row.kind} of {row.metric}" if row.metric else row.verdict) for row in bad.itertuples()]
 

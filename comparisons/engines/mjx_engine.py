@@ -10,26 +10,20 @@ from io import StringIO
 from typing import Any, ClassVar
 
 import jax
-import mujoco
 import numpy as np
 from jax import numpy as jnp
 
 from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, version
-from comparisons.engines.mujoco_contact import contact
-from comparisons.engines.mujoco_engine import REASONS, MuJoCo
+from comparisons.engines.mujoco_engine import MuJoCo
 from comparisons.engines.mujoco_limitations import limitations_met
-from comparisons.engines.mujoco_model import Form, calibrated_specification
-from comparisons.engines.mujoco_simulation import from_world, set_damping, to_world
+from comparisons.engines.mujoco_ports import REASONS, built, ported_model
+from comparisons.engines.mujoco_simulation import from_world, to_world
 from comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
 from scenarios import Scenario
-from scenarios.rotations import rotate
 
 with redirect_stdout(StringIO()):  # it prints that Warp is not installed, which it does not need
     from mujoco import mjx
 
-CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
-STICKING = 1e4
-"""Friction of a floor that grips, in single precision; with 1e5 a gripping corner can become NaN, with 1e3 a turning box slips."""
 CHUNK = 1000
 """States that one call of the compiled function records at most."""
 
@@ -37,13 +31,8 @@ CHUNK = 1000
 class MJX(Engine):
     """MJX's free body and, where the scene has a floor, one contact pair."""
 
-    name, compiles = "mjx", True
+    name, compiles, reasons = "mjx", True, REASONS
     choices: ClassVar = {"precision": ("float32", "float64"), "integrator": ("euler", "implicitfast", "rk4")}
-    reasons: ClassVar = {name: REASONS[name] for name in ("solref", "solimp", "solreffriction", "condim", "friction", "jacobian")} | {
-        "cone": "elliptic, or pyramidal without friction, where it has no effect: MJX has no elliptic contacts of one dimension",
-        "eulerdamp": "disable: without damping MJX need not compute the acceleration from the contact force again, which in single "
-        "precision errs by 8.5e-4 of a rebound",
-    }
 
     @property
     def precision(self) -> type:  # type: ignore[override]  # it depends on the option
@@ -87,20 +76,8 @@ class MJXSimulation(Simulation):
     def __init__(self, scene: Scenario, dt: float, integrator: str, precision: type) -> None:
         jax.config.update("jax_enable_x64", precision is np.float64)  # for the whole process; each engine has one of its own
         self.velocity_lag = 0.0 if integrator == "rk4" else 0.5 * dt
-        self._scene, self._dt, floor = scene, dt, scene.floor
-        pair = {} if floor is None else contact(floor.restitution, floor.friction, dt)
-        if floor is not None and floor.friction == "infinite" and precision is np.float32:
-            pair["friction"][:2] = [STICKING, STICKING]
-        spec = calibrated_specification(scene, dt, Form(integrator), pair, {})
-        solver: dict[str, str] = {}
-        if pair:
-            solver |= {"cone": "pyramidal" if pair["condim"] == 1 else "elliptic", "jacobian": "dense"}
-            spec.option.cone = CONES[solver["cone"]]
-        if scene.damping is None:
-            solver["eulerdamp"] = "disable"
-            spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-        model = spec.compile()
-        set_damping(model, scene)
+        self._scene, self._dt = scene, dt
+        model, settings = ported_model(scene, dt, integrator, precision)
         # The radii are a constant of the compiled functions, which use them for height fields alone.
         self.model = mjx.put_model(model).tree_replace({"_impl.geom_rbound_hfield": np.zeros(model.ngeom)})
         row = jnp.array(from_world(scene.initial_state))
@@ -108,13 +85,9 @@ class MJXSimulation(Simulation):
         device = jax.devices()[0]
         self.settings = {
             "version": version("mujoco-mjx"),
-            "mujoco": mujoco.__version__,
             "jax": jax.__version__,
             "device": f"{device.platform} ({device.device_kind})",
-            "precision": np.dtype(precision).name,
-            "integrator": integrator,
-            **solver,
-            **pair,
+            **settings,
         }
 
     def advance(self, steps: int) -> None:
@@ -135,9 +108,8 @@ class MJXSimulation(Simulation):
         return states
 
     def as_built(self) -> AsBuilt:
-        axes = rotate(np.array(self.model.body_iquat[1], dtype=float)[[1, 2, 3, 0]], np.eye(3))
-        inertia = axes.T @ np.diag(np.array(self.model.body_inertia[1], dtype=float)) @ axes
-        return AsBuilt(float(self.model.body_mass[1]), inertia, np.array(self.model.opt.gravity, dtype=float))
+        model = self.model
+        return built(model.body_mass[1], model.body_inertia[1], model.body_iquat[1], model.opt.gravity)
 
 
 class MJXBatch(BatchSimulation):

@@ -1,0 +1,50 @@
+"""MuJoCo models for its ports to other languages, which have the calibrated contacts of `mujoco` but not all of its flags."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from comparisons.engines.base import Array, AsBuilt
+from comparisons.engines.mujoco_contact import contact
+from comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
+from comparisons.engines.mujoco_model import Form, calibrated_specification
+from comparisons.engines.mujoco_simulation import set_damping
+from scenarios import Scenario
+from scenarios.rotations import rotate
+
+STICKING = 1e4
+"""Friction of a floor that grips, in single precision; with 1e5 a gripping corner can become NaN in MJX, with 1e3 a turning box slips."""
+CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
+REASONS = {name: MUJOCO_REASONS[name] for name in ("solref", "solimp", "solreffriction", "condim", "jacobian")} | {
+    "friction": f"the scene's coefficient; where the floor grips, {STICKING:g} in single precision and 1e6 in double",
+    "cone": "elliptic, or pyramidal without friction, where it has no effect: MJX has no elliptic contacts of one dimension",
+    "eulerdamp": "disable: without damping, MJX need not compute the acceleration from the contact force again; in single precision a "
+    "rebound would err by 8.5e-4",
+}
+
+
+def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -> tuple[Any, dict[str, Any]]:
+    """A compiled model without the flags that ports lack (autoreset, diagexact), and its settings."""
+    floor = scene.floor
+    pair = {} if floor is None else contact(floor.restitution, floor.friction, dt)
+    if floor is not None and floor.friction == "infinite" and precision is np.float32:
+        pair["friction"][:2] = [STICKING, STICKING]
+    spec = calibrated_specification(scene, dt, Form(integrator), pair, {})
+    settings: dict[str, Any] = {"mujoco": mujoco.__version__, "precision": np.dtype(precision).name, "integrator": integrator}
+    spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if pair:
+        settings |= {"cone": "pyramidal" if pair["condim"] == 1 else "elliptic", "jacobian": "dense"}
+        spec.option.cone = CONES[settings["cone"]]
+    if scene.damping is None:
+        settings["eulerdamp"] = "disable"
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+    model = spec.compile()
+    set_damping(model, scene)
+    return model, settings | pair
+
+
+def built(mass: float, moments: Array, axes: Array, gravity: Array) -> AsBuilt:
+    """What a port built: mass, principal moments, the quaternion [w, x, y, z] of their axes, and gravity, in its own precision."""
+    turned = rotate(np.array(axes, dtype=float)[[1, 2, 3, 0]], np.eye(3))
+    return AsBuilt(float(mass), turned.T @ np.diag(np.array(moments, dtype=float)) @ turned, np.array(gravity, dtype=float))

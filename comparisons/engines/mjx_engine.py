@@ -80,9 +80,9 @@ class MJXSimulation(Simulation):
         model, settings = ported_model(scene, dt, integrator, precision)
         # The radii are a constant of the compiled functions, which use them for height fields alone.
         self.model = mjx.put_model(model).tree_replace({"_impl.geom_rbound_hfield": np.zeros(model.ngeom)})
-        row = jnp.array(from_world(scene.initial_state))
-        self.data = mjx.make_data(self.model).replace(qpos=row[:7], qvel=row[7:])
         device = jax.devices()[0]
+        row = jax.device_put(from_world(scene.initial_state), device)  # placed as results are, else the second call compiles again
+        self.data = mjx.make_data(self.model).replace(qpos=row[:7], qvel=row[7:])
         self.settings = {
             "version": version("mujoco-mjx"),
             "jax": jax.__version__,
@@ -117,7 +117,7 @@ class MJXBatch(BatchSimulation):
 
     def __init__(self, first: MJXSimulation, members: Sequence[Scenario]) -> None:
         self.velocity_lag, self._model = first.velocity_lag, first.model
-        rows = jnp.array(from_world(np.array([member.initial_state for member in members])))
+        rows = jax.device_put(from_world(np.array([member.initial_state for member in members])), jax.devices()[0])
         self._data = jax.vmap(lambda row: first.data.replace(qpos=row[:7], qvel=row[7:]))(rows)
 
     def advance(self, steps: int) -> None:

@@ -7,7 +7,6 @@ processor, with the same states.
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-import mujoco_warp as mjw
 import numpy as np
 import warp as wp
 
@@ -18,7 +17,8 @@ from comparisons.engines.mujoco_ports import REASONS, built, ported_model
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from scenarios import Scenario
 
-wp.config.quiet = True  # Warp prints devices, and each module that it compiles
+wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
+import mujoco_warp as mjw  # noqa: E402
 
 
 class MuJoCoWarp(Engine):
@@ -47,10 +47,10 @@ class MuJoCoWarp(Engine):
         return MuJoCoWarpSimulation(scene, Worlds([scene], dt, self.option("integrator")))
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
-        return MuJoCoWarpBatch(Worlds(members, dt, self.option("integrator")))
+        return Worlds(members, dt, self.option("integrator"))
 
 
-class Worlds:
+class Worlds(BatchSimulation):
     """Worlds of one model on Warp's default device, with their step as a graph."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, integrator: str) -> None:
@@ -77,8 +77,10 @@ class Worlds:
         """MuJoCo's coordinates of each world, shape (size, 13)."""
         return np.concatenate([self._data.qpos.numpy(), self._data.qvel.numpy()], axis=1, dtype=float)
 
-    def record(self, steps: int, every: int) -> Array:
-        """The states now and after each `every` steps, shape (size, 1 + steps // every, 13)."""
+    def states(self) -> Array:
+        return to_world(self.coordinates())
+
+    def record(self, steps: int, every: int = 1) -> Array:
         rows = [self.coordinates()]
         for _ in range(steps // every):
             self.advance(every)
@@ -97,7 +99,7 @@ class MuJoCoWarpSimulation(Simulation):
         self._worlds.advance(steps)
 
     def state(self) -> Array:
-        return to_world(self._worlds.coordinates())[0]
+        return self._worlds.states()[0]
 
     def record(self, steps: int, every: int = 1) -> Array:
         [states] = self._worlds.record(steps, every)
@@ -108,19 +110,3 @@ class MuJoCoWarpSimulation(Simulation):
         model: Any = self._worlds.model
         mass, moments, axes = (part.numpy()[0, 1] for part in (model.body_mass, model.body_inertia, model.body_iquat))
         return built(mass, moments, axes, model.opt.gravity.numpy()[0])
-
-
-class MuJoCoWarpBatch(BatchSimulation):
-    """Many worlds, stepped together."""
-
-    def __init__(self, worlds: Worlds) -> None:
-        self.velocity_lag, self._worlds = worlds.velocity_lag, worlds
-
-    def advance(self, steps: int) -> None:
-        self._worlds.advance(steps)
-
-    def states(self) -> Array:
-        return to_world(self._worlds.coordinates())
-
-    def record(self, steps: int, every: int = 1) -> Array:
-        return self._worlds.record(steps, every)

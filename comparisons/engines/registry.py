@@ -41,6 +41,7 @@ BUILT_IN = {
     "drake": _Home("comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
     "mjx": _Home("comparisons.engines.mjx_engine", "MJX", "jax", "pip install 'dropspin[mjx]'"),
     "mujoco-warp": _Home("comparisons.engines.mujoco_warp_engine", "MuJoCoWarp", "mujoco_warp", "pip install 'dropspin[mujoco-warp]'"),
+    "newton": _Home("comparisons.engines.newton_engine", "Newton", "newton", "pip install 'dropspin[newton]'"),
 }
 
 CURES = {

@@ -14,7 +14,7 @@ from typing import Any
 from scenarios.text import printable
 
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
-STAMPED = (*MEASURING, "mujoco", "pybullet", "rapier3d", "dartpy", "drake", "mujoco-mjx", "jax", "mujoco-warp", "warp-lang")
+STAMPED = (*MEASURING, "mujoco", "pybullet", "rapier3d", "dartpy", "drake", "mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang")
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))
 """The packages that results depend on; the reports only show them."""
 

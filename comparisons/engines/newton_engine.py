@@ -1,0 +1,161 @@
+"""The engine `newton`: Newton's rigid body with one of its solvers, over a ground plane; in single precision.
+
+XPBD alone has restitution; it acts on the velocity after gravity, hence v+ = e (u + g dt). Contacts of the others are springs and dampers.
+"""
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, Simulation, refusal_of_shape, version
+from scenarios import Scenario
+from scenarios.body import Box, Sphere
+from scenarios.rotations import length
+from scenarios.state import SPIN
+
+wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
+import newton  # noqa: E402
+
+STICKING = 1e4
+UNDAMPED = {"angular_damping": 0.0}
+SOLVERS: dict[str, tuple[str, dict[str, Any]]] = {
+    "xpbd": ("SolverXPBD", UNDAMPED | {"enable_restitution": True, "rigid_contact_relaxation": 1.0}),
+    "semi-implicit": ("SolverSemiImplicit", UNDAMPED),
+    "featherstone": ("SolverFeatherstone", UNDAMPED),
+    "mujoco": ("SolverMuJoCo", {}),
+}
+"""The class of each solver, and its settings."""
+SPIN_GAINED = 3e-7
+"""Share of ω in a step, at most; measured 1.9e-7 to 2.4e-7 with steps of 10 to 0.25 ms, about a principal axis."""
+ENERGIES = ("energy_error", "energy_gain", "energy_drift")
+REASONS = {
+    "angular_damping": "0.05 by default in semi-implicit and featherstone, whatever the scene says",
+    "enable_restitution": "off by default, and then restitution is 0",
+    "rigid_contact_relaxation": "removes the whole depth of a contact; at the default 0.8 a fifth of it is left",
+}
+
+
+class Newton(Engine):
+    """Newton's rigid body."""
+
+    name, order, compiles, precision, reasons = "newton", 1.0, True, np.float32, REASONS
+    choices: ClassVar = {"solver": tuple(SOLVERS)}
+
+    def declines(self, scene: Scenario) -> str | None:
+        solver, floor = self.option("solver"), scene.floor
+        if solver == "mujoco" and find_spec("mujoco_warp") is None:
+            return "Newton's MuJoCo solver needs mujoco-warp; install newton[sim]"
+        if scene.damping is not None:
+            return "Newton has no linear damping of a free body"
+        if (unfit := refusal_of_shape(scene)) is not None or floor is None:
+            return unfit
+        if solver != "xpbd":
+            return "contacts of this solver are springs and dampers, without a coefficient of restitution; a ball of 0.5 rebounds with 0.3"
+        if floor.rest_speed > 0.0:
+            return "Newton has no speed below which restitution is 0 (floor.rest_speed)"
+        if floor.friction != "none" and floor.restitution > 0.0:
+            return (
+                "XPBD limits friction by the depth that a step corrects, not by the impulse of the rebound; a ball of 0.6 that lands on a "
+                "floor that grips rebounds with 0.41"
+            )
+        return None
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return NewtonSimulation(Worlds([scene], dt, self.option("solver")), self.option("solver"))
+
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
+        return Worlds(members, dt, self.option("solver"))
+
+
+class Worlds(BatchSimulation):
+    """Worlds with a body each on Warp's default device, with their step as a graph."""
+
+    def __init__(self, members: Sequence[Scenario], dt: float, solver: str) -> None:
+        scene, self.velocity_lag = members[0], 0.5 * dt
+        name, options = SOLVERS[solver]
+        builder, surface = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration)), self._surface(scene)
+        builder.replicate(self._world(scene, surface), len(members))
+        if scene.floor is not None:
+            builder.add_ground_plane(cfg=newton.ModelBuilder.ShapeConfig(density=0.0, **surface))
+        self.model: Any = builder.finalize()
+        self._solver = getattr(newton.solvers, name)(self.model, **options)
+        self._now, self._next, self._control = self.model.state(), self.model.state(), self.model.control()
+        self._pipeline = None if scene.floor is None else newton.CollisionPipeline(self.model)
+        self._contacts = self._pipeline.contacts() if self._pipeline else None
+        self._step(dt)  # compiles; nothing may be loaded while a graph is captured
+        with wp.ScopedCapture() as capture:
+            self._step(dt)
+        self._graph = capture.graph
+        rows = np.array([member.initial_state for member in members]).astype(np.float32)
+        self._now.assign(self.model.state())
+        self._now.body_q.assign(rows[:, :7])
+        self._now.body_qd.assign(rows[:, 7:])
+        newton.eval_ik(self.model, self._now, self._now.joint_q, self._now.joint_qd)
+        device = wp.get_device()
+        made = {"version": version("newton"), "warp": wp.config.version, "device": f"{device} ({device.name})", "solver": solver}
+        self.settings = made | options | surface
+
+    def _surface(self, scene: Scenario) -> dict[str, float]:
+        if scene.floor is None:
+            return {}
+        friction = {"none": 0.0, "infinite": STICKING}.get(str(scene.floor.friction), scene.floor.friction)
+        return {"restitution": scene.floor.restitution, "mu": float(friction)}
+
+    def _world(self, scene: Scenario, surface: dict[str, float]) -> Any:
+        world, body = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration)), scene.body
+        inertia = wp.mat33(*body.inertia_tensor.ravel().tolist())
+        moving = world.add_body(mass=body.mass, inertia=inertia, lock_inertia=True)
+        config = newton.ModelBuilder.ShapeConfig(density=0.0, **surface)
+        if scene.floor is not None and isinstance(body, Sphere):
+            world.add_shape_sphere(moving, radius=body.radius, cfg=config)
+        elif scene.floor is not None and isinstance(body, Box):
+            world.add_shape_box(moving, cfg=config, **dict(zip(("hx", "hy", "hz"), body.half_extents, strict=True)))
+        return world
+
+    def _step(self, dt: float) -> None:
+        self._now.clear_forces()
+        if self._pipeline is not None:
+            self._pipeline.collide(self._now, self._contacts)
+        self._solver.step(self._now, self._next, self._control, self._contacts, dt)
+        self._now.assign(self._next)
+
+    def advance(self, steps: int) -> None:
+        for _ in range(steps):
+            wp.capture_launch(self._graph)
+        wp.synchronize()
+
+    def states(self) -> Array:
+        return np.concatenate([self._now.body_q.numpy(), self._now.body_qd.numpy()], axis=1, dtype=float)
+
+
+class NewtonSimulation(Simulation):
+    """One world."""
+
+    def __init__(self, worlds: Worlds, solver: str) -> None:
+        self.velocity_lag, self.settings, self._worlds = worlds.velocity_lag, worlds.settings, worlds
+        self._gains = solver != "featherstone"
+
+    def advance(self, steps: int) -> None:
+        self._worlds.advance(steps)
+
+    def state(self) -> Array:
+        return self._worlds.states()[0]
+
+    def record(self, steps: int, every: int = 1) -> Array:
+        rows = super().record(steps, every)
+        fastest = float(length(rows[:, SPIN]).max())
+        if self._gains and fastest > 0.0:
+            gain = SPIN_GAINED * steps
+            turned = 0.5 * gain * fastest * steps * 2.0 * self.velocity_lag
+            errors = {"orientation_error": turned, "angular_momentum_error": gain} | dict.fromkeys(ENERGIES, 2.0 * gain)
+            message = f"the solver turns ω to the body's axes and back in each step, and rounding then adds up to {gain:.2g} of it"
+            self.known_limitations = [KnownLimitation(message, errors)]
+        return rows
+
+    def as_built(self) -> AsBuilt:
+        model = self._worlds.model
+        mass, inertia, gravity = (np.array(part.numpy()[0], dtype=float) for part in (model.body_mass, model.body_inertia, model.gravity))
+        return AsBuilt(float(mass), inertia, gravity)

@@ -14,7 +14,11 @@ from typing import Any
 from scenarios.text import printable
 
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
-STAMPED = (*MEASURING, "mujoco", "pybullet", "rapier3d", "dartpy", "drake", "mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang")
+ENGINES = (
+    *("mujoco", "pybullet", "rapier3d", "dartpy", "drake"),
+    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien"),
+)
+STAMPED = (*MEASURING, *ENGINES)
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))
 """The packages that results depend on; the reports only show them."""
 

@@ -13,9 +13,14 @@ def pytest_report_header():
 
 
 def pytest_generate_tests(metafunc):
-    """Each label of the engine is a case."""
+    """Each label of the engine is a case, and each command of docs/engines.md that runs it is a finding."""
     if "case" in metafunc.fixturenames:
         from support.heavy_engines import CASES
 
         cases = CASES[metafunc.config.getoption("engine")]
         metafunc.parametrize("case", cases, ids=[case.label for case in cases])
+    if "finding" in metafunc.fixturenames:
+        from support.findings import engine_of, findings
+
+        commands = [command for command in findings() if engine_of(command) == metafunc.config.getoption("engine")]
+        metafunc.parametrize("finding", commands)

@@ -1,6 +1,5 @@
 """The documentation, followed step by step: its commands are run, their output is compared with the page, and links are checked."""
 
-import json
 import re
 import shlex
 import sys
@@ -10,6 +9,8 @@ from pathlib import Path
 import click
 import pytest
 from support import cli
+from support.findings import PAGE, engine_of, findings, verify_findings
+from support.heavy_engines import CASES
 
 import dropspin as ds
 from reports.commands.main import COMMANDS, dropspin
@@ -84,44 +85,15 @@ def test_page_on_choosing_a_step_shows_the_output_of_its_commands(tmp_path):
     assert follow("choose-a-step.md", tmp_path) == [0, 0]
 
 
-FINDING = re.compile(
-    r"^- .+: (?P<order>order of )?`(?P<name>[\w ]+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
-    r"  `dropspin (?P<command>run .+)`$",
-    re.MULTILINE,
-)
-
-
-def findings():
-    """The findings on the page on engines, by command."""
-    by_command = {}
-    for row in FINDING.finditer((ROOT / "docs" / "engines.md").read_text(encoding="utf-8")):
-        by_command.setdefault(row["command"], []).append(row)
-    return by_command
-
-
 def test_every_finding_on_the_page_on_engines_has_a_value_and_a_command():
-    text = (ROOT / "docs" / "engines.md").read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     assert sum(map(len, findings().values())) == len(re.findall("^- ", text, re.MULTILINE)) == text.count("`dropspin run ")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", findings())
+@pytest.mark.parametrize("command", [command for command in findings() if engine_of(command) not in CASES])
 def test_commands_of_the_page_on_engines_measure_the_values_printed_there(command, tmp_path):
-    """To the printed digits; at the finest time step, or as dt → 0. A word is a verdict."""
-    results = json.loads(cli.dropspin(*shlex.split(command), "--json", "-o", "out", cwd=tmp_path).stdout)
-    finest = min((one["dt"] for one in results if one["dt"]), default=None)
-    for row in findings()[command]:
-        kinds = {"order"} if row["order"] else {"asymptotic_error"} if row["relation"] == "→" else {"truth", "invariant"}
-        kinds = {"symmetry"} if "--symmetries" in command else kinds
-        if row["value"] is None:
-            assert {one["verdict"] for one in results} == {row["name"]}
-            continue
-        of_metric = [one for one in results if one["metric"] == row["name"] and one["kind"] in kinds]
-        [measured] = [one["value"] for one in of_metric if one["dt"] in (finest, None)]
-        if row["relation"] == "<":
-            assert abs(measured) < float(row["value"])
-        else:
-            assert float(f"{measured:.1e}") == float(row["value"])
+    verify_findings(command, tmp_path)
 
 
 def test_python_of_the_readme_and_of_the_replay_page_runs(tmp_path, monkeypatch):

@@ -1,0 +1,46 @@
+"""The findings on the page on engines, docs/engines.md: a sentence, a value and the command that measures it."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+from support import cli
+
+PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
+FINDING = re.compile(
+    r"^- .+: (?P<order>order of )?`(?P<name>[\w ]+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
+    r"  `dropspin (?P<command>run .+)`$",
+    re.MULTILINE,
+)
+
+
+def findings():
+    """The findings by command."""
+    by_command = {}
+    for row in FINDING.finditer(PAGE.read_text(encoding="utf-8")):
+        by_command.setdefault(row["command"], []).append(row)
+    return by_command
+
+
+def engine_of(command):
+    """The engine of a command, without its options."""
+    return re.search(r"-e '?([\w-]+)", command)[1]
+
+
+def verify_findings(command, folder):
+    """Run a command: it measures the printed digits, at the finest time step or as dt → 0. A word is a verdict."""
+    results = json.loads(cli.dropspin(*shlex.split(command), "--json", "-o", "out", cwd=folder).stdout)
+    finest = min((one["dt"] for one in results if one["dt"]), default=None)
+    for row in findings()[command]:
+        kinds = {"order"} if row["order"] else {"asymptotic_error"} if row["relation"] == "→" else {"truth", "invariant"}
+        kinds = {"symmetry"} if "--symmetries" in command else kinds
+        if row["value"] is None:
+            assert {one["verdict"] for one in results} == {row["name"]}
+            continue
+        of_metric = [one for one in results if one["metric"] == row["name"] and one["kind"] in kinds]
+        [measured] = [one["value"] for one in of_metric if one["dt"] in (finest, None)]
+        if row["relation"] == "<":
+            assert abs(measured) < float(row["value"])
+        else:
+            assert float(f"{measured:.1e}") == float(row["value"])

@@ -43,7 +43,7 @@ def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:
 
 def write_tradeoff(found: Sequence[TradeOff], within: Sequence[float], folder: Path) -> None:
     """Write `tradeoff.csv`, `tradeoff.json`, `tradeoff.md` and a plot per scene."""
-    write_table(folder, "tradeoff", tradeoff.COLUMNS, [row for one in found for row in tradeoff.rows(one)])
+    write_table(folder, "tradeoff", tradeoff.columns(found), [row for one in found for row in tradeoff.rows(one)])
     section = Section("What accuracy costs")
     for one in found:
         section.add_heading(one.scene.name)

@@ -14,11 +14,13 @@ from scenarios import Scenario
 LONG_ENOUGH = 2e-3
 """The smallest wall time of a timing [s]."""
 MOST_RUNS = 200
-BATCH = 256
-"""Number of worlds in a batch."""
+WORLDS = (256,)
+"""Numbers of worlds in a batch."""
 BATCH_ROUNDS = 3
-MOST_BATCH_STEPS = 100_000
-"""Number of time steps, summed over all worlds, in one timing."""
+BATCH_SECONDS = 0.02
+"""The smallest wall time of a timing of a batch in free flight [s]."""
+LONGEST_BATCH = 4.0
+"""The largest wall time of a timing of a batch on a floor [s]."""
 
 
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
@@ -49,32 +51,38 @@ def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
     return timed.stepping if np.isfinite(timed.state).all() else math.nan
 
 
-def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float]) -> list[float]:
+def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> list[float]:
     """Wall time per simulated second and world [s/s] of a batch at each time step; NaN if the engine cannot simulate batches.
 
     In free flight a step takes the same time at any dt; with a floor whole runs are timed, unless they are too long.
     """
+    members = [scene] * worlds
     if scene.floor is not None:
-        return [_timed_batch(entry.adapter, scene, dt, scene.steps(dt)) / (scene.steps(dt) * dt) for dt in dts]
-    steps = MOST_BATCH_STEPS // BATCH
-    taken = _timed_batch(entry.adapter, scene, dts[-1], steps)
-    return [taken / (steps * dt) for dt in dts]
+        return [_cost_on_a_floor(entry.adapter, members, dt) / (dt * worlds) for dt in dts]
+    steps, taken = 4, _timed_batch(entry.adapter, members, dts[-1], 1)  # the first batch compiles
+    while (taken := _timed_batch(entry.adapter, members, dts[-1], steps)) < BATCH_SECONDS and steps < MOST_STEPS:
+        steps *= 4
+    taken = min([taken, *(_timed_batch(entry.adapter, members, dts[-1], steps) for _ in range(BATCH_ROUNDS - 1))])
+    return [taken / (steps * dt * worlds) for dt in dts]
 
 
-def _timed_batch(engine: Engine, scene: Scenario, dt: float, steps: int) -> float:
-    """The smallest wall time per world of some time steps of a batch [s]; NaN without a batch or if its states are not finite."""
-    members, timings = [scene] * BATCH, []
-    if steps * BATCH > MOST_BATCH_STEPS:
+def _cost_on_a_floor(engine: Engine, members: Sequence[Scenario], dt: float) -> float:
+    """The smallest wall time of a step of a batch [s] over a whole run; NaN if the run is too long, judged by its first steps."""
+    steps, few = members[0].steps(dt), 16
+    _timed_batch(engine, members, dt, 1)  # compiles
+    if not _timed_batch(engine, members, dt, few) * steps <= LONGEST_BATCH * few:
         return math.nan
-    for _ in range(1 + BATCH_ROUNDS):
-        batch = engine.prepare_batch(members, dt)
-        if batch is None:
-            return math.nan
-        with batch:
-            start = time.perf_counter()
-            batch.advance(steps)
-            states = np.asarray(batch.states())
-            timings.append(time.perf_counter() - start)
-        if not np.isfinite(states).all():
-            return math.nan
-    return min(timings[1:]) / BATCH  # the first round compiles
+    return min(_timed_batch(engine, members, dt, steps) for _ in range(BATCH_ROUNDS)) / steps
+
+
+def _timed_batch(engine: Engine, members: Sequence[Scenario], dt: float, steps: int) -> float:
+    """Wall time of some time steps of a batch [s]; NaN without a batch or if its states are not finite."""
+    batch = engine.prepare_batch(members, dt)
+    if batch is None:
+        return math.nan
+    with batch:
+        start = time.perf_counter()
+        batch.advance(steps)
+        states = np.asarray(batch.states())
+        taken = time.perf_counter() - start
+    return taken if np.isfinite(states).all() else math.nan

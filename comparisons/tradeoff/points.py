@@ -1,12 +1,13 @@
 """The results of a trade-off study: the error and cost of each configuration, the Pareto front, and the recommendation."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.tradeoff.costs import WORLDS
 from comparisons.tradeoff.ladder import Ladder
 from scenarios import Scenario
 
@@ -25,14 +26,15 @@ class CostPoint:
         dt: Time step [s].
         error: Absolute value of the metric.
         cost: Wall time per simulated second in each round [s/s], shape (rounds,).
-        cost_per_world: The smallest wall time per simulated second and world in a batch [s/s]; NaN if the engine cannot simulate batches.
+        costs_per_world: By number of worlds in a batch, the smallest wall time per simulated second and world [s/s]; empty for an engine
+            that cannot simulate batches.
     """
 
     engine: str
     dt: float
     error: float
     cost: Array
-    cost_per_world: float = math.nan
+    costs_per_world: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def typical_cost(self) -> float:
@@ -68,12 +70,14 @@ class TradeOff:
         metric: The metric of the error.
         points: The configurations with a measured error and cost.
         ladders: The time steps tried for every requested engine, and the reason why no smaller one was tried.
+        worlds: The numbers of worlds in a batch.
     """
 
     scene: Scenario
     metric: str
     points: tuple[CostPoint, ...]
     ladders: tuple[Ladder, ...]
+    worlds: tuple[int, ...] = WORLDS
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -85,10 +89,9 @@ class TradeOff:
         """The configurations for which no other one is both more accurate and cheaper; cheapest first."""
         return _pareto_front(self.points, lambda point: point.typical_cost)
 
-    @property
-    def batch_pareto_front(self) -> list[CostPoint]:
-        """The Pareto front by cost per world, for engines that can simulate batches."""
-        return _pareto_front([point for point in self.points if np.isfinite(point.cost_per_world)], lambda point: point.cost_per_world)
+    def batch_pareto_front(self, worlds: int) -> list[CostPoint]:
+        """The Pareto front by cost per world in batches of a size, for engines that can simulate them."""
+        return _pareto_front([one for one in self.points if worlds in one.costs_per_world], lambda point: point.costs_per_world[worlds])
 
     @property
     def dominated(self) -> dict[CostPoint, CostPoint]:
@@ -121,14 +124,15 @@ class TradeOff:
         level = ratio < LEVEL or float(np.quantile(ratios, 0.25)) <= 1.0
         return Recommendation(within, best, others[0], ratio, level)
 
-    def best_in_batch(self, within: float) -> CostPoint | None:
+    def best_in_batch(self, within: float, worlds: int) -> CostPoint | None:
         """The configuration with the smallest cost per world within a tolerance; None if no engine that can simulate batches reaches it.
 
         Args:
             within: The tolerance, in the metric's unit.
+            worlds: Number of worlds in a batch.
         """
-        batched = [point for point in self._coarsest(within) if np.isfinite(point.cost_per_world)]
-        return min(batched, key=lambda point: point.cost_per_world, default=None)
+        batched = [point for point in self._coarsest(within) if worlds in point.costs_per_world]
+        return min(batched, key=lambda point: point.costs_per_world[worlds], default=None)
 
     def _coarsest(self, within: float) -> list[CostPoint]:
         """For each engine, the coarsest time step for which it and all finer ones are within a tolerance."""

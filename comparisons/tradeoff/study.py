@@ -15,7 +15,7 @@ from comparisons.measuring.metrics import leading_metric, metrics_for
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
-from comparisons.tradeoff.costs import cost, costs_per_world
+from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps
 from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
@@ -44,6 +44,7 @@ ON_A_FLOOR = (
     "pybullet[coordinates=multibody]",
 )
 ROUNDS = 9
+MOST_WORLDS = 1 << 20
 NO_COST = "its cost could not be measured: its time steps fail, or do not give a finite state"
 
 OnProgress = Callable[[str, float], None]
@@ -56,6 +57,7 @@ def tradeoff(
     metric: str | None = None,
     *,
     budget: float = BUDGET,
+    worlds: Sequence[int] = WORLDS,
     on_progress: OnProgress | None = None,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
 ) -> TradeOff:
@@ -67,6 +69,7 @@ def tradeoff(
         metric: The metric of the error; by default the scene's leading metric.
         budget: Processor time for measuring the errors of each engine at all time steps [s]; once it is used up, no smaller time step is
             tried.
+        worlds: The numbers of worlds in the batches to time, for engines that step many worlds together.
         on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
         resources: The processor time [s] and memory [bytes] that each piece of work may use.
 
@@ -74,9 +77,12 @@ def tradeoff(
         The error of each engine at each time step and its cost, in seconds per simulated second, with the Pareto front.
 
     Raises:
-        DropspinError: The scene has no exact solution, or the metric does not apply to it; the budget is not above 0; or no engine runs the
-            scene.
+        DropspinError: The scene has no exact solution, or the metric does not apply to it; the budget or a number of worlds is not above 0;
+            or no engine runs the scene.
     """
+    sizes = tuple(sorted(set(worlds)))
+    if not all(isinstance(size, int) and 0 < size <= MOST_WORLDS for size in sizes):
+        raise DropspinError(f"worlds: got {', '.join(map(str, worlds))}; give whole numbers from 1 to {MOST_WORLDS}.")
     if not 0.0 < budget < math.inf:
         raise DropspinError(f"budget: got {budget!r}; give a number of seconds above 0.")
     scene = as_scene(scene)
@@ -96,10 +102,10 @@ def tradeoff(
         for number, entry in enumerate(entries.values(), 1):
             ladders.append(errors_over_steps(entry, scene, [chosen, of_the_motion], budget, processes))
             report(f"errors of {entry.label}", 0.5 * number / len(entries))
-        points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, processes, report)
+        points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, sizes, processes, report)
     measured = {point.engine for point in points}
     ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
-    found = TradeOff(scene, chosen, points, tuple(ladders))
+    found = TradeOff(scene, chosen, points, tuple(ladders), sizes)
     if not points:
         raise DropspinError(f"no engine runs {scene.name}: {'; '.join(f'{label}: {why}' for label, why in found.left_out.items())}.")
     return found
@@ -112,22 +118,28 @@ def _with_accuracy_levels(entry: EngineEntry) -> list[EngineEntry]:
 
 
 def _with_costs(
-    ladders: Sequence[tuple[EngineEntry, Ladder]], scene: Scenario, processes: EngineProcesses, on_progress: OnProgress
+    ladders: Sequence[tuple[EngineEntry, Ladder]],
+    scene: Scenario,
+    worlds: Sequence[int],
+    processes: EngineProcesses,
+    on_progress: OnProgress,
 ) -> tuple[CostPoint, ...]:
-    """The configurations of the ladders that have a finite error and a finite cost, with the cost in every round and in a batch."""
+    """The configurations of the ladders that have a finite error and a finite cost, with the cost in every round and in batches."""
     steps = [(entry, dt, error) for entry, ladder in ladders for dt, error in ladder.steps if np.isfinite(error)]
     costs: list[list[float]] = [[] for _ in steps]
     for number in range(ROUNDS):
         for rounds, (entry, dt, _) in zip(costs, steps, strict=True):
             rounds.append(math.nan if rounds and math.isnan(rounds[-1]) else _cost(entry, scene, dt, processes))
         on_progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
-    per_world: list[float] = []
-    for entry, _ in ladders:
-        per_world += _costs_per_world(entry, scene, [dt for mine, dt, _ in steps if mine is entry], processes)
-    on_progress("batches", 1.0)
+    per_world: list[dict[int, float]] = []
+    for number, (entry, _) in enumerate(ladders):
+        dts = [dt for mine, dt, _ in steps if mine is entry]
+        by_size = {size: _costs_per_world(entry, scene, dts, size, processes) for size in worlds}
+        per_world += [{size: found[row] for size, found in by_size.items() if np.isfinite(found[row])} for row in range(len(dts))]
+        on_progress(f"batches of {entry.label}", 0.9 + 0.1 * (number + 1) / len(ladders))
     return tuple(
-        CostPoint(entry.label, dt, error, np.array(rounds), batch)
-        for (entry, dt, error), rounds, batch in zip(steps, costs, per_world, strict=True)
+        CostPoint(entry.label, dt, error, np.array(rounds), batches)
+        for (entry, dt, error), rounds, batches in zip(steps, costs, per_world, strict=True)
         if np.isfinite(rounds).all()
     )
 
@@ -139,8 +151,8 @@ def _cost(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineProce
         return math.nan
 
 
-def _costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], processes: EngineProcesses) -> list[float]:
+def _costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int, processes: EngineProcesses) -> list[float]:
     try:
-        return processes.call(entry, costs_per_world, scene, dts)
+        return processes.call(entry, costs_per_world, scene, dts, worlds)
     except Failed:
         return [math.nan] * len(dts)

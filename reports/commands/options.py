@@ -59,6 +59,18 @@ class _Positive(click.FloatRange):
 POSITIVE = _Positive()
 
 
+class WholeNumbers(click.ParamType):  # type: ignore[type-arg]  # not generic at run time before click 8.5
+    """Whole numbers above 0, separated by commas."""
+
+    name = "whole numbers"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
+        parts = value.split(",")
+        if not all(part.isascii() and part.isdigit() and 0 < len(part) < 10 and int(part) > 0 for part in parts):
+            self.fail(f"{value!r} is not a list of whole numbers above 0, such as 1,256,4096.", param, ctx)
+        return tuple(map(int, parts))
+
+
 def seconds_option(name: str, default: float, of: str, least: float = 0.0) -> Callable[[Command], Command]:
     """An option whose value is a processor time."""
     return click.option(

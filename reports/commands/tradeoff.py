@@ -6,7 +6,7 @@ import os
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import POSITIVE, as_json, seconds_option
+from reports.commands.options import POSITIVE, WholeNumbers, as_json, seconds_option
 from reports.terminal.safe import echo
 
 
@@ -26,6 +26,14 @@ from reports.terminal.safe import echo
 @seconds_option(
     "--budget", 10.0, "for measuring the errors of one engine at all its time steps; once it is used up, no smaller time step is tried."
 )
+@click.option(
+    "--worlds",
+    type=WholeNumbers(),
+    default="256",
+    show_default=True,
+    metavar="N[,N]...",
+    help="Numbers of worlds in the batches to time, for engines that step many worlds together, such as 1,256,4096.",
+)
 @click.option("-o", "--output", default="out/tradeoff", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
 @as_json
 def tradeoff_command(
@@ -34,6 +42,7 @@ def tradeoff_command(
     metric: str | None,
     within: tuple[float, ...],
     budget: float,
+    worlds: tuple[int, ...],
     output: str,
     json_output: bool,
 ) -> None:
@@ -58,9 +67,9 @@ def tradeoff_command(
                     stop_if_interrupted()
                     progress(what, share)
 
-                found.append(tradeoff(scene, engines, metric, budget=budget, on_progress=on_progress))
+                found.append(tradeoff(scene, engines, metric, budget=budget, worlds=worlds, on_progress=on_progress))
             if not json_output:
-                print_rows(view.pareto_front_rows(found[-1]), json_output=False, left_out_first=view.LEFT_OUT_FIRST)
+                print_rows(view.pareto_front_rows(found[-1]), json_output=False, left_out_first=view.left_out_first(found[-1]))
                 print_sentences(view.sentences(found[-1], within))
         write_tradeoff(found, within, folder)
     if json_output:

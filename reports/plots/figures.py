@@ -15,7 +15,7 @@ from reports.plots.history import plot_history
 from reports.plots.limits import failure_modes
 from reports.plots.over_time import over_time, quantities
 from reports.plots.spins import polhode, wobbles_freely
-from reports.plots.tradeoff import error_over_cost
+from reports.plots.tradeoff import error_over_cost, throughput
 from scenarios import truth_for
 
 if TYPE_CHECKING:
@@ -87,8 +87,10 @@ def ensemble_charts(results: Results, scene_name: str) -> list[Chart]:
 
 
 def tradeoff_charts(found: "TradeOff") -> list[Chart]:
-    """Error over cost in one scene, for one world, and per world in a batch if an engine can simulate batches."""
-    return [error_over_cost(found, batch) for batch in ((False, True) if found.batch_pareto_front else (False,))]
+    """Error over cost in one scene, for one world, and per world in batches; and the throughput over the number of worlds."""
+    batches = [worlds for worlds in found.worlds if found.batch_pareto_front(worlds)]
+    charts = [error_over_cost(found, worlds) for worlds in (None, *batches)]
+    return [*charts, throughput(found)] if len(batches) > 1 else charts
 
 
 def limits_charts(found: RobustnessStudy) -> list[Chart]:

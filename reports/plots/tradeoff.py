@@ -1,11 +1,10 @@
 """Error over cost."""
 
-from math import isfinite
+from math import isfinite, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.tradeoff.costs import BATCH
 from reports.plots.chart import Chart, Line, draw
 from reports.plots.colours import engine_styles
 from reports.plots.style import metric_label
@@ -16,27 +15,43 @@ if TYPE_CHECKING:
     from comparisons.tradeoff.points import CostPoint, TradeOff
 
 
-def error_over_cost(found: "TradeOff", batch: bool = False) -> Chart:
+def error_over_cost(found: "TradeOff", worlds: int | None = None) -> Chart:
     """Error over cost, both logarithmic: a line for the time steps of each engine, and the Pareto front.
 
     Args:
         found: The trade-off.
-        batch: Whether the cost is per world in a batch; only engines that can simulate batches are then shown.
+        worlds: The number of worlds of a batch, for the cost per world; only engines that can simulate such batches are then shown.
     """
 
     def cost(point: "CostPoint") -> float:
-        return point.cost_per_world if batch else point.typical_cost
+        return point.typical_cost if worlds is None else point.costs_per_world.get(worlds, nan)
 
     def line(label: str, points: "list[CostPoint]", colour: str = "", marker: str = "", width: float = 1.0) -> Line:
         return Line(label, np.array([cost(one) for one in points]), np.array([one.error for one in points]), colour, width, marker=marker)
 
-    lines = [line("Pareto front", list(found.batch_pareto_front if batch else found.pareto_front), "#B0B0B0", width=5.0)]
-    for engine, (colour, marker) in engine_styles(list(dict.fromkeys(point.engine for point in found.points))).items():
+    front = found.pareto_front if worlds is None else found.batch_pareto_front(worlds)
+    lines = [line("Pareto front", list(front), "#B0B0B0", width=5.0)]
+    for engine, (colour, marker) in _styles(found).items():
         lines.append(line(engine, [one for one in found.points if one.engine == engine and isfinite(cost(one))], colour, marker))
-    per_world = f", per world (batch of {BATCH})" if batch else ""
+    per_world = "" if worlds is None else f", per world (batch of {worlds})"
     return Chart(f"time per simulated second{per_world} [s]", metric_label(found.metric), lines, x_log=True, y_log=True)
 
 
-def plot_tradeoff(found: "TradeOff", axes: "Axes", batch: bool = False) -> None:
+def throughput(found: "TradeOff") -> Chart:
+    """Steps per second of all worlds over the number of worlds, both logarithmic: a line for each engine at its finest time step."""
+    lines = []
+    for engine, (colour, marker) in _styles(found).items():
+        finest = min((one for one in found.points if one.engine == engine), key=lambda one: one.dt)
+        sizes = sorted(finest.costs_per_world)
+        rates = [1.0 / (finest.dt * finest.costs_per_world[size]) for size in sizes]
+        lines.append(Line(engine, np.array(sizes, dtype=float), np.array(rates), colour, marker=marker))
+    return Chart("number of worlds in a batch", "steps per second, all worlds", lines, x_log=True, y_log=True)
+
+
+def _styles(found: "TradeOff") -> dict[str, tuple[str, str]]:
+    return engine_styles(list(dict.fromkeys(point.engine for point in found.points)))
+
+
+def plot_tradeoff(found: "TradeOff", axes: "Axes", worlds: int | None = None) -> None:
     """Draw `error_over_cost` into axes."""
-    draw(error_over_cost(found, batch), axes)
+    draw(error_over_cost(found, worlds), axes)

@@ -7,18 +7,23 @@ from typing import Any
 import numpy as np
 
 from comparisons.measuring.metrics import METRICS
-from comparisons.tradeoff.costs import BATCH
 from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
 from reports.views.numbers import duration, formatted
 
-COLUMNS = (
-    *("scene", "metric", "engine", "dt", "error", "cost", "cost_best", "cost_quartiles", "cost_per_world", "on_pareto_front"),
-    *("dominated_by", "ladder_ended", "ladder_reason", "left_out"),
-)
 
-LEFT_OUT_FIRST = (f"per world (batch of {BATCH})", "on the Pareto front")
-"""The columns of the table of the Pareto front that are left out on a narrow terminal."""
+def columns(found: Sequence[TradeOff]) -> list[str]:
+    """The columns of the table."""
+    return list(dict.fromkeys(column for one in found for row in rows(one) for column in row))
+
+
+def left_out_first(found: TradeOff) -> tuple[str, ...]:
+    """The columns of the table of the Pareto front that are left out on a narrow terminal."""
+    return (*(_per_world(worlds) for worlds in found.worlds), "on the Pareto front")
+
+
+def _per_world(worlds: int) -> str:
+    return f"per world (batch of {worlds})"
 
 
 def rows(found: TradeOff) -> list[dict[str, Any]]:
@@ -37,7 +42,7 @@ def rows(found: TradeOff) -> list[dict[str, Any]]:
             "engine": ladder.engine,
             "dt": _finite(dt),
             "error": _finite(error),
-            **_costs(points.get((ladder.engine, dt))),
+            **_costs(points.get((ladder.engine, dt)), found.worlds),
             "on_pareto_front": any(point.engine == ladder.engine and point.dt == dt for point in front),
             "dominated_by": dominated_by.get(ladder.engine),
             "ladder_ended": ladder.ended,
@@ -53,14 +58,15 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _costs(point: CostPoint | None) -> dict[str, Any]:
+def _costs(point: CostPoint | None, worlds: Sequence[int]) -> dict[str, Any]:
+    per_world = {f"cost_per_world_{size}": None if point is None else point.costs_per_world.get(size) for size in worlds}
     if point is None:
-        return dict.fromkeys(("cost", "cost_best", "cost_quartiles", "cost_per_world"))
+        return dict.fromkeys(("cost", "cost_best", "cost_quartiles")) | per_world
     return {
         "cost": point.typical_cost,
         "cost_best": float(point.cost.min()),
         "cost_quartiles": [float(value) for value in np.quantile(point.cost, [0.25, 0.75])],
-        "cost_per_world": _finite(point.cost_per_world),
+        **per_world,
     }
 
 
@@ -68,7 +74,9 @@ def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
     """The Pareto front, cheapest first, then the most accurate time step of each dominated engine, then the engines left out."""
     on_front = [_row(found, point, "yes") for point in found.pareto_front]
     dominated = [_row(found, point, f"dominated by {other.engine}") for point, other in found.dominated.items()]
-    left_out = [dict(zip(on_front[0], (label, *["–"] * 4, "left out, see below"), strict=True)) for label in found.left_out]
+    left_out = [
+        dict(zip(on_front[0], (label, *["–"] * (len(on_front[0]) - 2), "left out, see below"), strict=True)) for label in found.left_out
+    ]
     return on_front + dominated + left_out
 
 
@@ -78,7 +86,7 @@ def _row(found: TradeOff, point: CostPoint, on_front: str) -> dict[str, str]:
         "step [ms]": f"{1e3 * point.dt:.4g}",
         f"error [{METRICS[found.metric].unit}]": formatted(point.error),
         "per simulated second": duration(point.typical_cost),
-        f"per world (batch of {BATCH})": "–" if math.isnan(point.cost_per_world) else duration(point.cost_per_world),
+        **{_per_world(size): duration(point.costs_per_world[size]) if size in point.costs_per_world else "–" for size in found.worlds},
         "on the Pareto front": on_front,
     }
 
@@ -117,9 +125,10 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         sentence += f"; {_named(advice.next_best)} takes about as long, {advice.ratio:.2f} times that."
     else:
         sentence += f"; the next best, {_named(advice.next_best)}, takes {advice.ratio:.1f} times that."
-    batched = found.best_in_batch(tolerance)
-    if batched is not None:
-        sentence += f" In a batch of {BATCH}, {_named(batched)}: {duration(batched.cost_per_world)} per world."
+    for size in found.worlds:
+        batched = found.best_in_batch(tolerance, size)
+        if batched is not None:
+            sentence += f" In a batch of {size}, {_named(batched)}: {duration(batched.costs_per_world[size])} per world."
     return sentence
 
 

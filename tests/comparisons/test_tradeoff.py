@@ -64,12 +64,14 @@ def test_recommendation_is_the_cheapest_within_the_tolerance():
 
 def test_best_in_batch_is_among_engines_with_batches():
     """By cost per world, at the coarsest time step within the tolerance."""
-    ways = [("lanes", 0.2, 1e-2, 1e-8), ("lanes", 0.1, 1e-4, 2e-8), ("threads", 0.1, 1e-4, 3e-8), ("alone", 0.1, 1e-5, np.nan)]
-    found = found_with(CostPoint(engine, dt, error, np.array([1.0]), cost) for engine, dt, error, cost in ways)
-    best = found.best_in_batch(1e-3)
+    lanes, threads = [("lanes", 0.2, 1e-2, {256: 1e-8}), ("lanes", 0.1, 1e-4, {256: 2e-8})], ("threads", 0.1, 1e-4, {16: 1e-9, 256: 3e-8})
+    ways = [*lanes, threads, ("alone", 0.1, 1e-5, {})]
+    found = found_with(CostPoint(engine, dt, error, np.array([1.0]), costs) for engine, dt, error, costs in ways)
+    best = found.best_in_batch(1e-3, 256)
     assert (best.engine, best.dt) == ("lanes", 0.1)
-    assert found.best_in_batch(1e-5) is None
-    assert [(point.engine, point.dt) for point in found.batch_pareto_front] == [("lanes", 0.2), ("lanes", 0.1)]
+    assert found.best_in_batch(1e-5, 256) is None
+    assert found.best_in_batch(1e-3, 16).engine == "threads"
+    assert [(point.engine, point.dt) for point in found.batch_pareto_front(256)] == [("lanes", 0.2), ("lanes", 0.1)]
 
 
 @pytest.mark.parametrize("rounds", [([2, 2, 2], [2.2, 2.2, 2.2]), ([2, 2, 2], [1.9, 3.5, 1.9, 3.5][:3])])
@@ -91,11 +93,10 @@ def test_leading_metric_depends_on_the_scene():
 
 @pytest.fixture(scope="module", autouse=True)
 def short_timings():
-    """Two rounds instead of nine, batches of 8 instead of 256, 400 steps with a floor: no assertion depends on the machine's speed."""
+    """Two rounds instead of nine, short batches, 400 steps with a floor: no assertion depends on the machine's speed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "ROUNDS", 2)
-        patch.setattr(costs, "BATCH", 8)
-        patch.setattr(costs, "MOST_BATCH_STEPS", 3000)
+        patch.setattr(costs, "BATCH_SECONDS", 1e-4)
         patch.setattr(errors, "MOST_RECORDED", 400)
         yield
 

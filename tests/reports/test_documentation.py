@@ -143,7 +143,12 @@ def quoted_constants():
         f"with a floor, {errors.MOST_RECORDED:,}",
         f"above {errors.CONVERGED:g} of its largest",
     ]
-    cost = [f"the median of {study.ROUNDS} rounds", f"less than a factor of {points.LEVEL:g}", f"in a batch of {costs.BATCH}"]
+    cost = [
+        f"the median of {study.ROUNDS} rounds",
+        f"less than a factor of {points.LEVEL:g}",
+        f"in a batch of {costs.WORLDS[0]}",
+        f"longer than {costs.LONGEST_BATCH:g} s",
+    ]
     runs = [
         f"the time step `--dt` ({1e3 * limits.DT:g} ms)",
         f"`--within` ({limits.WITHIN:g})",

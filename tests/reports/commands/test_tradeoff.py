@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 from support.cli import dropspin
 
 from comparisons.tradeoff.errors import BUDGET
@@ -41,7 +42,7 @@ def test_pareto_front_recommendations_and_files(tmp_path):
     compared = [row for row in rows if not row["left_out"]]
     assert all(row["cost_best"] <= row["cost"] for row in compared)
     assert any(row["on_pareto_front"] for row in compared)
-    assert all(row["cost_per_world"] > 0.0 for row in compared)
+    assert all(row["cost_per_world_256"] > 0.0 for row in compared)
 
 
 def test_budget_is_an_option_with_the_default_of_the_study(tmp_path):
@@ -66,3 +67,29 @@ def test_a_scene_without_an_exact_solution_is_refused(tmp_path):
     assert done.returncode == 2
     assert "mine has no exact solution to compare with" in done.stderr
     assert list(tmp_path.iterdir()) == [tmp_path / "mine.toml"]
+
+
+@pytest.mark.parametrize("worlds", ["0", "1,-2", "1.5", "many", "1,,2", ""])
+def test_worlds_that_are_no_whole_numbers_are_refused(worlds, tmp_path):
+    refused = dropspin("tradeoff", "--worlds", worlds, cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "is not a list of whole numbers above 0, such as 1,256,4096" in " ".join(refused.stderr.split())
+
+
+def test_each_number_of_worlds_has_a_cost_and_a_recommendation(tmp_path):
+    """And there is a plot of the throughput; an engine without batches has no cost per world."""
+    (tmp_path / "short.toml").write_text(SCENE)
+    done = dropspin(
+        *("tradeoff", "short.toml", "-e", "document[rotation=rk4]", "-e", "pybullet", "--worlds", "2,16", "--budget", "0.5"),
+        *("--within", "0.1", "-o", "out"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    output = " ".join(done.stdout.split())
+    for worlds in (2, 16):
+        assert f"In a batch of {worlds}, document[rotation=rk4] at " in output
+    rows = json.loads((tmp_path / "out/tradeoff.json").read_text())
+    for row in rows:
+        costs = [row["cost_per_world_2"], row["cost_per_world_16"]]
+        assert costs == [None, None] if row["engine"] == "pybullet" else all(cost > 0.0 for cost in costs)
+    assert "number of worlds in a batch" in (tmp_path / "out/section.json").read_text()

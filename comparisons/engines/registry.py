@@ -40,6 +40,7 @@ BUILT_IN = {
     "dart": _Home("comparisons.engines.dart_engine", "Dart", "dartpy", "pip install 'dropspin[dart]'"),
     "drake": _Home("comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
     "sapien": _Home("comparisons.engines.sapien_engine", "Sapien", "sapien", "pip install 'dropspin[sapien]'"),
+    "exudyn": _Home("comparisons.engines.exudyn_engine", "Exudyn", "exudyn", "pip install 'dropspin[exudyn]'"),
     "mjx": _Home("comparisons.engines.mjx_engine", "MJX", "jax", "pip install 'dropspin[mjx]'"),
     "mujoco-warp": _Home("comparisons.engines.mujoco_warp_engine", "MuJoCoWarp", "mujoco_warp", "pip install 'dropspin[mujoco-warp]'"),
     "newton": _Home("comparisons.engines.newton_engine", "Newton", "newton", "pip install 'dropspin[newton]'"),

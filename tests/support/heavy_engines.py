@@ -22,5 +22,10 @@ class Case(NamedTuple):
 
 CASES = {
     "mjx": [Case("mjx", 2.9e-4, 1e-6, batch=4), Case("mjx[precision=float64]", 2.9e-4, 1e-6, batch=4)],
+    "exudyn": [
+        Case("exudyn", 1.24e-7, None, batch=None),
+        Case("exudyn[integrator=trapezoidal]", 1.23e-7, None, batch=None),
+        Case("exudyn[integrator=midpoint]", 9.3e-8, None, batch=None),
+    ],
     "sapien": [Case("sapien", 2.8e-4, 2.5e-3, batch=None)],
 }

@@ -1,0 +1,111 @@
+"""The engine `exudyn`: Exudyn's rigid body in free flight, on a rotation vector that each step starts anew (a Lie-group integrator)."""
+
+from typing import ClassVar
+
+import exudyn as exu
+import numpy as np
+from exudyn import utilities as items
+from scipy.spatial.transform import Rotation
+
+from comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
+from scenarios.body import Array
+from scenarios.model import Scenario
+
+INTEGRATORS = {
+    "generalized-alpha": ("GeneralizedAlpha", 2.0),
+    "trapezoidal": ("TrapezoidalIndex2", 2.0),
+    "midpoint": ("ExplicitMidpoint", 2.0),
+    "rk44": ("RK44", 4.0),
+    "rk67": ("RK67", 6.0),
+}
+"""The name of Exudyn's solver, and its order, by the option `integrator`."""
+OUTPUTS = [getattr(exu.OutputVariableType, name) for name in ("Position", "RotationMatrix", "Velocity", "AngularVelocity")]
+REASONS = {
+    "adaptiveStep": "never divides a step; a step that does not converge ends the simulation",
+    "relativeTolerance": "of an implicit step's residual; with the defaults, 1e-8 and 1e-10, the motion depends on the units, by 4e-6",
+    "absoluteTolerance": "as relativeTolerance",
+    "spectralRadius": "Exudyn's own, of generalized-alpha alone; at 1 it makes the errors of trapezoidal, which differ by 0.5 %",
+    "damping": "N s/m, and N m s in the body's axes: m c and I c, which give the scene's decay",
+}
+"""Effects were measured on tumbling bodies at 1 ms, without the one setting."""
+
+
+class Exudyn(Engine):
+    """Exudyn's rigid body without contacts."""
+
+    name, reasons = "exudyn", REASONS
+    choices: ClassVar = {"integrator": tuple(INTEGRATORS)}
+
+    @property
+    def order(self) -> float:  # type: ignore[override]
+        return INTEGRATORS[self.option("integrator")][1]
+
+    def declines(self, scene: Scenario) -> str | None:
+        if scene.floor is None:
+            return None
+        return "Exudyn's contacts are springs: with restitution 0.5 a ball rebounds with 0.481 or 0.498, by their stiffness"
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return ExudynSimulation(scene, dt, INTEGRATORS[self.option("integrator")][0])
+
+
+class ExudynSimulation(Simulation):
+    """A system of one body, and a solver that takes one step a call."""
+
+    def __init__(self, scene: Scenario, dt: float, solver: str) -> None:
+        start, inertia, mass = scene.start, scene.body.inertia_tensor, scene.body.mass
+        self._container = exu.SystemContainer()  # holds the system
+        self._system = self._container.AddSystem()
+        turned = Rotation.from_quat(start.orientation)
+        spin = turned.inv().apply(start.angular_velocity)
+        node = items.NodeRigidBodyRotVecLG(
+            referenceCoordinates=[*start.position, *turned.as_rotvec()], initialVelocities=[*start.velocity, *spin]
+        )
+        moments = inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+        self._node = self._system.AddNode(node)
+        self._body = self._system.AddObject(items.ObjectRigidBody(mass=mass, inertia=moments, nodeNumber=self._node))
+        weight = self._system.AddMarker(items.MarkerBodyMass(bodyNumber=self._body))
+        self._load = self._system.AddLoad(items.LoadMassProportional(markerNumber=weight, loadVector=scene.acceleration))
+        damping = {}
+        if scene.damping is not None:
+            damping = {"linear": scene.damping.linear * mass * np.eye(3), "angular": scene.damping.angular * inertia}
+            self._damp(**damping)
+        self._system.Assemble()
+        is_implicit = solver in ("GeneralizedAlpha", "TrapezoidalIndex2")
+        newton = {"relativeTolerance": 1e-13, "absoluteTolerance": 0.0} if is_implicit else {}
+        chosen = {"numberOfSteps": 1, "endTime": dt, "adaptiveStep": False}
+        self._options = exu.SimulationSettings()
+        self._options.solution.file.write = False
+        time, alpha = self._options.timeIntegration, self._options.timeIntegration.generalizedAlpha
+        for table, values in ((time, chosen), (time.newton, newton)):
+            for name, value in values.items():
+                setattr(table, name, value)
+        time.solverType = getattr(exu.DynamicSolverType, solver)
+        alpha.useNewmark = alpha.useIndex2Constraints = solver == "TrapezoidalIndex2"
+        self._solver = exu.MainSolverImplicitSecondOrder() if is_implicit else exu.MainSolverExplicit()
+        self._solver.InitializeSolver(self._system, self._options)
+        self.settings = {"version": version("exudyn"), "solverType": solver, **chosen, **newton}
+        self.settings |= {"spectralRadius": alpha.spectralRadius} if solver == "GeneralizedAlpha" else {}
+        self.settings |= {"damping": {motion: rates.tolist() for motion, rates in damping.items()}} if damping else {}
+
+    def _damp(self, linear: Array, angular: Array) -> None:
+        rates = np.zeros((6, 6))
+        rates[:3, :3], rates[3:, 3:] = linear, angular
+        ground = self._system.AddObject(items.ObjectGround())
+        bodies = [self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=body)) for body in (self._body, ground)]
+        self._system.AddObject(items.ObjectConnectorRigidBodySpringDamper(markerNumbers=bodies, stiffness=np.zeros((6, 6)), damping=rates))
+
+    def advance(self, steps: int) -> None:
+        for _ in range(steps):
+            self._solver.it.currentTime, self._solver.it.currentStepIndex = 0.0, 1  # else only the first call would step
+            if not self._solver.SolveSteps(self._system, self._options):
+                raise Diverged("Exudyn's solver does not converge")
+
+    def state(self) -> Array:
+        position, turned, velocity, spin = [self._system.GetNodeOutput(self._node, output) for output in OUTPUTS]
+        return np.concatenate([position, Rotation.from_matrix(turned.reshape(3, 3)).as_quat(), velocity, spin])
+
+    def as_built(self) -> AsBuilt:
+        body, gravity = self._system.GetObject(self._body), self._system.GetLoad(self._load)["loadVector"]
+        xx, yy, zz, yz, xz, xy = body["inertia"]
+        return AsBuilt(body["mass"], np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), np.array(gravity))

@@ -20,7 +20,7 @@ def pytest_generate_tests(metafunc):
         cases = CASES[metafunc.config.getoption("engine")]
         metafunc.parametrize("case", cases, ids=[case.label for case in cases])
     if "finding" in metafunc.fixturenames:
-        from support.findings import engine_of, findings
+        from support.findings import findings, heavy_engine
 
-        commands = [command for command in findings() if engine_of(command) == metafunc.config.getoption("engine")]
+        commands = [command for command in findings() if heavy_engine(command) == metafunc.config.getoption("engine")]
         metafunc.parametrize("finding", commands)

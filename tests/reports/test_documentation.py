@@ -9,8 +9,7 @@ from pathlib import Path
 import click
 import pytest
 from support import cli
-from support.findings import PAGE, engine_of, findings, verify_findings
-from support.heavy_engines import CASES
+from support.findings import PAGE, findings, heavy_engine, verify_findings
 
 import dropspin as ds
 from reports.commands.main import COMMANDS, dropspin
@@ -91,7 +90,7 @@ def test_every_finding_on_the_page_on_engines_has_a_value_and_a_command():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [command for command in findings() if engine_of(command) not in CASES])
+@pytest.mark.parametrize("command", [command for command in findings() if not heavy_engine(command)])
 def test_commands_of_the_page_on_engines_measure_the_values_printed_there(command, tmp_path):
     verify_findings(command, tmp_path)
 

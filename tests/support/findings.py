@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 from support import cli
+from support.heavy_engines import CASES
 
 PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
 FINDING = re.compile(
@@ -23,9 +24,11 @@ def findings():
     return by_command
 
 
-def engine_of(command):
-    """The engine of a command, without its options."""
-    return re.search(r"-e '?([\w-]+)", command)[1]
+def heavy_engine(command):
+    """The name of the engine in a command that has an environment of its own; empty if it has none."""
+    arguments = shlex.split(command)
+    named = {arguments[at + 1].partition("[")[0] for at, argument in enumerate(arguments) if argument == "-e"}
+    return "".join(named & CASES.keys())
 
 
 def verify_findings(command, folder):

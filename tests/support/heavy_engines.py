@@ -21,7 +21,14 @@ class Case(NamedTuple):
 
 
 CASES = {
-    "mjx": [Case("mjx", 2.9e-4, 1e-6, batch=4), Case("mjx[precision=float64]", 2.9e-4, 1e-6, batch=4)],
+    "mjx": [Case("mjx", 2.9e-4, 1e-6, batch=4), Case("mjx[precision=float64]", 2.9e-4, 1e-6, batch=32)],
+    "mujoco-warp": [Case("mujoco-warp", 2.9e-4, 1e-6)],
+    "newton": [
+        Case("newton", 3.2e-4, 3e-3),
+        Case("newton[solver=semi-implicit]", 3.1e-4, None),
+        Case("newton[solver=featherstone]", 2.9e-4, None),
+        Case("newton[solver=mujoco]", 2.9e-4, None),
+    ],
     "exudyn": [
         Case("exudyn", 1.24e-7, None, batch=None),
         Case("exudyn[integrator=trapezoidal]", 1.23e-7, None, batch=None),

@@ -88,8 +88,7 @@ def run_cost() -> None:
         time_method(engine, "prepare", "building")
     for engine in (Document, MuJoCo):
         time_method(engine, "prepare_batch", "building")
-    for module in ("run", "parallel"):
-        import_module(f"comparisons.running.{module}").EngineProcesses = ProcessesHere
+    import_module("comparisons.running.run").EngineProcesses = ProcessesHere
     core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
     ds.run(core[:1], "document", jobs=1)  # compiles
     seconds.clear()

@@ -6,8 +6,8 @@ from contextlib import ExitStack
 from threading import Event
 from typing import TypeVar
 
-from comparisons.running.inputs import EngineEntry, ignore
-from comparisons.running.processes import Closed, EngineProcesses, ResourceLimits
+from comparisons.running.inputs import ignore
+from comparisons.running.processes import Closed, EngineProcesses
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError
 
@@ -32,11 +32,8 @@ def as_jobs(jobs: int | None) -> int:
 def work_in_parallel(
     pieces: Iterator[Piece],
     work: Callable[[Piece, EngineProcesses, Callable[[], None]], Result],
-    jobs: int,
-    resources: ResourceLimits,
+    crews: Sequence[EngineProcesses],
     on_done: Callable[[Piece, Result], None],
-    *,
-    entries: Sequence[EngineEntry] = (),
     on_wait: Callable[[], None] = ignore,
 ) -> None:
     """Do pieces of work, several at a time.
@@ -45,10 +42,8 @@ def work_in_parallel(
         pieces: The pieces; the next one is requested when a processor is free.
         work: Called in a thread, with a piece, engine processes that no other piece uses at that time, and a function that raises once all
             work is to stop.
-        jobs: Number of pieces at a time.
-        resources: What an engine may use for each of its pieces of work.
+        crews: Engine processes for each of the pieces that are done at a time; they are abandoned at the end.
         on_done: Called with each piece and its result, in the order in which they are done; may raise to stop.
-        entries: Engines whose processes start before any work does.
         on_wait: Called at least twice a second; may raise to stop.
     """
     stopping = Event()
@@ -58,12 +53,10 @@ def work_in_parallel(
             raise Closed
 
     with ExitStack() as stack:
-        idle = [stack.enter_context(EngineProcesses(resources)) for _ in range(jobs)]
-        for processes in idle:
-            processes.start(entries)
-        threads = stack.enter_context(ThreadPoolExecutor(jobs))
+        idle = list(crews)
+        threads = stack.enter_context(ThreadPoolExecutor(len(crews)))
         # On leaving, the engine processes end first, then the threads that wait for them.
-        stack.callback(_abandon, list(idle), stopping)
+        stack.callback(_abandon, crews, stopping)
         running: dict[Future[Result], tuple[Piece, EngineProcesses]] = {}
         while True:
             while idle and (piece := next(pieces, None)) is not None:
@@ -79,8 +72,8 @@ def work_in_parallel(
                 idle.append(processes)
 
 
-def _abandon(all_processes: list[EngineProcesses], stopping: Event) -> None:
+def _abandon(crews: Sequence[EngineProcesses], stopping: Event) -> None:
     """End all running work; a process that ends with the work does not count as a failure of its engine."""
     stopping.set()
-    for processes in all_processes:
+    for processes in crews:
         processes.abandon()

@@ -1,6 +1,7 @@
 """A run: scenes × engines × time steps, measured against exact solutions and against each other, and judged."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import product
 from threading import Lock
@@ -81,37 +82,39 @@ def run(
                 report(Progress(scene.name, entry.label, step, finished=True))
         else:
             pending.append(StartPhase(scene, truth))
-    timings = _timings([own.scene for own in pending], entries, dts, resources, report)
+    number = min(as_jobs(jobs), max(len(pending), 1))
+    with ExitStack() as stack:
+        crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(number)]
+        timings = _timings([own.scene for own in pending], entries, dts, crews[0], report)
 
-    def of_scene(own: StartPhase, processes: EngineProcesses, _: Callable[[], None]) -> Results:
-        return run_scene(own, entries, dts, processes, report, stamp, timings)
+        def of_scene(own: StartPhase, processes: EngineProcesses, _: Callable[[], None]) -> Results:
+            return run_scene(own, entries, dts, processes, report, stamp, timings)
 
-    def on_done(own: StartPhase, part: Results) -> None:
-        parts[own.scene.name] = part
-        keep(part)
+        def on_done(own: StartPhase, part: Results) -> None:
+            parts[own.scene.name] = part
+            keep(part)
 
-    present = [entry for entry in entries if not entry.absence]
-    work_in_parallel(iter(pending), of_scene, min(as_jobs(jobs), max(len(pending), 1)), resources, on_done, entries=present)
+        for processes in crews[1:]:
+            processes.start([entry for entry in entries if not entry.absence])
+        work_in_parallel(iter(pending), of_scene, crews, on_done)
     stamp["compilation"] = _compilation(timings)
     return joined([parts[scene.name] for scene in prepared.scenes], stamp)
 
 
 def _timings(
-    scenes: Sequence[Scenario], entries: Sequence[EngineEntry], dts: Sequence[float], resources: ResourceLimits, on_progress: OnProgress
+    scenes: Sequence[Scenario], entries: Sequence[EngineEntry], dts: Sequence[float], processes: EngineProcesses, on_progress: OnProgress
 ) -> Timings:
     """The time that the steps of each engine take, measured while nothing else runs."""
     found = {}
-    with EngineProcesses(resources) as processes:
-        for scene, entry, dt in product(scenes, entries, dts):
-            on_progress(Progress(scene.name, entry.label, dt, timing=True))
-            if entry.absence:
-                timing = Timing()
-            else:
-                try:
-                    timing = processes.call(entry, time_engine, scene, dt)
-                except Failed as failure:
-                    timing = Timing(breakdown=Breakdown(failure.verdict, failure.reason), ended=True)
-            found[scene.name, entry.label, dt] = timing
+    for scene, entry, dt in product(scenes, entries, dts):
+        on_progress(Progress(scene.name, entry.label, dt, timing=True))
+        timing = Timing()
+        if not entry.absence:
+            try:
+                timing = processes.call(entry, time_engine, scene, dt)
+            except Failed as failure:
+                timing = Timing(breakdown=Breakdown(failure.verdict, failure.reason), ended=True)
+        found[scene.name, entry.label, dt] = timing
     return found
 
 

@@ -1,6 +1,7 @@
 """A sweep on this machine: one part at a time on each processor."""
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 from comparisons.running.parallel import work_in_parallel
 from comparisons.running.processes import EngineProcesses
@@ -25,4 +26,6 @@ def run_locally(work: Work, parts: Iterator[Part], folder: SweepFolder, on_progr
     def on_done(part: Part, result: None) -> None:
         on_progress(part.last - part.first)
 
-    work_in_parallel(parts, run_part, usable_cores(), work.resources, on_done, on_wait=lambda: on_progress(0))
+    with ExitStack() as stack:
+        crews = [stack.enter_context(EngineProcesses(work.resources)) for _ in range(usable_cores())]
+        work_in_parallel(parts, run_part, crews, on_done, lambda: on_progress(0))

@@ -33,8 +33,8 @@ def error_over_cost(found: "TradeOff", worlds: int | None = None) -> Chart:
     lines = [line("Pareto front", list(front), "#B0B0B0", width=5.0)]
     for engine, (colour, marker) in _styles(found).items():
         lines.append(line(engine, [one for one in found.points if one.engine == engine and isfinite(cost(one))], colour, marker))
-    per_world = "" if worlds is None else f", per world (batch of {worlds})"
-    return Chart(f"time per simulated second{per_world} [s]", metric_label(found.metric), lines, x_log=True, y_log=True)
+    cost_label = "time per simulated second" if worlds is None else f"per world and simulated second, batch of {worlds}"
+    return Chart(f"{cost_label} [s]", metric_label(found.metric), lines, x_log=True, y_log=True)
 
 
 def throughput(found: "TradeOff") -> Chart:

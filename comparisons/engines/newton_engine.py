@@ -26,7 +26,6 @@ SOLVERS: dict[str, tuple[str, dict[str, Any]]] = {
     "featherstone": ("SolverFeatherstone", UNDAMPED),
     "mujoco": ("SolverMuJoCo", {}),
 }
-"""The class of each solver, and its settings."""
 REASONS = {
     "angular_damping": "0.05 by default in semi-implicit and featherstone, whatever the scene says",
     "enable_restitution": "off by default, and then restitution is 0",
@@ -72,8 +71,8 @@ class Worlds(BatchSimulation):
 
     def __init__(self, members: Sequence[Scenario], dt: float, solver: str) -> None:
         scene, self.velocity_lag = members[0], 0.5 * dt
-        name, options = SOLVERS[solver]
-        builder, surface = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration)), self._surface(scene)
+        (name, options), surface = SOLVERS[solver], self._surface(scene)
+        builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration))
         builder.replicate(self._world(scene, surface), len(members))
         if scene.floor is not None:
             builder.add_ground_plane(cfg=newton.ModelBuilder.ShapeConfig(density=0.0, **surface))
@@ -91,9 +90,8 @@ class Worlds(BatchSimulation):
         self._now.body_q.assign(rows[:, :7])
         self._now.body_qd.assign(rows[:, 7:])
         newton.eval_ik(self.model, self._now, self._now.joint_q, self._now.joint_qd)
-        device = wp.get_device()
-        made = {"version": version("newton"), "warp": wp.config.version, "device": f"{device} ({device.name})", "solver": solver}
-        self.settings = made | options | surface
+        made = {"version": version("newton"), "warp": wp.config.version, "device": f"{wp.get_device()} ({wp.get_device().name})"}
+        self.settings = made | {"solver": solver} | options | surface
 
     def _surface(self, scene: Scenario) -> dict[str, float]:
         if scene.floor is None:
@@ -148,5 +146,5 @@ class NewtonSimulation(Simulation):
 
     def as_built(self) -> AsBuilt:
         model = self._worlds.model
-        mass, inertia, gravity = (np.array(part.numpy()[0], dtype=float) for part in (model.body_mass, model.body_inertia, model.gravity))
-        return AsBuilt(float(mass), inertia, gravity)
+        inertia, gravity = (np.array(part.numpy()[0], dtype=float) for part in (model.body_inertia, model.gravity))
+        return AsBuilt(float(model.body_mass.numpy()[0]), inertia, gravity)

@@ -73,4 +73,5 @@ def test_state_has_the_precision_that_is_claimed(case):
 
 
 def test_findings_of_the_page_on_engines_are_measured(finding, tmp_path):
-    verify_findings(finding, tmp_path)
+    """In a process of its own, because one in which JAX has started threads must not fork."""
+    verify_findings(finding, tmp_path, cli.spawn)

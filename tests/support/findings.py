@@ -31,9 +31,9 @@ def heavy_engine(command):
     return "".join(named & CASES.keys())
 
 
-def verify_findings(command, folder):
+def verify_findings(command, folder, run=cli.dropspin):
     """Run a command: it measures the printed digits, at the finest time step or as dt → 0. A word is a verdict."""
-    results = json.loads(cli.dropspin(*shlex.split(command), "--json", "-o", "out", cwd=folder).stdout)
+    results = json.loads(run(*shlex.split(command), "--json", "-o", "out", cwd=folder).stdout)
     finest = min((one["dt"] for one in results if one["dt"]), default=None)
     for row in findings()[command]:
         kinds = {"order"} if row["order"] else {"asymptotic_error"} if row["relation"] == "→" else {"truth", "invariant"}

@@ -49,13 +49,13 @@ class Newton(Engine):
         if (unfit := refusal_of_shape(scene)) is not None or floor is None:
             return unfit
         if solver != "xpbd":
-            return "contacts of this solver are springs and dampers, without a coefficient of restitution; a ball of 0.5 rebounds with 0.3"
+            return "this solver's contacts are springs and dampers without a restitution: a ball rebounds alike with 0.5 and with 0.9"
         if floor.rest_speed > 0.0:
             return "Newton has no speed below which restitution is 0 (floor.rest_speed)"
         if floor.friction != "none" and floor.restitution > 0.0:
             return (
-                "XPBD limits friction by the depth that a step corrects, not by the impulse of the rebound; a ball of 0.6 that lands on a "
-                "floor that grips rebounds with 0.41"
+                "XPBD restores the rebound's normal impulse after friction has acted, without friction of its own; a spinning ball of 0.6 "
+                "that lands on a floor that grips rebounds with 0.41"
             )
         return None
 

@@ -174,6 +174,8 @@ def _moment(axis: int) -> Change:
         if np.count_nonzero(tensor - np.diag(np.diag(tensor))):
             return None
         moments = np.diag(tensor) * (1.0 + share * (np.arange(3) == axis))
+        if 2.0 * moments.max() > moments.sum():  # no body has these moments
+            return None
         body = type(scene.body)(**scene.body.model_dump() | {"inertia": tuple(map(float, moments))})
         return scene.model_copy(update={"body": body})
 

@@ -155,6 +155,7 @@ def faulty_engine(name: str, fault: SizedFault, s: float) -> Engine:
     faulty = copy(sound)
     prepare = lambda scene, dt: Disguised(fault.plant(sound.prepare, scene, dt, s), scene.initial_state)  # noqa: E731
     object.__setattr__(faulty, "prepare", prepare)
+    object.__setattr__(faulty, "prepare_batch", lambda members, dt: None)  # which would not have the fault
     return faulty
 
 

@@ -4,9 +4,10 @@ import pytest
 from support import engines as made
 from support.detection_power import FAULTS, faulty_engine
 
-from comparisons.regressions.parameters import wrong_parameters
+from comparisons.regressions.parameters import _parameters, wrong_parameters
 from comparisons.running.run import run
 from reports.views.failures import failures, grouped
+from scenarios import load
 
 OF = {fault.title: fault for fault in FAULTS}
 
@@ -35,3 +36,11 @@ def test_planted_fault_is_among_the_parameters_that_are_named(title, engine, sce
 )
 def test_fault_of_another_kind_is_attributed_to_no_parameter(engine):
     assert wrong_parameters(run("spin-asymmetric", engine), engine.label) == []
+
+
+def test_moments_that_no_body_has_explain_no_error():
+    """The largest moment of a thin plate is almost the sum of the other two."""
+    plate = load({"duration": 1.0, "body": {"shape": "box", "half_extents": [0.3, 0.001, 0.2], "mass": 1.0}})
+    about_y = _parameters()["moment of inertia about y"]
+    assert about_y(plate, 0.01) is None
+    assert about_y(plate, -0.01) is not None

@@ -45,7 +45,12 @@ reason = "no engine is that stiff"
     ("arguments", "code", "output", "error"),
     [
         (["list", "metrics"], 0, "orientation_error", ""),
-        (["run", "harsh.toml", "-e", "mujoco", "--dt", "0.01"], 1, "1 of 1 checks fail.", "running harsh (scene 1 of 1, "),
+        (
+            ["run", "harsh.toml", "-e", "mujoco", "--dt", "0.01"],
+            1,
+            "1 of 1 checks fail.",
+            "timing the steps of each engine\n",
+        ),
         (["show", "drop-bal"], 2, "", "dropspin: scene 'drop-bal' is not in the catalogue and no file of that name exists. Did you mean"),
         (["conform", "my_engine:Mine"], 3, "", "dropspin: my_engine:Mine needs the module no_such_engine, which is not installed.\n"),
     ],
@@ -195,7 +200,7 @@ def test_an_interrupted_run_leaves_nothing(how, tmp_path):
     command = [DROPSPIN, "run", "long.toml", "-e", "mujoco", "--dt", "0.01", "--dt", "0.00001"]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
-    assert process.stderr.readline().startswith("running long (scene 1 of 1, ")
+    assert process.stderr.readline() == "timing the steps of each engine\n"
     process.send_signal(how)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130

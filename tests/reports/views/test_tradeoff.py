@@ -31,7 +31,7 @@ def found():
     )
     costs = {"mujoco[integrator=implicitfast]": 5e-6, "document[rotation=implicit-gyroscopic]": 2e-6, "accurate": 1e-6}
     points = tuple(
-        CostPoint(one.engine, dt, error, np.full(3, costs[one.engine] / dt), 1e-7 / dt)
+        CostPoint(one.engine, dt, error, np.full(3, costs[one.engine] / dt), {256: 1e-7 / dt})
         for one in ladders
         if not one.left_out
         for dt, error in one.steps

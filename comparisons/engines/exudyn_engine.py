@@ -37,7 +37,7 @@ class Exudyn(Engine):
     choices: ClassVar = {"integrator": tuple(INTEGRATORS)}
 
     @property
-    def order(self) -> float:  # type: ignore[override]
+    def order(self) -> float:  # type: ignore[override]  # it depends on the option
         return INTEGRATORS[self.option("integrator")][1]
 
     def declines(self, scene: Scenario) -> str | None:

@@ -13,10 +13,10 @@ import jax
 import numpy as np
 from jax import numpy as jnp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, version
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Simulation, version
 from comparisons.engines.mujoco_engine import MuJoCo
 from comparisons.engines.mujoco_limitations import limitations_met
-from comparisons.engines.mujoco_ports import REASONS, built, ported_model
+from comparisons.engines.mujoco_ports import Port, built, ported_model
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
 from scenarios import Scenario
@@ -28,25 +28,16 @@ CHUNK = 1000
 """States that one call of the compiled function records at most."""
 
 
-class MJX(Engine):
+class MJX(Port):
     """MJX's free body and, where the scene has a floor, one contact pair."""
 
-    name, compiles, reasons = "mjx", True, REASONS
+    name = "mjx"
     choices: ClassVar = {"precision": ("float32", "float64"), "integrator": ("euler", "implicitfast", "rk4")}
 
     @property
     def precision(self) -> type:  # type: ignore[override]  # it depends on the option
         """JAX's default is single precision."""
         return np.float64 if self.option("precision") == "float64" else np.float32
-
-    @property
-    def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
-        """That of MuJoCo's manual."""
-        return self._mujoco.order
-
-    @property
-    def _mujoco(self) -> MuJoCo:
-        return MuJoCo({"integrator": self.option("integrator")})
 
     def discretisation(self, scene: Scenario) -> str | None:
         """MuJoCo's, but the gyroscopic term is explicit in `implicitfast` too, and RK4's rotations are those of MuJoCo before 4.0."""
@@ -61,7 +52,7 @@ class MJX(Engine):
                 "with damping or implicitfast, MJX computes accelerations from contact forces, whose rounding errors in single precision "
                 "change a rebound by 8.5e-4; use precision=float64"
             )
-        return self._mujoco.declines(scene)
+        return super().declines(scene)
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return MJXSimulation(scene, dt, self.option("integrator"), self.precision)

@@ -5,9 +5,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt
+from comparisons.engines.base import Array, AsBuilt, Engine
 from comparisons.engines.mujoco_contact import contact
 from comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
+from comparisons.engines.mujoco_engine import MuJoCo
 from comparisons.engines.mujoco_model import Form, calibrated_specification
 from comparisons.engines.mujoco_simulation import set_damping
 from scenarios import Scenario
@@ -22,6 +23,28 @@ REASONS = {name: MUJOCO_REASONS[name] for name in ("solref", "solimp", "solreffr
     "eulerdamp": "disable: without damping, MJX need not compute the acceleration from the contact force again; in single precision a "
     "rebound would err by 8.5e-4",
 }
+
+
+class Port(Engine):
+    """A port of MuJoCo with the option `integrator`: it claims and declines what MuJoCo does, unless it says otherwise."""
+
+    compiles, reasons = True, REASONS
+
+    @property
+    def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
+        """That of MuJoCo's manual."""
+        return self._mujoco.order
+
+    @property
+    def _mujoco(self) -> MuJoCo:
+        return MuJoCo({"integrator": self.option("integrator")})
+
+    def discretisation(self, scene: Scenario) -> str | None:
+        """MuJoCo's."""
+        return self._mujoco.discretisation(scene)
+
+    def declines(self, scene: Scenario) -> str | None:
+        return self._mujoco.declines(scene)
 
 
 def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -> tuple[Any, dict[str, Any]]:

@@ -10,10 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, version
-from comparisons.engines.mujoco_engine import MuJoCo
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Simulation, version
 from comparisons.engines.mujoco_limitations import limitations_met
-from comparisons.engines.mujoco_ports import REASONS, built, ported_model
+from comparisons.engines.mujoco_ports import Port, built, ported_model
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from scenarios import Scenario
 
@@ -21,27 +20,11 @@ wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which 
 import mujoco_warp as mjw  # noqa: E402
 
 
-class MuJoCoWarp(Engine):
+class MuJoCoWarp(Port):
     """MuJoCo Warp's free body and, where the scene has a floor, one contact pair."""
 
-    name, compiles, precision, reasons = "mujoco-warp", True, np.float32, REASONS
+    name, precision = "mujoco-warp", np.float32
     choices: ClassVar = {"integrator": ("euler", "implicit", "implicitfast", "rk4")}
-
-    @property
-    def order(self) -> float:  # type: ignore[override]  # the claim depends on the option
-        """That of MuJoCo's manual."""
-        return self._mujoco.order
-
-    @property
-    def _mujoco(self) -> MuJoCo:
-        return MuJoCo({"integrator": self.option("integrator")})
-
-    def discretisation(self, scene: Scenario) -> str | None:
-        """MuJoCo's."""
-        return self._mujoco.discretisation(scene)
-
-    def declines(self, scene: Scenario) -> str | None:
-        return self._mujoco.declines(scene)
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return MuJoCoWarpSimulation(scene, Worlds([scene], dt, self.option("integrator")))

@@ -13,7 +13,7 @@ from comparisons.published.results import EXACT, Result, Status, compared
 from comparisons.published.sources import DATA, Source
 from scenarios import Scenario, Truth, load, truth_for
 from scenarios.mechanics import kinetic_energy
-from scenarios.rotations import about, rotate
+from scenarios.rotations import about, conjugate, rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN
 from scenarios.trajectory import Trajectory
 
@@ -33,9 +33,7 @@ def truth_of(scene: Scenario) -> Truth:
 
 def body_rates(states: Array) -> Array:
     """Angular velocities in the body frame [rad/s], shape (n, 3), of states, shape (n, 13)."""
-    back = states[:, ORIENTATION] * np.array([-1.0, -1.0, -1.0, 1.0])
-    rates: Array = rotate(back, states[:, SPIN])
-    return rates
+    return rotate(conjugate(states[:, ORIENTATION]), states[:, SPIN])
 
 
 def nesc_brick(source: Source) -> list[Result]:

@@ -61,7 +61,7 @@ class Source(Table):
 
     Attributes:
         name: The name of its file.
-        title: What it is about.
+        title: The subject.
         citation: Authors, title, year.
         place: The file or table, and the version in which it was read.
         licence: The licence of that file.

@@ -67,6 +67,7 @@ class Metric:
         """
         return None if self.components is None else self._average(self.components, cases)
 
+    @np.errstate(all="ignore")  # an engine may return 0 or 1e300; the inf or NaN that follows is judged as such
     def _average(self, measure: Measure, cases: Sequence[Comparison]) -> "Average":
         measured = [np.atleast_1d(measure(case)) for case in cases]
         flights = min(map(len, measured))

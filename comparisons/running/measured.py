@@ -91,8 +91,7 @@ def _judge_metric(
     """A metric's average over the start phases, and its judgement."""
     unresolved: Unresolved | None = None
     try:
-        with np.errstate(all="ignore"):  # an engine may return 1e300; the inf or NaN that follows is judged as such
-            average = metric.average(cases)
+        average = metric.average(cases)
     except Unresolved as error:
         average, unresolved = Average(*[np.array([np.nan])] * 3), error
     judgement = judge(scene, label, dt, metric, average.value)

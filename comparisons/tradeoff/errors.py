@@ -146,7 +146,6 @@ def processor_time() -> float:
 
 def _size(metric: str, cases: Sequence[Comparison]) -> float:
     try:
-        with np.errstate(all="ignore"):
-            return abs(METRICS[metric].average(cases).value)
+        return abs(METRICS[metric].average(cases).value)
     except Unresolved:
         return math.nan

@@ -207,6 +207,13 @@ def test_planted_landing_error_is_measured():
     assert measure(scene, planted)["landing_error"] == pytest.approx(0.01 * spin[after, 2] / 1.01 / spin[before, 2], rel=1e-9)
 
 
+def test_landing_of_a_body_that_does_not_turn_is_not_a_number():
+    """And NumPy does not warn of it."""
+    scene, motion = exact_motion("rock-block")
+    _, still = exact_motion("rock-block", angular_velocity=np.zeros_like(motion.angular_velocity))
+    assert np.isnan(measure(scene, still)["landing_error"])
+
+
 def test_moment_about_the_contact_point_of_a_body_at_rest_is_unresolved():
     """A ball that is thrown up in its first step: it has no speed to compare with."""
     scene, motion = exact_motion("drop-ball")

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from comparisons.engines.base import Engine, NumericOption, Simulation
 from comparisons.engines.document import Document
-from scenarios.rotations import multiply, rotate, unrotate
+from scenarios.rotations import cross, multiply, rotate, unrotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 LEAST_REBOUND = 1e-6
@@ -23,6 +23,7 @@ class AdaptiveSimulation(Simulation):
     def __init__(self, scene, dt, rtol, restitution):
         self._scene, self._dt, self._rtol, self._restitution = scene, dt, rtol, restitution
         self._state, self._resting = scene.initial_state, False
+        self._inertia, self._inverse = scene.body.inertia_tensor, np.linalg.inv(scene.body.inertia_tensor)
 
     def advance(self, steps):
         self.record(steps, max(steps, 1))
@@ -65,10 +66,10 @@ class AdaptiveSimulation(Simulation):
         return height
 
     def _rates(self, t, y):
-        tensor, damping = self._scene.body.inertia_tensor, self._scene.damping
+        damping = self._scene.damping
         k, kappa = (damping.linear, damping.angular) if damping else (0.0, 0.0)
         turning = 0.5 * multiply(y[ORIENTATION], np.array([*y[SPIN], 0.0]))
-        torque = np.linalg.solve(tensor, -np.cross(y[SPIN], tensor @ y[SPIN]))
+        torque = self._inverse @ cross(self._inertia @ y[SPIN], y[SPIN])
         return np.concatenate([y[VELOCITY], turning, self._scene.acceleration - k * y[VELOCITY], torque - kappa * y[SPIN]])
 
     @staticmethod

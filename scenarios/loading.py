@@ -1,4 +1,4 @@
-"""Loading of a `Scenario` by the name of a catalogue scene or a random scene, from a TOML file, or from a mapping."""
+"""Loading of a `Scenario` by the name or number of a catalogue scene, the name of a random scene, from a TOML file, or from a mapping."""
 
 import os
 import re
@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 from scenarios.errors import DropspinError, SceneError, did_you_mean
 from scenarios.files import read_file
 from scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
+from scenarios.problems import scene_name
 from scenarios.validation import Alternatives, first_problem, shown
 
 CATALOGUE = Path(__file__).parent / "catalogue"
@@ -50,8 +51,8 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
     """Load a scene.
 
     Args:
-        scene: The name of a catalogue scene or a random scene, the path of a TOML file, or a mapping with the same keys. A mapping may have
-            arrays instead of lists, and a key `name`, which is `scene` by default.
+        scene: The name or the number (`DS-012`) of a catalogue scene, the name of a random scene, the path of a TOML file, or a mapping
+            with the same keys. A mapping may have arrays instead of lists, and a key `name`, which is `scene` by default.
 
     Returns:
         The scene; all values are in SI units.
@@ -67,6 +68,8 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         from scenarios.draw import drawn_scene
 
         return drawn_scene(*map(int, drawn.groups()))
+    if isinstance(scene, str):
+        scene = scene_name(scene)
     path = _find(scene)
     try:
         str(path).encode()

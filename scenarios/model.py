@@ -197,8 +197,8 @@ class Scenario(Table):
 
     @property
     def digest(self) -> str:
-        """A short hash of everything that affects the motion, that is, without texts and expectations."""
-        physics = self.model_dump_json(exclude={"name", "summary", "source", "tags", "expect"})
+        """A short hash of everything that affects the motion: without texts, expectations and values that are the default."""
+        physics = self.model_dump_json(exclude={"name", "summary", "source", "tags", "expect"}, exclude_defaults=True)
         return hashlib.sha256(physics.encode()).hexdigest()[:12]
 
     def steps(self, dt: float) -> int:

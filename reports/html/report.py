@@ -30,6 +30,7 @@ from reports.views.matrix import legend_of_marks
 from reports.views.run import Overview
 from reports.views.scene import left_out, modelled
 from scenarios import truth_for
+from scenarios.problems import identifier
 
 
 def html_report(results: Results, summary: Overview, sections: Sequence[Section] = ()) -> str:
@@ -79,6 +80,7 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
     return {
         "id": f"scene-{number:02d}",
         "name": name,
+        "problem": identifier(scene),
         "failed": has_failed,
         "scene": scene,
         "modelled": modelled(scene),

@@ -3,6 +3,7 @@
 from scenarios.catalogue_truths import CATALOGUE_TRUTHS
 from scenarios.errors import DropspinError
 from scenarios.loading import load, names
+from scenarios.problems import identifier
 
 Rows = list[dict[str, str]]
 LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs", "unit")}
@@ -12,7 +13,13 @@ LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs
 def scene_rows() -> Rows:
     """The scenes of the catalogue."""
     return [
-        {"scene": scene.name, "truth": CATALOGUE_TRUTHS.get(scene.name, ""), "tags": ", ".join(scene.tags), "summary": scene.summary}
+        {
+            "scene": scene.name,
+            "problem": identifier(scene),
+            "truth": CATALOGUE_TRUTHS.get(scene.name, ""),
+            "tags": ", ".join(scene.tags),
+            "summary": scene.summary,
+        }
         for scene in map(load, names())
     ]
 

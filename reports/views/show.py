@@ -8,6 +8,7 @@ from reports.views.numbers import bound
 from reports.views.scene import left_out, modelled
 from scenarios import Scenario, truth_for
 from scenarios.model import Expectation
+from scenarios.problems import identifier
 
 if TYPE_CHECKING:
     from comparisons.running.inputs import EngineEntry
@@ -22,6 +23,7 @@ def scene_rows(scene: Scenario) -> Rows:
     start = scene.start
     facts = {
         "scene": scene.name,
+        "problem": identifier(scene),
         "summary": scene.summary,
         "source": scene.source,
         "duration": f"{scene.duration:g} s",

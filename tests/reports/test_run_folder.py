@@ -122,6 +122,10 @@ def test_names_with_markup_are_inert(folder):
     assert not re.search(r"(?<!\\)<", markdown)
 
 
+def test_the_heading_of_a_scene_has_the_identifier_of_its_problem(folder):
+    assert '<h2>drop-ball <span class="quiet">DS-012.1: A ball dropped' in (folder / "report.html").read_text(encoding="utf-8")
+
+
 def test_the_policy_allows_the_script_of_the_page_alone(results, folder):
     """By its hash; markup that got into a page could not run one."""
     replays = [replay_of(results, scene) for scene in results.scenes]

@@ -135,7 +135,7 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
 def test_piped_list_has_one_line_for_each_scene(tmp_path):
     lines = dropspin("list", cwd=tmp_path).stdout.splitlines()
     assert [line.split()[0] for line in lines] == ["scene", *ds.scene_names()]
-    assert lines[0].split() == ["scene", "truth", "tags", "summary"]
+    assert lines[0].split() == ["scene", "problem", "truth", "tags", "summary"]
 
 
 def test_narrow_terminal_leaves_out_columns_and_names_them(tmp_path):

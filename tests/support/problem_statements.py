@@ -1,0 +1,180 @@
+"""The statement of a numbered problem in words and numbers: what another program needs to reproduce it."""
+
+import numpy as np
+
+from scenarios.mechanics import is_diagonal
+
+CONVENTIONS = """SI units. The world frame is right-handed with y up. x and v are the position and the velocity of the centre of
+mass, and ω is the angular velocity, all in the world frame. q = [x, y, z, w] is a unit quaternion with the scalar last that turns
+vectors of the body frame, whose origin is the centre of mass, into the world frame: r_world = q r_body q*, dq/dt = ½ [ω, 0] q. M is
+the mass, I the inertia tensor turned into the world frame, and L = I ω."""
+
+FLIGHT = "In flight dv/dt = g and dL/dt = 0."
+IMPACT = """The body is in flight until a point of it reaches the floor and descends. An impact takes no time and does not
+change x and q: an impulse j acts at this point, at r from the centre of mass, whose velocity is u = v + ω × r; v changes by j/M and
+ω by I⁻¹ (r × j)."""
+SMOOTH = "j is vertical (no friction), and such that u_y becomes -e u_y (Newton's restitution); the horizontal parts of u may change too."
+STICKING = """j is such that u becomes [0, -e u_y, 0]: Newton's restitution of the normal velocity, and infinite friction, which
+ends the sliding of this point whatever the ratio of the tangential to the normal impulse."""
+EDGE = "The two ends of an edge strike at once, with equal velocities; r is the middle of the edge."
+PENDULUM = """The body stands on one edge, that of its lowest corners, which stays at rest on the floor. The body turns about it
+without friction or slip, as a rigid pendulum: (I_e + M R²) d²ψ/dt² = M |g| R sin ψ, with ψ the angle from the direction against
+gravity to the line from the edge to the centre of mass, R the length of this line and I_e the moment of inertia about the direction
+of the edge through the centre of mass."""
+LANDING = """When the next edge reaches the floor, the body turns about that edge from then on, and the old edge leaves the
+floor: the angular momentum about the new edge is the same before and after (Housner's landing: infinite friction, restitution 0; x
+and q do not jump, v and ω do)."""
+RESTS = """When the body rocks about the two edges of one face, the times between landings become ever shorter and the
+landings accumulate; from then on the body lies still."""
+
+LAWS = {
+    "principal-spin": (FLIGHT,),
+    "free-rotor": (FLIGHT,),
+    "ball-impact": (IMPACT, FLIGHT, "The point of a ball that strikes is the lowest, r = [0, -radius, 0]."),
+    "corner-impact": (IMPACT, FLIGHT),
+    "edge-impact": (IMPACT, FLIGHT, EDGE),
+    "tipping": (PENDULUM,),
+    "rocking": (PENDULUM, LANDING, RESTS),
+    "rimless-wheel": (PENDULUM, LANDING, RESTS),
+    "slipping": (
+        """The body stands on one edge, that of its lowest corners. The floor exerts only vertical forces, at this edge,
+which stays on the floor and slides: the horizontal velocity of the centre of mass is constant. The energy M v²/2 + ω·L/2 - M g·x is
+constant.""",
+    ),
+    "coulomb-slide": (
+        """The box lies flat and stays so: the normal force acts where it balances the moment of friction. While it slides,
+friction has the size f M |g_y| and acts against v: dv/dt = g_t - f |g_y| v/|v|, with g_t the horizontal part of g. It stops where v
+is 0 and stays there if |g_t| ≤ f |g_y|; it does not start if it is at rest and this holds.""",
+    ),
+    "coulomb-turn": (
+        """The box lies flat and stays so, and its centre of mass does not move. Its four lower corners, not the face between
+them, touch the floor, each with a quarter of the weight; friction at each has the size f times this and acts against the corner's
+velocity, until the box stops.""",
+    ),
+    "rolling": (
+        """The ball stays on the floor; its contact point, at r = [0, -radius, 0], has the velocity s = v + ω × r. Friction F
+acts there: M dv/dt = M g_t + F, dL/dt = r × F, with g_t the horizontal part of g. While s is not 0, F = -f M |g_y| s/|s|. From the
+time at which s is 0, the ball rolls without slip: F is what keeps s at 0. Nothing resists rolling or turning about the vertical.""",
+    ),
+    "top": (
+        """The lowest corner, the tip, stays where it is, as in a ball joint: the floor exerts any force on it, and no
+moment. No other corner touches the floor. About the tip, d(L + r × M v)/dt = r × M g with r from the tip to the centre of mass, and
+v = ω × r.""",
+    ),
+}
+"""For the name of each exact solution, the laws of the motion; those that depend on the scene are added by `laws`."""
+
+KINDS = {
+    "ball-impact": "closed form",
+    "bounce-ladder": "closed form",
+    "corner-impact": "elliptic functions; impact times by root finding",
+    "coulomb-slide": "closed form",
+    "coulomb-turn": "closed form",
+    "damped-free-rotor": "elliptic functions",
+    "damped-parabola": "closed form",
+    "edge-impact": "closed form; impact time by root finding",
+    "free-rotor": "elliptic functions",
+    "principal-spin": "closed form",
+    "rimless-wheel": "elliptic functions",
+    "rocking": "elliptic functions",
+    "rolling": "closed form; numerical integration where the axis of rotation turns",
+    "slipping": "quadrature",
+    "tipping": "elliptic functions",
+    "top": "numerical integration",
+}
+"""The kind of each exact solution, by its name."""
+
+
+def laws(scene, truth):
+    """The laws of the motion of a scene, sentences."""
+    found = list(LAWS.get(truth.name, ()))
+    if scene.damping is not None:
+        linear, angular = number(scene.damping.linear), number(scene.damping.angular)
+        found.append(f"A medium resists in proportion to the velocities: dv/dt = g - {linear} v, dL/dt = -{angular} L.")
+    if truth.name.endswith("-impact"):
+        found.append(SMOOTH if scene.floor.friction == "none" else STICKING)
+    if truth.name == "bounce-ladder":
+        found.append(_bounces(scene, truth))
+    return [" ".join(one.split()) for one in found]
+
+
+def _bounces(scene, truth):
+    """The law of a body whose impacts do not change its rotation."""
+    if truth.events[0].time == 0.0:
+        return "The floor carries the body and exerts no friction: x is constant, and the body turns about the vertical as a free body."
+    face = "" if scene.body.rounding else "The four lower corners strike at once, so that the box stays flat. "
+    law = f"{face}Between impacts dv/dt = g. When the lowest point reaches the floor, v_y becomes -e v_y (Newton's restitution)."
+    if scene.floor.rest_speed:
+        return f"{law} An impact slower than {number(scene.floor.rest_speed)} m/s has e = 0; after it the body lies still."
+    if scene.floor.restitution == 1.0:
+        return law
+    return f"""{law} The impacts accumulate at t = t₁ + (2 |v₁|/|g_y|) e/(1 - e), with t₁ the time of the first and v₁ the velocity before
+        it; from then on the body lies still."""
+
+
+def statement(scene):
+    """The rows of the statement: what, and its value."""
+    start = scene.start
+    rows = {"body": _shape(scene.body), "mass": f"{number(scene.body.mass)} kg", "inertia": _inertia(scene.body)}
+    for name, value, unit in (
+        ("x", start.position, "m"),
+        ("q", start.orientation, ""),
+        ("v", start.velocity, "m/s"),
+        ("ω", start.angular_velocity, "rad/s"),
+    ):
+        rows[f"{name} at t = 0"] = f"{vector(value)} {unit}".strip()
+    rows["gravity"] = "none" if scene.gravity is None else f"g = {vector(scene.gravity.acceleration)} m/s²"
+    rows["floor"] = "none" if scene.floor is None else _floor(scene.floor)
+    rows["duration"] = f"{number(scene.duration)} s"
+    if scene.ensemble is not None:
+        rows["ensemble"] = _ensemble(scene)
+    return rows
+
+
+def _shape(body):
+    if body.shape == "sphere":
+        return f"ball of radius {number(body.radius)} m, centre of mass at its centre"
+    if body.shape == "box":
+        return f"box with the half extents {vector(body.half_extents)} m along its axes, centre of mass at its centre"
+    points = ", ".join(vector(point, computed) for point in body.vertices)
+    return f"the convex hull of {len(body.vertices)} points, given from the centre of mass [m]: {points}"
+
+
+def _inertia(body):
+    tensor = body.inertia_tensor
+    rows = vector(np.diag(tensor), computed) if is_diagonal(tensor) else ", ".join(vector(row, computed) for row in tensor)
+    about = "principal moments along the body's axes" if is_diagonal(tensor) else "tensor, by rows"
+    why = {"solid": "; homogeneous", "vertices": "; all mass in equal parts at the corners"}.get(
+        str(body.inertia), "; given, whatever the shape"
+    )
+    return f"{about}: {rows} kg m²{why}"
+
+
+def _floor(floor):
+    named = {"none": "no friction", "infinite": "infinite friction"}
+    friction = named.get(str(floor.friction)) or f"Coulomb friction f = {number(floor.friction)}"
+    return f"the plane y = 0, fixed; restitution e = {number(floor.restitution)}, {friction}"
+
+
+def _ensemble(scene):
+    one = scene.ensemble
+    return (
+        f"the scene also has {one.size} starts drawn with seed {one.seed}, with orientations uniform over all rotations, angular "
+        f"velocities uniform within ± {vector(one.angular_velocity)} rad/s of the start above, and the lowest point as high as in it; "
+        "this sheet is about the start above"
+    )
+
+
+def number(value):
+    """A number with as many digits as identify it."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def computed(value):
+    """A number that was computed, without the rounding of its last digit."""
+    return f"{value:.15g}" if abs(value) > 1e-17 else "0"
+
+
+def vector(values, written=number):
+    """Numbers in brackets."""
+    return f"[{', '.join(written(value) for value in values)}]"

@@ -71,6 +71,8 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
     after[:, 8] = speeds[1 : len(times) + 1]
     events = tuple(Impact(float(time), *pair) for time, *pair in zip(times, before, after, strict=True))
     statement = "bounce ladder h_k = e^(2k) H with impact times by geometric sums (Newton's restitution)"
+    if u0 == 0.0:
+        statement = "rest on the floor, angular velocity about the vertical constant, angle ωt"
     return Truth("bounce-ladder", statement, states, events, until)
 
 

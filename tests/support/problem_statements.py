@@ -6,8 +6,9 @@ from scenarios.mechanics import is_diagonal
 
 CONVENTIONS = """SI units. The world frame is right-handed with y up. x and v are the position and the velocity of the centre of
 mass, and ω is the angular velocity, all in the world frame. q = [x, y, z, w] is a unit quaternion with the scalar last that turns
-vectors of the body frame, whose origin is the centre of mass, into the world frame: r_world = q r_body q*, dq/dt = ½ [ω, 0] q. M is
-the mass, I the inertia tensor turned into the world frame, and L = I ω."""
+vectors of the body frame, whose origin is the centre of mass, into the world frame: r_world = q r_body q*, dq/dt = ½ [ω, 0] q. Of q
+and -q, which are one orientation, the one with w ≥ 0 is printed. M is the mass, I the inertia tensor turned into the world frame,
+and L = I ω."""
 
 FLIGHT = "In flight dv/dt = g and dL/dt = 0."
 IMPACT = """The body is in flight until a point of it reaches the floor and descends. An impact takes no time and does not

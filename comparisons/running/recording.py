@@ -17,7 +17,6 @@ from comparisons.judging.verdicts import Verdict
 from comparisons.running.inputs import SceneLike, as_scene, verify_time_step
 from comparisons.running.progress import OnSimulations
 from comparisons.running.verification import (
-    BATCH_ULPS,
     verified_batch,
     verified_lag,
     verified_limitations,
@@ -25,7 +24,7 @@ from comparisons.running.verification import (
     verified_refusal,
     verified_settings,
     verify_build,
-    verify_start,
+    verify_starts,
 )
 from scenarios import DropspinError, Scenario, Trajectory
 
@@ -149,8 +148,7 @@ def record_batch(
         lag = verified_lag(batch.velocity_lag, dt)
         states = verified_batch(batch.record(steps), len(starts), steps + 1)
     times = dt * np.arange(steps + 1, dtype=float)
-    for start, rows in zip(starts, states, strict=True):
-        verify_start(engine, start, rows[0], BATCH_ULPS)
+    verify_starts(engine, starts, np.array([rows[0] for rows in states]))
     on_simulations(len(starts), len(starts))
     return [Trajectory.from_states(times, rows, lag) for rows in states]
 

@@ -1,10 +1,10 @@
-"""What an adapter may round: the start, to a few ulp."""
+"""What an adapter may round: the start, to a few ulp; and the verification of a batch as a whole."""
 
 import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.running.verification import BuildMismatch, verify_start
+from comparisons.running.verification import BuildMismatch, verified_batch, verify_start, verify_starts
 from scenarios import load
 from scenarios.rotations import rotate, unrotate
 from scenarios.state import ORIENTATION, SPIN
@@ -29,3 +29,33 @@ def test_a_spin_may_be_rotated_to_the_body_s_axes_and_back():
         with pytest.raises(BuildMismatch, match="angular velocity at the start"):
             verify_start(made.Exact(), scene, state)
     assert largest > 2e-15  # 9 ulp and more do occur
+
+
+def motions_of_a_batch():
+    states = np.zeros((40, 3, 13))
+    states[:, :, 6] = 1.0
+    return states
+
+
+@pytest.mark.parametrize("length", [1.0 + 2e-5, 1.0 - 2e-5])
+def test_one_wrong_quaternion_in_a_batch_is_found(length):
+    states = motions_of_a_batch()
+    states[39, 1, 6] = 1.0 + 0.9e-5
+    assert len(verified_batch(states, 40, 3)) == 40
+    states[39, 2, 6] = length
+    with pytest.raises(BuildMismatch, match="quaternion of row 2"):
+        verified_batch(states, 40, 3)
+    states[39, 2, 7] = np.nan  # a divergence, which has a verdict of its own
+    assert np.isnan(verified_batch(states, 40, 3)[39]).any()
+
+
+def test_one_wrong_start_in_a_batch_is_named():
+    ball = load({"duration": 1.0, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}})
+    starts = motions_of_a_batch()[:, 0]
+    starts[:, 0] = np.arange(40.0)
+    scenes = [ball.starting_at(start) for start in starts]
+    starts[5, 3:7] *= -1.0  # the same orientation
+    verify_starts(made.Exact(), scenes, starts)
+    starts[37, 0] = 38.0
+    with pytest.raises(BuildMismatch, match=r"position at the start is \[38\. .* the scene has \[37\. "):
+        verify_starts(made.Exact(), scenes, starts)

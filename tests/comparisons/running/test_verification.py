@@ -42,7 +42,7 @@ def test_one_wrong_quaternion_in_a_batch_is_found(length):
     states = motions_of_a_batch()
     states[39, 1, 6] = 1.0 + 0.9e-5
     assert len(verified_batch(states, 40, 3)) == 40
-    states[39, 2, 6] = length
+    states[39, 1:, 6] = 1.0, length
     with pytest.raises(BuildMismatch, match="quaternion of row 2"):
         verified_batch(states, 40, 3)
     states[39, 2, 7] = np.nan  # a divergence, which has a verdict of its own

@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from comparisons.sweeps.running import run_sweep as run_sweep
     from comparisons.sweeps.spec import load_sweep as load_sweep
     from comparisons.symmetries.study import symmetries as symmetries
+    from comparisons.symmetries.twins import twins as twins
     from comparisons.tradeoff.points import TradeOff as TradeOff
     from comparisons.tradeoff.study import tradeoff as tradeoff
     from reports.run_folder import write_report as write_report
@@ -107,6 +108,7 @@ _HOMES = {
     "comparisons.sweeps.running": ("read_sweep", "read_sweep_parts", "run_sweep"),
     "comparisons.sweeps.spec": ("load_sweep",),
     "comparisons.symmetries.study": ("symmetries",),
+    "comparisons.symmetries.twins": ("twins",),
     "comparisons.tradeoff.points": ("TradeOff",),
     "comparisons.tradeoff.study": ("tradeoff",),
     "reports.run_folder": ("write_report",),

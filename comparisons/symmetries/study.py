@@ -155,7 +155,7 @@ def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array | Br
 
 def findings_of(entry: EngineEntry, scene: Scenario, dt: float, names: Iterable[str]) -> tuple[Array | Breakdown, list[Finding]]:
     """The engine's motion of a scene, and the findings on some symmetries that the scene has; runs in the engine's process."""
-    own = _states(entry, scene, dt)
+    own = states_of(entry, scene, dt)
     if isinstance(own, Breakdown):
         return own, []
     having = [name for name in names if name not in SYMMETRIES or SYMMETRIES[name].applies(scene)]
@@ -166,7 +166,7 @@ def _finding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: F
     """One finding; `none` is that of a symmetry that cannot be compared."""
     try:
         pairs, effects = _pairs(entry, scene, dt, own, none.symmetry)
-        return _judged(none, scene, dt, pairs, effects, entry.adapter.precision)
+        return judged(none, scene, dt, pairs, effects, entry.adapter.precision)
     except _NotComparable as error:
         return _not_run(none, error.breakdown)
     except DropspinError as error:  # the transformed scene is no valid scene
@@ -193,10 +193,10 @@ def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str
         return _halves(entry, scene, dt, own)
     if name == BATCH:
         # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
-        effects = (lambda: _effects(entry, scene, dt, own, _perturbed(scene, entry))) if entry.adapter.compiles else None
+        effects = (lambda: effects_of_rounding(entry, scene, dt, own)) if entry.adapter.compiles else None
         return _batched(entry, scene, dt, own), effects
     other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
-    return [(own, _motion(other, scene, dt))], lambda: _effects(entry, scene, dt, own, _perturbed(scene, entry))
+    return [(own, _motion(other, scene, dt))], lambda: effects_of_rounding(entry, scene, dt, own)
 
 
 def _batched(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> Pairs:
@@ -222,7 +222,7 @@ def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple
     rest = _motion(entry, nominal, dt)
 
     def of_rest() -> list[Array]:
-        effects = _effects(entry, nominal, dt, rest, _perturbed(nominal, entry))
+        effects = effects_of_rounding(entry, nominal, dt, rest)
         return [np.concatenate([np.zeros(half), effect]) for effect in effects]
 
     return [(own, np.concatenate([own[:half], rest]))], of_rest
@@ -235,7 +235,7 @@ def _transformed(entry: EngineEntry, scene: Scenario, dt: float, own: Array, sym
 
     def of_transformed() -> list[Array]:
         starts = [symmetry.back(times[:1], start.initial_state[np.newaxis])[0] for start in _perturbed(transformed, entry)]
-        return _effects(entry, scene, dt, own, map(scene.starting_at, starts))
+        return effects_of_rounding(entry, scene, dt, own, map(scene.starting_at, starts))
 
     return [(own, symmetry.back(times, states))], of_transformed
 
@@ -254,9 +254,11 @@ def _on_one_core(entry: EngineEntry, scene: Scenario, dt: float, own: Array, non
     return replace(_finding(entry, scene, dt, own, replace(none, symmetry=BATCH)), symmetry=none.symmetry)
 
 
-def _effects(entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario]) -> list[Array]:
-    """The differences of an engine's motion and those from perturbed starts, each of shape (n,)."""
-    motions = (_states(entry, start, dt) for start in starts)
+def effects_of_rounding(
+    entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario] | None = None
+) -> list[Array]:
+    """The differences of an engine's motion and those from perturbed starts, by default the scene's own, each of shape (n,)."""
+    motions = (states_of(entry, start, dt) for start in (_perturbed(scene, entry) if starts is None else starts))
     return [differences(scene, own, motion) for motion in motions if not isinstance(motion, Breakdown)]
 
 
@@ -271,13 +273,13 @@ def _motion(entry: EngineEntry, scene: Scenario, dt: float) -> Array:
     Raises:
         _NotComparable: There is no motion.
     """
-    states = _states(entry, scene, dt)
+    states = states_of(entry, scene, dt)
     if isinstance(states, Breakdown):
         raise _NotComparable(states)
     return states
 
 
-def _states(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
+def states_of(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
     """The states of an engine's motion at each time step, shape (n, 13), or why there are none."""
     recording = try_record(entry.adapter, scene, dt)
     if isinstance(recording, Breakdown):
@@ -285,7 +287,7 @@ def _states(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown
     return divergence(recording.motion) or recording.motion.states
 
 
-def _judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Effects | None, precision: type) -> Finding:
+def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Effects | None, precision: type) -> Finding:
     """A finding with its status; where rounding has no effect, the motions of each pair must be equal bit for bit."""
     of_pairs = [differences(scene, *pair) for pair in pairs]
     difference: Array = np.max(of_pairs, axis=0)

@@ -29,6 +29,7 @@ COMMANDS = {
     "sweep": "Run every job of a grid or random sample.",
     "symmetries": "Test whether engines keep symmetries and repeat their results.",
     "tradeoff": "Measure what accuracy costs.",
+    "twins": "Find the time step from which engines of the same algorithm differ.",
 }
 """The commands, each in `reports/commands/NAME.py`, with the line shown for each in the help."""
 CITATION = """To cite: The dropspin authors, dropspin, version {version};

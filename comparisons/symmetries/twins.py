@@ -1,0 +1,168 @@
+"""The study of the command `dropspin twins`: from which time step on engines that should give the same motion differ, and by how much.
+
+Twins are engines that state the same algorithm, such as one engine on a processor and its port to a GPU. No exact solution is needed. As
+for symmetries, a difference is attributed to rounding as long as perturbations of the initial state by a few ulp explain it; they are
+those of the engine of lower precision.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.engines.base import Engine
+from comparisons.measuring.differences import differences
+from comparisons.measuring.motions import Motions
+from comparisons.running.entries import engine_entry
+from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.recording import Breakdown
+from comparisons.symmetries.study import DT, RESOURCES, Effects, Finding, Status, effects_of_rounding, judged, states_of
+from scenarios import DropspinError, Scenario, Trajectory
+
+Array = NDArray[np.float64]
+
+LEVELS = (1e-12, 1e-9, 1e-6, 1e-3)
+"""Differences whose first time steps are reported, of angles [rad] and relative to sizes and speeds."""
+
+
+@dataclass(frozen=True)
+class TwinFinding:
+    """How far two engines agree in one scene.
+
+    Attributes:
+        scene: Name of the scene.
+        engine: Label of one engine.
+        twin: Label of the other.
+        status: As that of a symmetry: `kept` and `rounding` if rounding explains the difference, up to 1e-5 or above; `nearly kept` and
+            `lost` if it does not; `not run` if one of the engines has no motion.
+        first: The first time step after which any number of the states differs; 0 is the start, None if all have the same bits.
+        before_contact: The largest difference up to the last step before either motion has a contact, of angles [rad] and relative to
+            sizes and speeds.
+        after_contact: The largest difference after that; NaN if there is no contact.
+        beyond: For each of `LEVELS`, the first time step after which the difference exceeds it; None if it never does.
+        unexplained: The first time step after which rounding does not explain the difference; None if it always does.
+        reason: Why there is no motion to compare; otherwise empty.
+    """
+
+    scene: str
+    engine: str
+    twin: str
+    status: Status
+    first: int | None = None
+    before_contact: float = float("nan")
+    after_contact: float = float("nan")
+    beyond: dict[float, int | None] = field(default_factory=dict)
+    unexplained: int | None = None
+    reason: str = ""
+
+
+def twins(
+    scenes: SceneLike | Iterable[SceneLike],
+    engines: Iterable[Engine | str],
+    *,
+    dt: float = DT,
+    on_progress: Callable[[str, float], None] | None = None,
+    resources: ResourceLimits = RESOURCES,
+) -> list[TwinFinding]:
+    """Run scenes with engines that should give the same motions, and compare these pair by pair.
+
+    Args:
+        scenes: One scene or several: scenes, catalogue names, paths of files, or mappings.
+        engines: Two engines or more: engines, or names with options.
+        dt: Time step [s].
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        resources: The processor time [s] and memory [bytes] that an engine may use for one scene.
+
+    Returns:
+        One finding for each scene and pair of engines.
+
+    Raises:
+        DropspinError: A scene or an engine does not exist, there are fewer than two engines, or a time step does not fit a scene.
+    """
+    chosen = [as_scene(one) for one in several("scenes", scenes)]
+    entries = list({one.label: one for one in map(engine_entry, several("engines", engines))}.values())
+    if len(entries) < 2:
+        raise DropspinError(f"twins: got {len(entries)} engine{'s' * (len(entries) != 1)}; name at least two, such as mujoco and mjx.")
+    for scene in chosen:
+        verify_time_step(scene, dt)
+    found: list[TwinFinding] = []
+    with EngineProcesses(resources) as processes:
+        for number, scene in enumerate(chosen):
+            (on_progress or ignore)(scene.name, number / len(chosen))
+            found += _of_scene(processes, entries, scene, dt)
+    return found
+
+
+def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene: Scenario, dt: float) -> list[TwinFinding]:
+    """The findings for all pairs of engines in one scene."""
+    motions = [(entry, _motion(processes, entry, scene, dt)) for entry in entries]
+
+    @cache
+    def effects(label: str) -> list[Array]:
+        [entry] = [one for one in entries if one.label == label]
+        return processes.call(entry, _effects, scene, dt)
+
+    found = []
+    for (entry, own), (twin, other) in combinations(motions, 2):
+        broken = {one.label: motion for one, motion in ((entry, own), (twin, other)) if isinstance(motion, Breakdown)}
+        none = TwinFinding(scene.name, entry.label, twin.label, "not run")
+        if isinstance(own, Breakdown) or isinstance(other, Breakdown):
+            reasons = [f"{label}: {one.reason.removesuffix('.')}" for label, one in broken.items()]
+            found.append(replace(none, reason="; ".join(reasons)))
+        else:
+            coarser, precision = max((entry, own[1]), (twin, other[1]), key=lambda one: float(np.finfo(one[1]).eps))
+            found.append(_compared(none, scene, dt, (own[0], other[0]), partial(effects, coarser.label), precision))
+    return found
+
+
+def _motion(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array, type] | Breakdown:
+    """The states at each time step, shape (n, 13), and the engine's precision; or why there are none."""
+    if entry.engine is None:
+        return Breakdown(entry.absence or "missing", entry.reason)
+    try:
+        return processes.call(entry, _recorded, scene, dt)
+    except Failed as failure:
+        return Breakdown(failure.verdict, failure.reason)
+
+
+def _recorded(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array, type] | Breakdown:
+    states = states_of(entry, scene, dt)
+    return states if isinstance(states, Breakdown) else (states, entry.adapter.precision)
+
+
+def _effects(entry: EngineEntry, scene: Scenario, dt: float) -> list[Array]:
+    states = states_of(entry, scene, dt)
+    assert not isinstance(states, Breakdown)  # it gave a motion before
+    return effects_of_rounding(entry, scene, dt, states)
+
+
+def _compared(
+    none: TwinFinding, scene: Scenario, dt: float, motions: tuple[Array, Array], effects: Effects, precision: type
+) -> TwinFinding:
+    """The finding for two motions of a scene; `none` is that of engines without motions."""
+    difference, unequal = differences(scene, *motions), (motions[0] != motions[1]).any(axis=1)
+    until = min(_first_flight_end(scene, dt, states) for states in motions) + 1
+    judgement = judged(Finding(scene.name, none.engine, none.twin, "not run"), scene, dt, [motions], effects, precision)
+    return replace(
+        none,
+        status=judgement.status,
+        first=_first(unequal),
+        before_contact=float(difference[:until].max()),
+        after_contact=float(difference[until:].max(initial=-np.inf)) if until < len(difference) else float("nan"),
+        beyond={level: _first(difference > level) for level in LEVELS},
+        unexplained=judgement.step,
+    )
+
+
+def _first_flight_end(scene: Scenario, dt: float, states: Array) -> int:
+    times = dt * np.arange(len(states), dtype=float)
+    return int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end)
+
+
+def _first(rows: NDArray[np.bool_]) -> int | None:
+    """The first row that is True; None if there is none."""
+    return int(rows.argmax()) if rows.any() else None

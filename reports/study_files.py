@@ -10,7 +10,7 @@ from comparisons.published.sources import Source
 from comparisons.regressions.history import History
 from comparisons.results.stored_files import file_name
 from comparisons.robustness.study import RobustnessStudy
-from comparisons.symmetries.study import Finding
+from comparisons.symmetries.findings import Finding
 from comparisons.tradeoff.points import TradeOff
 from reports.html.replay import replay_page
 from reports.markdown import history_markdown

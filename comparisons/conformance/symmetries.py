@@ -7,7 +7,8 @@ from comparisons.engines.base import Engine
 from comparisons.measuring.symmetries import BATCH, SYMMETRIES
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.recording import record
-from comparisons.symmetries.study import Finding, findings_of
+from comparisons.symmetries.findings import Finding
+from comparisons.symmetries.study import findings_of
 from scenarios.transformations import whole_steps
 
 

@@ -10,7 +10,7 @@ from comparisons.measuring.symmetries import BITWISE, kind_of
 from comparisons.measuring.tolerances import MATTERS
 from comparisons.results.measurement import Measurement, as_table
 from comparisons.results.results import Results
-from comparisons.symmetries.study import BY_CHANCE, Finding
+from comparisons.symmetries.findings import BY_CHANCE, Finding
 
 
 def with_symmetries(results: Results, findings: Sequence[Finding], dt: float) -> Results:

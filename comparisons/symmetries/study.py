@@ -1,15 +1,8 @@
-"""The study of the command `dropspin symmetries`: whether engines keep the symmetries of a scene, and repeat their results.
-
-Rounding breaks every symmetry a little, and a sensitive motion amplifies that. So the initial state of the transformed scene is perturbed
-by a few ulp, and the nominal scene is run from there: a difference is attributed to rounding as long as it is not larger than the largest
-effect of the perturbations so far, times a factor that allows for a rounding error in each time step. Repeated runs must be equal bit for
-bit.
-"""
+"""The study of the command `dropspin symmetries`: whether engines keep the symmetries of a scene, and repeat their results."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,68 +11,26 @@ from comparisons.engines.base import Engine
 from comparisons.judging.verdicts import Verdict
 from comparisons.measuring.differences import differences
 from comparisons.measuring.symmetries import AGAIN, AWAY, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
-from comparisons.measuring.tolerances import FEW_DRAWS, MATTERS, PERTURBATION, ULPS_PER_STEP, perturbed
+from comparisons.measuring.tolerances import perturbed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.recording import Breakdown, classify, divergence, record_batch, try_record
+from comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError, Scenario
 from scenarios.state import POSITION, RATES
 from scenarios.transformations import whole_steps
 
 Array = NDArray[np.float64]
-Effects = Callable[[], list[Array]]
-"""A function that runs an engine from perturbed starts and returns the differences from its motion, each of shape (n,)."""
-Pairs = Sequence[tuple[Array, Array]]
-"""Motions that should be equal, states of shape (n, 13)."""
-Status = Literal["kept", "rounding", "nearly kept", "lost", "not run"]
-STATUSES: tuple[Status, ...] = get_args(Status)
-"""From the best to the worst. Kept: rounding explains the difference, which is up to 1e-5 of the motion's sizes and speeds. Rounding:
-rounding explains it, but it is larger. Nearly kept: rounding does not explain it, but it is up to 1e-5. Lost: it is larger. Not run: the
-engine does not run the transformed scene, or breaks down in it.
-"""
 
 SCENES = ("spin-asymmetric", "drop-ball-backspin", "drop-box-anyhow", "drop-box-sticking", "roll-ball", "slide-box", "turn-box-rough")
 """A free rotation, a ball with backspin, boxes that strike a smooth and a rough floor, a rolling ball, a sliding and a turning box."""
 ENGINES = ("document", "mujoco", "pybullet")
 DT = 1e-3  # s
 RESOURCES = ResourceLimits(processor_time=60.0)
-ULPS = 1000.0
-"""Rounding errors of a single time step, in ulp of the scene's sizes and speeds, which some engines make in their transformations."""
-BY_CHANCE = 3.0
-"""Factor on the largest effect of a few perturbations, if it is so large that it is due to chance."""
 FASTER = (1.001, 1.002)
 """Factors on the initial velocities of the other simulations of a batch, which also start as many thousandths of the body's size away."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Whether an engine keeps one symmetry, or repeats its result, in one scene.
-
-    Attributes:
-        scene: Name of the scene.
-        engine: Label of the engine.
-        symmetry: The symmetry, or the way in which the run was repeated.
-        status: One of `STATUSES`.
-        difference: The largest difference of the two motions, of angles [rad] and relative to sizes and speeds; NaN if there is none.
-        step: The first time step at which rounding does not explain the difference; None if it does at all steps.
-        time: The time of this step [s]; NaN if there is none.
-        reason: Why there is no motion to compare; otherwise empty.
-        verdict: The verdict on the run that gave no motion, such as `declined` or `crashed`; otherwise empty.
-        motions: If the symmetry is lost, the engine's motion and the one that should equal it, states of shape (n, 13).
-    """
-
-    scene: str
-    engine: str
-    symmetry: str
-    status: Status
-    difference: float = float("nan")
-    step: int | None = None
-    time: float = float("nan")
-    reason: str = ""
-    verdict: Verdict | Literal[""] = ""
-    motions: tuple[Array, Array] | None = field(default=None, repr=False, compare=False)
 
 
 def symmetries(
@@ -131,20 +82,16 @@ def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, 
     except Failed as failure:
         own, found = Breakdown(failure.verdict, failure.reason), []
     if isinstance(own, Breakdown):
-        return [_not_run(replace(none, symmetry=name), own) for name in NAMES]
+        return [not_run(replace(none, symmetry=name), own) for name in NAMES]
     for name, again in IN_NEW_PROCESSES.items():
         repeated = replace(none, symmetry=name)
         try:
             processes.renew(entry)
             found.append(processes.call(entry, again, scene, dt, own, repeated))
         except Failed as failure:
-            found.append(_not_run(repeated, Breakdown(failure.verdict, failure.reason)))
+            found.append(not_run(repeated, Breakdown(failure.verdict, failure.reason)))
     processes.renew(entry)  # the last one may use one processor only
     return found
-
-
-def _not_run(none: Finding, broken: Breakdown) -> Finding:
-    return replace(none, reason=broken.reason, verdict=broken.verdict)
 
 
 def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array | Breakdown, list[Finding]]:
@@ -168,11 +115,11 @@ def _finding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: F
         pairs, effects = _pairs(entry, scene, dt, own, none.symmetry)
         return judged(none, scene, dt, pairs, effects, entry.adapter.precision)
     except _NotComparable as error:
-        return _not_run(none, error.breakdown)
+        return not_run(none, error.breakdown)
     except DropspinError as error:  # the transformed scene is no valid scene
-        return _not_run(none, Breakdown("declined", str(error)))
+        return not_run(none, Breakdown("declined", str(error)))
     except Exception as error:  # an engine is somebody else's code
-        return _not_run(none, classify(error))
+        return not_run(none, classify(error))
 
 
 class _NotComparable(Exception):
@@ -248,7 +195,7 @@ def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, own: Array, 
 def _on_one_core(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
     """The finding of a batch in a process all of whose threads may use one processor."""
     if not hasattr(os, "sched_setaffinity") or usable_cores() == 1:
-        return _not_run(none, Breakdown("declined", "the process cannot be restricted to fewer processors"))
+        return not_run(none, Breakdown("declined", "the process cannot be restricted to fewer processors"))
     for thread in os.listdir("/proc/self/task"):
         os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
     return replace(_finding(entry, scene, dt, own, replace(none, symmetry=BATCH)), symmetry=none.symmetry)
@@ -285,30 +232,6 @@ def states_of(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdo
     if isinstance(recording, Breakdown):
         return recording
     return divergence(recording.motion) or recording.motion.states
-
-
-def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Effects | None, precision: type) -> Finding:
-    """A finding with its status; where rounding has no effect, the motions of each pair must be equal bit for bit."""
-    of_pairs = [differences(scene, *pair) for pair in pairs]
-    difference: Array = np.max(of_pairs, axis=0)
-    largest, steps = float(difference.max()), np.arange(len(difference), dtype=float)
-    allowed, ulp = np.zeros_like(difference), float(np.finfo(precision).eps)
-    if effects is not None:
-        allowed = ulp * (ULPS + ULPS_PER_STEP * steps)
-    if effects is not None and not (difference <= allowed).all():  # most engines need no perturbed runs
-        grown = np.maximum.accumulate(np.max([np.zeros_like(difference), *effects()], axis=0))
-        # A large effect is one of chance, such as a contact that is missed in a time step: it does not add up, and others are as large.
-        small = np.minimum(grown * (FEW_DRAWS + steps / PERTURBATION), MATTERS * ulp / np.finfo(float).eps)
-        allowed = BY_CHANCE * grown + small + allowed
-    beyond = np.flatnonzero(~(difference <= allowed))
-    if not len(beyond):
-        return replace(none, status="kept" if largest <= MATTERS else "rounding", difference=largest)
-    first = int(beyond[0])
-    # What perturbations explain does not count, even if it is large.
-    unexplained = float(difference[beyond].max())
-    status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
-    motions = pairs[int(np.argmax([one.max() for one in of_pairs]))] if status == "lost" else None
-    return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)
 
 
 IN_NEW_PROCESSES = {NEW_PROCESS: _in_new_process, ONE_CORE: _on_one_core}

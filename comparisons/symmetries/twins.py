@@ -20,7 +20,8 @@ from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.recording import Breakdown
-from comparisons.symmetries.study import DT, RESOURCES, Effects, Finding, Status, effects_of_rounding, judged, states_of
+from comparisons.symmetries.findings import Effects, Finding, Status, judged
+from comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
 from scenarios import DropspinError, Scenario, Trajectory
 
 Array = NDArray[np.float64]

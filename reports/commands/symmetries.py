@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from comparisons.running.processes import ResourceLimits
-    from comparisons.symmetries.study import Finding
+    from comparisons.symmetries.findings import Finding
     from scenarios import Scenario
 
 

@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import Any
 
 from comparisons.measuring.symmetries import NAMES
-from comparisons.symmetries.study import STATUSES, Finding, Status
+from comparisons.symmetries.findings import STATUSES, Finding, Status
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
 MARKS: dict[Status, str] = {"kept": "✓", "rounding": "≈", "nearly kept": "~", "lost": "✗", "not run": "–"}

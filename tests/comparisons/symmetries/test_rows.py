@@ -10,8 +10,9 @@ from support import engines as made
 
 import dropspin as ds
 from comparisons.measuring.symmetries import AGAIN, BITWISE, NAMES
+from comparisons.symmetries.findings import Finding
 from comparisons.symmetries.rows import with_symmetries
-from comparisons.symmetries.study import Finding, symmetries
+from comparisons.symmetries.study import symmetries
 from reports.views.failures import failures
 
 SCENE, DTS = "spin-asymmetric", (8e-3, 4e-3)

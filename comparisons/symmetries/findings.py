@@ -1,0 +1,95 @@
+"""What the comparison of two motions that should be equal finds, and whether rounding explains their difference.
+
+Rounding breaks every symmetry a little, and a sensitive motion amplifies that. So the initial state of the transformed scene is perturbed
+by a few ulp, and the nominal scene is run from there: a difference is attributed to rounding as long as it is not larger than the largest
+effect of the perturbations so far, times a factor that allows for a rounding error in each time step. Repeated runs must be equal bit for
+bit.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.judging.verdicts import Verdict
+from comparisons.measuring.differences import differences
+from comparisons.measuring.tolerances import FEW_DRAWS, MATTERS, PERTURBATION, ULPS_PER_STEP
+from comparisons.running.recording import Breakdown
+from scenarios import Scenario
+
+Array = NDArray[np.float64]
+Effects = Callable[[], list[Array]]
+"""A function that runs an engine from perturbed starts and returns the differences from its motion, each of shape (n,)."""
+Pairs = Sequence[tuple[Array, Array]]
+"""Motions that should be equal, states of shape (n, 13)."""
+Status = Literal["kept", "rounding", "nearly kept", "lost", "not run"]
+STATUSES: tuple[Status, ...] = get_args(Status)
+"""From the best to the worst. Kept: rounding explains the difference, which is up to 1e-5 of the motion's sizes and speeds. Rounding:
+rounding explains it, but it is larger. Nearly kept: rounding does not explain it, but it is up to 1e-5. Lost: it is larger. Not run: the
+engine does not run the transformed scene, or breaks down in it.
+"""
+
+ULPS = 1000.0
+"""Rounding errors of a single time step, in ulp of the scene's sizes and speeds, which some engines make in their transformations."""
+BY_CHANCE = 3.0
+"""Factor on the largest effect of a few perturbations, if it is so large that it is due to chance."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Whether an engine keeps one symmetry, or repeats its result, in one scene.
+
+    Attributes:
+        scene: Name of the scene.
+        engine: Label of the engine.
+        symmetry: The symmetry, or the way in which the run was repeated.
+        status: One of `STATUSES`.
+        difference: The largest difference of the two motions, of angles [rad] and relative to sizes and speeds; NaN if there is none.
+        step: The first time step at which rounding does not explain the difference; None if it does at all steps.
+        time: The time of this step [s]; NaN if there is none.
+        reason: Why there is no motion to compare; otherwise empty.
+        verdict: The verdict on the run that gave no motion, such as `declined` or `crashed`; otherwise empty.
+        motions: If the symmetry is lost, the engine's motion and the one that should equal it, states of shape (n, 13).
+    """
+
+    scene: str
+    engine: str
+    symmetry: str
+    status: Status
+    difference: float = float("nan")
+    step: int | None = None
+    time: float = float("nan")
+    reason: str = ""
+    verdict: Verdict | Literal[""] = ""
+    motions: tuple[Array, Array] | None = field(default=None, repr=False, compare=False)
+
+
+def not_run(none: Finding, broken: Breakdown) -> Finding:
+    """The finding where a run gave no motion."""
+    return replace(none, reason=broken.reason, verdict=broken.verdict)
+
+
+def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Effects | None, precision: type) -> Finding:
+    """A finding with its status; where rounding has no effect, the motions of each pair must be equal bit for bit."""
+    of_pairs = [differences(scene, *pair) for pair in pairs]
+    difference: Array = np.max(of_pairs, axis=0)
+    largest, steps = float(difference.max()), np.arange(len(difference), dtype=float)
+    allowed, ulp = np.zeros_like(difference), float(np.finfo(precision).eps)
+    if effects is not None:
+        allowed = ulp * (ULPS + ULPS_PER_STEP * steps)
+    if effects is not None and not (difference <= allowed).all():  # most engines need no perturbed runs
+        grown = np.maximum.accumulate(np.max([np.zeros_like(difference), *effects()], axis=0))
+        # A large effect is one of chance, such as a contact that is missed in a time step: it does not add up, and others are as large.
+        small = np.minimum(grown * (FEW_DRAWS + steps / PERTURBATION), MATTERS * ulp / np.finfo(float).eps)
+        allowed = BY_CHANCE * grown + small + allowed
+    beyond = np.flatnonzero(~(difference <= allowed))
+    if not len(beyond):
+        return replace(none, status="kept" if largest <= MATTERS else "rounding", difference=largest)
+    first = int(beyond[0])
+    # What perturbations explain does not count, even if it is large.
+    unexplained = float(difference[beyond].max())
+    status: Status = "nearly kept" if unexplained <= MATTERS else "lost"
+    motions = pairs[int(np.argmax([one.max() for one in of_pairs]))] if status == "lost" else None
+    return replace(none, status=status, difference=unexplained, step=first, time=first * dt, motions=motions)

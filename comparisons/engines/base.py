@@ -3,6 +3,7 @@
 The file is longer than 300 lines because it is the whole protocol, most of it docstrings.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -77,7 +78,7 @@ class KnownLimitation(NamedTuple):
         return bool(self.explained_errors) and max(self.explained_errors.values()) < MINOR
 
 
-class Simulation:
+class Simulation(ABC):
     """One scene at one time step, built and ready to step; a context manager.
 
     Attributes:
@@ -91,13 +92,13 @@ class Simulation:
     settings: Mapping[str, Any] = {}
     known_limitations: Sequence[str | KnownLimitation] = ()
 
+    @abstractmethod
     def advance(self, steps: int) -> None:
         """Take some native steps and nothing else: this is what is timed."""
-        raise NotImplementedError
 
+    @abstractmethod
     def state(self) -> Array:
         """Position, orientation [x, y, z, w], velocity, angular velocity; all in the world frame, y up, shape (13,)."""
-        raise NotImplementedError
 
     def record(self, steps: int, every: int = 1) -> Array:
         """States now and after each `every` of `steps` steps, shape (1 + steps // every, 13)."""
@@ -112,7 +113,7 @@ class Simulation:
         """What the engine built, read back from the engine itself; None if it cannot say."""
         return None
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - optional
         """Release what the simulation holds."""
 
     def __enter__(self) -> Self:
@@ -122,7 +123,7 @@ class Simulation:
         self.close()
 
 
-class BatchSimulation:
+class BatchSimulation(ABC):
     """One scene from many starts at one time step, stepped together by the engine; a context manager.
 
     Attributes:
@@ -131,13 +132,13 @@ class BatchSimulation:
 
     velocity_lag: float = 0.0
 
+    @abstractmethod
     def advance(self, steps: int) -> None:
         """Take some native steps and nothing else: this is what is timed."""
-        raise NotImplementedError
 
+    @abstractmethod
     def states(self) -> Array:
         """The state of each, as `Simulation.state` gives it, shape (size, 13); NumPy must be able to read the array."""
-        raise NotImplementedError
 
     def record(self, steps: int, every: int = 1) -> Array:
         """States now and after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
@@ -147,7 +148,7 @@ class BatchSimulation:
             rows.append(np.array(self.states(), dtype=float))
         return np.stack(rows, axis=1)
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - optional
         """Release what the simulation holds."""
 
     def __enter__(self) -> Self:
@@ -221,7 +222,7 @@ def _spelled(value: float | str) -> str:
 
 
 @dataclass(frozen=True)
-class Engine:
+class Engine(ABC):
     """An engine with its options.
 
     Attributes:
@@ -256,6 +257,10 @@ class Engine:
     """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
 
     options: Mapping[str, str] = field(default_factory=dict)
+
+    @abstractmethod
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        """Build a scene at a time step [s], start included."""
 
     def __post_init__(self) -> None:
         chosen = {}
@@ -352,10 +357,6 @@ class Engine:
         speeds [m/s] after each step of a fall from that height.
         """
         return {}
-
-    def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        """Build a scene at a time step [s], start included."""
-        raise NotImplementedError
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         """Build one scene from many starts; None if the engine cannot step them together, and single simulations take their place."""

@@ -4,13 +4,13 @@ The adapter's module is imported, and the engine constructed, in the engine's ow
 stand-in has its name, its options and their values, and can be configured, but not run.
 """
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NoReturn
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from comparisons.engines.adapter_code import adapter_code
 from comparisons.engines.base import Engine, EngineBroken, NumericOption
-from scenarios import DropspinError
+from scenarios import DropspinError, Scenario
 from scenarios.text import Text
 from scenarios.validation import validated
 
@@ -50,6 +50,9 @@ class StandIn(Engine):
     """An engine of one's own, outside its process."""
 
     traits: ClassVar[Traits]
+
+    def prepare(self, scene: Scenario, dt: float) -> NoReturn:
+        raise NotImplementedError(f"{self.label} is simulated in its own process only")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (self.traits, dict(self.options))

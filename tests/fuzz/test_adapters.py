@@ -16,6 +16,11 @@ class Evil:
     """Every question about it raises."""
     __repr__ = __str__ = __eq__ = __hash__ = __bool__ = __len__ = __iter__ = __float__ = __int__ = __index__ = __getattr__ = no
     __array__ = __lt__ = __le__ = __add__ = __mul__ = __neg__ = __abs__ = __contains__ = __getitem__ = __reduce_ex__ = no
+class Unfinished(Drifting):
+    """A simulation without a state."""
+    __init__ = lambda self: None
+class Batch(BatchSimulation):
+    advance = states = no
 class Word(str):
     __repr__ = __str__ = __format__ = no
 class Real(float):
@@ -40,7 +45,7 @@ AsBuilt(1.0,np.eye(3),np.zeros(3)) AsBuilt(None,None,None) AsBuilt('a',np.eye(2)
 [KnownLimitation('x',{1:np.nan})] [KnownLimitation('x',{'energy_error':-1})] [KnownLimitation(Evil(),Evil())] (NumericOption(1,2,3),)
 {'tolerance':NumericOption(None,'a',{})} {'tolerance':NumericOption(0.1,0.0,float('inf'))} {'method':()} {'method':('one',)}
 {'method':'one'} {'method':(1,2)} {'tolerance':(0.1,0.2,0.3)} {'tolerance':(0.1,'x',None)} {'tolerance':(5.0,6.0,7.0)}
-{'a[b':('[','\n')} Drifting Simulation() BatchSimulation() sys.stdout threading.Lock() types.SimpleNamespace()
+{'a[b':('[','\n')} Drifting Unfinished() Batch() sys.stdout threading.Lock() types.SimpleNamespace()
 """
 VALUES = st.sampled_from(ANSWERS.split())
 ACTIONS = st.sampled_from(

@@ -6,7 +6,7 @@ import pytest
 from support.accuracy_options import Adaptive, InnerStep, Substeps
 
 from comparisons.conformance.checks import conform
-from comparisons.engines.base import Engine, NumericOption
+from comparisons.engines.base import NumericOption
 from comparisons.engines.document import Document
 from comparisons.running.run import run
 from scenarios import load
@@ -66,7 +66,7 @@ def test_options_are_refined_together_with_the_finest_time_steps():
     ({"rtol": (1e-4, 1e-8)}, DropspinError, "give at least 3 values, coarsest first"),
 ])  # fmt: skip
 def test_accuracy_is_checked(accuracy, error, text):
-    engine = type("Wrong", (Engine,), {"name": "wrong", "numbers": {"rtol": NumericOption(1e-6, 1e-12, 1e-2)}, "accuracy": accuracy})
+    engine = type("Wrong", (Adaptive,), {"numbers": {"rtol": NumericOption(1e-6, 1e-12, 1e-2)}, "accuracy": accuracy})
     with pytest.raises(error, match=text):
         engine()
 

@@ -2,9 +2,11 @@
 
 import json
 import os
+import re
 from pathlib import Path
 
 import pytest
+from support.adapters import DRIFTING
 from support.cli import TERMINAL, dropspin, spawn
 from support.engines import Exact
 
@@ -154,7 +156,8 @@ ENGINE = "from dropspin import Engine\nclass Mine(Engine):"
         (f"{ENGINE} pass", 2, "Mine.name is ''; give it a name for results"),
         ("import no_such_engine", 3, "needs the module no_such_engine, which is not installed"),
         ("1 / 0", 3, "my_module cannot be imported: ZeroDivisionError: division by zero"),
-        (f"{ENGINE}\n name='mine'\n def __init__(self): pass", 3, "my_module:Mine cannot be constructed: TypeError"),
+        (f"{ENGINE}\n name='mine'\n prepare = None\n def __init__(self): pass", 3, "cannot be constructed: TypeError: Mine.__init__()"),
+        (f"{ENGINE}\n name='mine'", 3, "cannot be constructed: TypeError: Can't instantiate abstract class Mine with"),
         (None, 2, "no module 'my_module' here"),
         ("import sys\nsys.exit(0)", 3, "cannot be imported: SystemExit: 0"),
         (f"{ENGINE}\n name='mujoco'", 2, "which is a built-in engine; results need another name"),
@@ -168,6 +171,18 @@ def test_what_is_not_an_engine_is_refused_in_one_line(text, code, message, tmp_p
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert len(done.stderr) < 400
+
+
+@pytest.mark.parametrize("member", ["prepare", "advance", "state"])
+def test_a_missing_required_member_is_named(member, tmp_path):
+    """That of an engine when it is loaded, that of a simulation in the line that constructs it."""
+    (tmp_path / "my_module.py").write_text(DRIFTING.replace(f"def {member}(", "def renamed("))
+    done = dropspin("conform", "my_module:Mine", "--check", "states", cwd=tmp_path)
+    assert done.returncode == 3
+    [line] = (done.stderr if member == "prepare" else done.stdout).splitlines()[:1]
+    kind, end = ("Mine", ".") if member == "prepare" else ("Drifting", "(my_module.py:16, in prepare)")
+    assert re.search(rf"TypeError: Can't instantiate abstract class {kind} with.* abstract method '?{member}\b", line)
+    assert line.endswith(end)
 
 
 def test_an_engine_of_another_package(tmp_path):

@@ -21,6 +21,7 @@ COMMANDS = {
     "history": "Follow each result over runs, commits and versions.",
     "limits": "Find where engines break down.",
     "list": "List the scenes, the engines or the metrics.",
+    "new-adapter": "Write a working adapter, to change into that of your engine.",
     "replay": "Show the motions of a run in 3D.",
     "report": "Write the report of a run again.",
     "reproduce": "Compare published results with what engines give here.",
@@ -31,7 +32,7 @@ COMMANDS = {
     "tradeoff": "Measure what accuracy costs.",
     "twins": "Find the time step from which engines of the same algorithm differ.",
 }
-"""The commands, each in `reports/commands/NAME.py`, with the line shown for each in the help."""
+"""The commands, each in `reports/commands/NAME.py` (`-` is `_` there), with the line shown for each in the help."""
 CITATION = """To cite: The dropspin authors, dropspin, version {version};
 for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
 """The text to cite; a test compares it with CITATION.cff."""
@@ -111,7 +112,8 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = getattr(import_module(f"reports.commands.{cmd_name}"), f"{cmd_name}_command")
+        module = cmd_name.replace("-", "_")
+        command: click.Command = getattr(import_module(f"reports.commands.{module}"), f"{module}_command")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -1,6 +1,6 @@
 """Command lines: every command with any of its options, and values that no user means."""
 
-from importlib import import_module
+import os
 
 import click
 from hypothesis import given
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from fuzz.campaign import cases
 from fuzz.cases import fill, run, run_alone, surroundings
 from fuzz.strategies import NUMBERS, TEXTS
-from reports.commands.main import COMMANDS
+from reports.commands.main import COMMANDS, dropspin
 
 SOUND = {
     "engine_name": ["mujoco", "document", "mujoco[integrator=rk4]"],
@@ -34,6 +34,7 @@ SOUND = {
     "metric": ["energy_error"],
     "axes": ["step", "spin"],
     "checks": ["protocol"],
+    "name": ["my_engine", "toy"],
     "names": ["housner-block", "drake-free-body", "nesc-brick"],
     "seed": ["1"],
     "count": ["1"],
@@ -56,7 +57,8 @@ WRITTEN = ("--output", "--baseline", "--junit", "--summary", "--gif")
 
 def command(name: str) -> click.Command:
     """The command of a name."""
-    found: click.Command = getattr(import_module(f"reports.commands.{name}"), f"{name}_command")
+    found = dropspin.get_command(click.Context(dropspin), name)
+    assert found is not None
     return found
 
 
@@ -93,6 +95,8 @@ def outputs(line: tuple[str, ...]) -> list[str]:
     """The paths that a command line may write."""
     named = [part.partition("=")[2] for part in line if part.startswith(WRITTEN)]
     written = ["out", *(one for one in named if one not in ("", ".", "..", "/"))]
+    if line[0] == "new-adapter":
+        written += [os.path.join(folder, f"{start}{name}.py") for folder in (*named, ".") for name in line[1:] for start in ("", "test_")]
     return written + {"accept": ["dropspin-baseline.toml"], "report": list(line[1:]), "replay": list(line[1:])}.get(line[0], [])
 
 

@@ -123,7 +123,7 @@ def test_help_lists_every_command(arguments, tmp_path):
     listed = (done.stdout + done.stderr).partition("Commands:\n")[2]
     names = [line.split()[0] for line in listed.splitlines() if line.startswith("  ") and not line.startswith("   ")]
     assert names == list(cli.COMMANDS)
-    assert sorted(names) == sorted(path.stem for path in Path(cli.__file__).parent.glob("*.py") if path.stem in cli.COMMANDS)
+    assert all(Path(cli.__file__).with_name(f"{name.replace('-', '_')}.py").is_file() for name in names)
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)

@@ -1,5 +1,6 @@
 """The documentation, followed step by step: its commands are run, their output is compared with the page, and links are checked."""
 
+import inspect
 import re
 import shlex
 import sys
@@ -13,6 +14,7 @@ from support.findings import PAGE, findings, heavy_engine, verify_findings
 
 import dropspin as ds
 from reports.commands.main import COMMANDS, dropspin
+from scenarios import body, model
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "reference_impl" / "README.md"]
@@ -170,6 +172,40 @@ def test_pages_quote_the_constants_of_the_code(page):
 def test_reference_documents_every_public_name():
     text = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
     assert sorted(re.findall(r"^\.\. \S+:: dropspin\.(\w+)$", text, re.MULTILINE)) == ds.__all__
+
+
+def rows_of(heading):
+    """By the heading of its first column, the names in each table of a section of the page on adapters, without arguments."""
+    section = (ROOT / "docs" / "bring-your-engine.md").read_text(encoding="utf-8").partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
+    tables = re.findall(r"^\| (.+?) \|.*\n\|---.*\n((?:\|.*\n)+)", section, re.MULTILINE)
+    return {title: [name for row in rows.splitlines() for name in re.findall(r"`([\w.]+)", row.split(" | ")[0])] for title, rows in tables}
+
+
+def public_members(kind):
+    """The fields, properties and methods that a class of dropspin has, without private ones."""
+    own = [base for base in kind.__mro__ if base.__module__.partition(".")[0] in ("scenarios", "comparisons")]
+    names = {name for base in own for name in [*vars(base), *inspect.get_annotations(base)]} - {"model_config"}
+    return {name for name in names if not name.startswith("_")}
+
+
+def test_page_on_adapters_documents_every_attribute_of_a_scene():
+    """And no other; each once."""
+    tables = {"start": [model.Start], "gravity": [model.Gravity], "floor": [model.Floor], "damping": [model.Damping]}
+    tables["body"] = [body.Sphere, body.Box, body.Vertices]
+    parts = {f"{table}.{name}" for table, kinds in tables.items() for kind in kinds for name in public_members(kind)}
+    [names] = rows_of("What a scene holds").values()
+    assert sorted(names) == sorted(public_members(ds.Scenario) - {"start", "body"} | parts)
+
+
+def test_page_on_adapters_documents_every_member_of_the_protocol():
+    """Those that are required are the abstract ones, and the name; an adapter does not define those that are left out."""
+    kinds = (ds.Engine, ds.Simulation, ds.BatchSimulation)
+    abstract = {f"{kind.__name__}.{name}" for kind in kinds for name in kind.__abstractmethods__}
+    defined_by_dropspin = {"options", "option", "label", "accuracy_levels", "refined", "represented_otherwise"}
+    members = {f"{kind.__name__}.{name}" for kind in kinds for name in public_members(kind) - defined_by_dropspin}
+    found = rows_of("The protocol")
+    assert sorted(found["required"]) == sorted(abstract | {"Engine.name"})
+    assert sorted(found["required"] + [name for name in found["optional"] if name != "dropspin.Diverged"]) == sorted(members)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -3,8 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import takewhile
+from itertools import product, takewhile
 
 from comparisons.engines.base import Engine
 from comparisons.robustness.axes import AXES, Axis
@@ -12,7 +11,8 @@ from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.runner import Runner
 from comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
 from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import SceneLike, as_scene, ignore, several, verify_time_step
+from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from comparisons.running.parallel import results_in_parallel, started_crews
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from scenarios import DropspinError, Scenario
 from scenarios.errors import UnknownName
@@ -88,6 +88,7 @@ def find_limits(
     within: float = WITHIN,
     on_progress: Callable[[str, float], None] | None = None,
     resources: ResourceLimits = RESOURCES,
+    jobs: int | None = None,
 ) -> RobustnessStudy:
     """Vary one quantity of a scene at a time, up to extreme values, and find the failure modes of engines.
 
@@ -97,8 +98,10 @@ def find_limits(
         axes: Names of axes, such as `step`, `spin` or `mass`; by default all that the scene has.
         dt: Time step, if it is not varied [s].
         within: The largest error that counts as accurate: a ratio, or an angle in radians.
-        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1, in any
+            thread, but in one at a time.
         resources: The processor time [s] and memory [bytes] that an engine may use for one tested value.
+        jobs: Number of axes to scan at a time; by default, the number of processors that this process may use. It changes no result.
 
     Returns:
         For each engine and axis, the ranges in which the engine is accurate and stable, and its failure modes outside them.
@@ -115,20 +118,24 @@ def find_limits(
     entries = list({one.label: one for one in named}.values())
     left_out = {one.label: one.reason for one in entries if one.engine is None}
     present = [one for one in entries if one.engine is not None]
-    scans, refinements = [], {}
     nominal, callback = OperatingPoint(scene, dt), on_progress or ignore
-    with EngineProcesses(resources) as processes:
-        for number, entry in enumerate(present):
-            runner, share = Runner(entry, within, processes), number / len(present)
-            known = refinements[entry.label] = refine(runner, nominal, partial(_report, callback, f"{entry.label}, dt", share))
-            for done, axis in enumerate(chosen):
-                report = partial(_report, callback, f"{entry.label}, {axis.name}", share + done / len(chosen) / len(present))
-                scans.append(scan_axis(runner, nominal, axis, on_progress=report, known=known if axis.name == "step" else ()))
+
+    def refined(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> tuple[ScanPoint, ...]:
+        return refine(Runner(entry, within, processes), nominal, lambda value: report(f"{entry.label}, dt {value:.3g}"))
+
+    def scanned(piece: tuple[EngineEntry, Axis], processes: EngineProcesses, report: Callable[[str], None]) -> AxisScan:
+        entry, axis = piece
+        known = refinements[entry.label] if axis.name == "step" else ()
+        runner = Runner(entry, within, processes)
+        return scan_axis(runner, nominal, axis, on_progress=lambda value: report(f"{entry.label}, {axis.name} {value:.3g}"), known=known)
+
+    pieces = list(product(present, chosen))
+    with started_crews(jobs, len(pieces), present, resources) as crews:
+        share = 1.0 / (1 + len(chosen))
+        found = results_in_parallel(present, refined, crews, lambda what, done: callback(what, share * done))
+        refinements = {entry.label: points for entry, points in zip(present, found, strict=True)}
+        scans = results_in_parallel(pieces, scanned, crews, lambda what, done: callback(what, share + (1.0 - share) * done))
     return RobustnessStudy(scene, dt, within, tuple(scans), left_out, refinements)
-
-
-def _report(on_progress: Callable[[str, float], None], what: str, share: float, value: float) -> None:
-    on_progress(f"{what} {value:.3g}", share)
 
 
 def _axes(scene: Scenario, names: Sequence[str]) -> list[Axis]:

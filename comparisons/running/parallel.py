@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack
-from threading import Event
+from contextlib import ExitStack, contextmanager
+from threading import Event, Lock
 from typing import TypeVar
 
-from comparisons.running.inputs import ignore
-from comparisons.running.processes import Closed, EngineProcesses
+from comparisons.running.inputs import EngineEntry, ignore
+from comparisons.running.processes import Closed, EngineProcesses, ResourceLimits
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError
 
@@ -42,7 +42,7 @@ def work_in_parallel(
         pieces: The pieces; the next one is requested when a processor is free.
         work: Called in a thread, with a piece, engine processes that no other piece uses at that time, and a function that raises once all
             work is to stop.
-        crews: Engine processes for each of the pieces that are done at a time; they are abandoned at the end.
+        crews: Engine processes for each of the pieces that are done at a time; they are abandoned if the work stops before its end.
         on_done: Called with each piece and its result, in the order in which they are done; may raise to stop.
         on_wait: Called at least twice a second; may raise to stop.
     """
@@ -52,28 +52,76 @@ def work_in_parallel(
         if stopping.is_set():
             raise Closed
 
+    idle = list(crews)
+    running: dict[Future[Result], tuple[Piece, EngineProcesses]] = {}
+    with ThreadPoolExecutor(len(crews)) as threads:
+        try:
+            while True:
+                while idle and (piece := next(pieces, None)) is not None:
+                    processes = idle.pop()
+                    running[threads.submit(work, piece, processes, raise_if_stopping)] = piece, processes
+                if not running:
+                    return
+                finished, _ = wait(running, timeout=POLL_INTERVAL, return_when=FIRST_COMPLETED)
+                on_wait()
+                for future in finished:
+                    piece, processes = running.pop(future)
+                    on_done(piece, future.result())
+                    idle.append(processes)
+        except BaseException:
+            # The engine processes end first, then the threads that wait for them; such an end is no failure of an engine.
+            stopping.set()
+            for processes in crews:
+                processes.abandon()
+            raise
+
+
+@contextmanager
+def started_crews(
+    jobs: int | None, pieces: int, entries: Sequence[EngineEntry], resources: ResourceLimits
+) -> Iterator[list[EngineProcesses]]:
+    """Engine processes for each of the pieces of work that are done at a time, all of them started.
+
+    Args:
+        jobs: Number of pieces to do at a time, as for `as_jobs`.
+        pieces: Number of pieces.
+        entries: The engines.
+        resources: What each engine may use.
+    """
     with ExitStack() as stack:
-        idle = list(crews)
-        threads = stack.enter_context(ThreadPoolExecutor(len(crews)))
-        # On leaving, the engine processes end first, then the threads that wait for them.
-        stack.callback(_abandon, crews, stopping)
-        running: dict[Future[Result], tuple[Piece, EngineProcesses]] = {}
-        while True:
-            while idle and (piece := next(pieces, None)) is not None:
-                processes = idle.pop()
-                running[threads.submit(work, piece, processes, raise_if_stopping)] = piece, processes
-            if not running:
-                return
-            finished, _ = wait(running, timeout=POLL_INTERVAL, return_when=FIRST_COMPLETED)
-            on_wait()
-            for future in finished:
-                piece, processes = running.pop(future)
-                on_done(piece, future.result())
-                idle.append(processes)
+        crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(min(as_jobs(jobs), max(pieces, 1)))]
+        for processes in crews:
+            processes.start([entry for entry in entries if not entry.absence])
+        yield crews
 
 
-def _abandon(crews: Sequence[EngineProcesses], stopping: Event) -> None:
-    """End all running work; a process that ends with the work does not count as a failure of its engine."""
-    stopping.set()
-    for processes in crews:
-        processes.abandon()
+def results_in_parallel(
+    pieces: Sequence[Piece],
+    work: Callable[[Piece, EngineProcesses, Callable[[str], None]], Result],
+    crews: Sequence[EngineProcesses],
+    on_progress: Callable[[str, float], None],
+) -> list[Result]:
+    """Do the pieces of a study, several at a time.
+
+    Args:
+        pieces: The pieces.
+        work: Called in a thread, with a piece, engine processes as in `work_in_parallel`, and a function to call with what is being done.
+        crews: Engine processes as in `work_in_parallel`.
+        on_progress: Called with what is being done and the share of the pieces that are done, in any thread, but in one at a time; may
+            raise to stop.
+
+    Returns:
+        The result of each piece.
+    """
+    found: dict[int, Result] = {}
+    lock = Lock()
+
+    def do(number: int, processes: EngineProcesses, _: Callable[[], None]) -> Result:
+        def report(what: str) -> None:
+            with lock:
+                on_progress(what, len(found) / len(pieces))
+
+        return work(pieces[number], processes, report)
+
+    work_in_parallel(iter(range(len(pieces))), do, crews, found.__setitem__)
+    return [found[number] for number in range(len(pieces))]

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from itertools import chain, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from comparisons.measuring.symmetries import AGAIN, AWAY, BATCH, HALVES, NAMES, 
 from comparisons.measuring.tolerances import perturbed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from comparisons.running.parallel import results_in_parallel, started_crews
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.running.recording import Breakdown, classify, divergence, record_batch, try_record
 from comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
@@ -40,6 +42,7 @@ def symmetries(
     dt: float = DT,
     on_progress: Callable[[str, float], None] | None = None,
     resources: ResourceLimits = RESOURCES,
+    jobs: int | None = None,
 ) -> list[Finding]:
     """Run scenes and scenes that have the same motion, and compare the motions.
 
@@ -47,8 +50,11 @@ def symmetries(
         scenes: One scene or several: scenes, catalogue names, paths of files, or mappings; by default seven of different kinds.
         engines: One engine or several: engines, or names with options; by default `document`, `mujoco` and `pybullet`.
         dt: Time step [s].
-        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1, in any
+            thread, but in one at a time.
         resources: The processor time [s] and memory [bytes] that an engine may use for one scene.
+        jobs: Number of pairs of a scene and an engine to run at a time; by default, the number of processors that this process may use. It
+            changes no result.
 
     Returns:
         One finding for each scene, engine and symmetry that the scene has.
@@ -62,13 +68,15 @@ def symmetries(
     entries = list({one.label: one for one in map(engine_entry, several("engines", engines) or ENGINES)}.values())
     for scene in chosen:
         verify_time_step(scene, dt)
-    found: list[Finding] = []
-    callback = on_progress or ignore
-    with EngineProcesses(resources) as processes:
-        for number, (scene, entry) in enumerate((scene, entry) for scene in chosen for entry in entries):
-            callback(f"{scene.name}, {entry.label}", number / (len(chosen) * len(entries)))
-            found += _of_engine(processes, entry, scene, dt)
-    return found
+
+    def of_pair(pair: tuple[Scenario, EngineEntry], processes: EngineProcesses, report: Callable[[str], None]) -> list[Finding]:
+        scene, entry = pair
+        report(f"{scene.name}, {entry.label}")
+        return _of_engine(processes, entry, scene, dt)
+
+    pairs = list(product(chosen, entries))
+    with started_crews(jobs, len(pairs), entries, resources) as crews:
+        return list(chain.from_iterable(results_in_parallel(pairs, of_pair, crews, on_progress or ignore)))
 
 
 def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float) -> list[Finding]:

@@ -1,7 +1,8 @@
 """The study of the command `dropspin tradeoff`: errors and costs of engines over a ladder of time steps.
 
-Only the engine's own time stepping is timed. In each round all engines are timed in turn, and ratios of costs are computed within a round,
-so that other load on the machine affects all engines of a round equally.
+Errors of several engines are measured at a time, then costs while nothing else runs. Only the engine's own time stepping is timed. In each
+round all engines are timed in turn, and ratios of costs are computed within a round, so that other load on the machine affects all engines
+of a round equally.
 """
 
 import math
@@ -14,6 +15,7 @@ from comparisons.engines.base import Engine
 from comparisons.measuring.metrics import leading_metric, metrics_for
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
+from comparisons.running.parallel import as_jobs, results_in_parallel
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
 from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps
@@ -60,6 +62,7 @@ def tradeoff(
     worlds: Sequence[int] = WORLDS,
     on_progress: OnProgress | None = None,
     resources: ResourceLimits = ResourceLimits(),  # noqa: B008 - it is immutable
+    jobs: int | None = None,
 ) -> TradeOff:
     """Measure error and cost of engines over a ladder of time steps.
 
@@ -70,8 +73,11 @@ def tradeoff(
         budget: Processor time for measuring the errors of each engine at all time steps [s]; once it is used up, no smaller time step is
             tried.
         worlds: The numbers of worlds in the batches to time, for engines that step many worlds together.
-        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1, in any
+            thread, but in one at a time.
         resources: The processor time [s] and memory [bytes] that each piece of work may use.
+        jobs: Number of engines whose errors are measured at a time; by default, the number of processors that this process may use. It
+            changes no error. Costs are measured afterwards, one at a time.
 
     Returns:
         The error of each engine at each time step and its cost, in seconds per simulated second, with the Pareto front.
@@ -97,11 +103,16 @@ def tradeoff(
     named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
     entries = {one.label: one for entry in named for one in _with_accuracy_levels(entry)}
     report = on_progress or ignore
+
+    def errors(entry: EngineEntry, processes: EngineProcesses, report_errors: Callable[[str], None]) -> Ladder:
+        report_errors(f"errors of {entry.label}")
+        return errors_over_steps(entry, scene, [chosen, of_the_motion], budget, processes)
+
     with EngineProcesses(resources) as processes:
-        ladders = []
-        for number, entry in enumerate(entries.values(), 1):
-            ladders.append(errors_over_steps(entry, scene, [chosen, of_the_motion], budget, processes))
-            report(f"errors of {entry.label}", 0.5 * number / len(entries))
+        processes.start([entry for entry in entries.values() if not entry.absence])
+        # Each engine has one process, in which it has compiled when its costs are measured.
+        crews = [processes] * min(as_jobs(jobs), len(entries))
+        ladders = results_in_parallel(list(entries.values()), errors, crews, lambda what, share: report(what, 0.5 * share))
         points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, sizes, processes, report)
     measured = {point.engine for point in points}
     ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]

@@ -6,7 +6,7 @@ import os
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import POSITIVE, as_json, time_limit_option
+from reports.commands.options import POSITIVE, as_json, jobs_option, time_limit_option
 from reports.terminal.safe import echo
 
 
@@ -30,6 +30,7 @@ from reports.terminal.safe import echo
     help="The largest error that counts as sound: a ratio, or an angle in radians.",
 )
 @time_limit_option(60.0, "an engine may use for one tested value")
+@jobs_option("axes to scan")
 @click.option("-o", "--output", default="out/limits", show_default=True, metavar="DIR", help="Folder for the tables and the figures.")
 @as_json
 def limits_command(
@@ -39,6 +40,7 @@ def limits_command(
     dt: float,
     within: float,
     time_limit: float,
+    jobs: int | None,
     output: str,
     json_output: bool,
 ) -> None:
@@ -71,7 +73,8 @@ def limits_command(
                     progress(what, share)
 
                 resources = ResourceLimits(processor_time=time_limit)
-                found.append(find_limits(scene, engines, axes, dt=dt, within=within, on_progress=on_progress, resources=resources))
+                study = find_limits(scene, engines, axes, dt=dt, within=within, on_progress=on_progress, resources=resources, jobs=jobs)
+                found.append(study)
         write_limits(found, folder)
     if json_output:
         echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))

@@ -85,5 +85,5 @@ def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
 
 def jobs_option(pieces: str) -> Callable[[Command], Command]:
     """The option `-j`: how many pieces of work to do at a time."""
-    text = f"Number of {pieces} to run at a time; it changes no result. [default: the number of processors]"
+    text = f"Number of {pieces} at a time; it changes no result. [default: the number of processors]"
     return click.option("-j", "--jobs", type=click.IntRange(min=1), metavar="N", help=text)

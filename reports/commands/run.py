@@ -42,7 +42,7 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
 @click.option("--seed", type=int, metavar="SEED", help="Seed of the random scenes. [default: a fresh seed, which is printed]")
 @click.option("--symmetries", "test_symmetries", is_flag=True, help="Also test the symmetries of each scene at the finest time step.")
 @time_limit_option(300.0, "an engine may use for one scene at one time step")
-@jobs_option("scenes")
+@jobs_option("scenes to run")
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that are already measured are not run again.")
 @click.option("-v", "--verbose", is_flag=True, help="Also print a table of every metric for each scene.")
@@ -147,7 +147,7 @@ def _run(
             results = replace(results, provenance={**results.provenance, "asked": asked, "named": named})
             if test_symmetries:
                 finest = min(steps)
-                results = with_symmetries(results, with_progress(scenes, chosen, finest, resources), finest)
+                results = with_symmetries(results, with_progress(scenes, chosen, finest, resources, jobs), finest)
             if show is not None:
                 show(results)
             with status("writing the report"):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, time_limit_option
+from reports.commands.options import as_json, jobs_option, time_limit_option
 from reports.terminal.safe import echo
 
 if TYPE_CHECKING:
@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 @click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
 @click.option("--dt", default=1e-3, show_default=True, type=float, metavar="SECONDS", help="The time step.")
 @time_limit_option(60.0, "an engine may use for one scene")
+@jobs_option("pairs of a scene and an engine to run")
 @click.option("-o", "--output", default="out/symmetries", show_default=True, metavar="DIR", help="Folder for the tables.")
 @as_json
 def symmetries_command(
-    scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float, output: str, json_output: bool
+    scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float, jobs: int | None, output: str, json_output: bool
 ) -> None:
     """Test whether engines give the same motion for the same scene seen from elsewhere, in other units, or run again.
 
@@ -44,7 +45,7 @@ def symmetries_command(
 
     with folder_made(output) as folder:
         loaded = [load(name) for name in scenes or SCENES]
-        found = with_progress(loaded, engines, dt, ResourceLimits(processor_time=time_limit))
+        found = with_progress(loaded, engines, dt, ResourceLimits(processor_time=time_limit), jobs)
         write_symmetries(found, {scene.name: scene for scene in loaded}, dt, folder)
     if json_output:
         echo(json.dumps(view.rows(found), indent=1))
@@ -56,7 +57,9 @@ def symmetries_command(
         echo(f"Replay of the worst case of each engine: {os.path.join(output, 'symmetries.html')}")
 
 
-def with_progress(scenes: "Iterable[Scenario]", engines: "Iterable[str]", dt: float, resources: "ResourceLimits") -> "list[Finding]":
+def with_progress(
+    scenes: "Iterable[Scenario]", engines: "Iterable[str]", dt: float, resources: "ResourceLimits", jobs: int | None
+) -> "list[Finding]":
     """The findings of the study, which shows its progress and stops at an interrupt."""
     from comparisons.symmetries.study import symmetries
     from reports.terminal.progress import share_bar
@@ -67,4 +70,4 @@ def with_progress(scenes: "Iterable[Scenario]", engines: "Iterable[str]", dt: fl
             stop_if_interrupted()
             progress(what, share)
 
-        return symmetries(scenes, engines, dt=dt, on_progress=on_progress, resources=resources)
+        return symmetries(scenes, engines, dt=dt, on_progress=on_progress, resources=resources, jobs=jobs)

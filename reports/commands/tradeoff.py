@@ -6,7 +6,7 @@ import os
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import POSITIVE, WholeNumbers, as_json, seconds_option
+from reports.commands.options import POSITIVE, WholeNumbers, as_json, jobs_option, seconds_option
 from reports.terminal.safe import echo
 
 
@@ -34,6 +34,7 @@ from reports.terminal.safe import echo
     metavar="N[,N]...",
     help="Numbers of worlds in the batches to time, for engines that step many worlds together, such as 1,256,4096.",
 )
+@jobs_option("engines whose errors are measured")
 @click.option("-o", "--output", default="out/tradeoff", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
 @as_json
 def tradeoff_command(
@@ -43,6 +44,7 @@ def tradeoff_command(
     within: tuple[float, ...],
     budget: float,
     worlds: tuple[int, ...],
+    jobs: int | None,
     output: str,
     json_output: bool,
 ) -> None:
@@ -67,7 +69,7 @@ def tradeoff_command(
                     stop_if_interrupted()
                     progress(what, share)
 
-                found.append(tradeoff(scene, engines, metric, budget=budget, worlds=worlds, on_progress=on_progress))
+                found.append(tradeoff(scene, engines, metric, budget=budget, worlds=worlds, on_progress=on_progress, jobs=jobs))
             if not json_output:
                 print_rows(view.pareto_front_rows(found[-1]), json_output=False, left_out_first=view.left_out_first(found[-1]))
                 print_sentences(view.sentences(found[-1], within))

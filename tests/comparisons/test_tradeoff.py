@@ -108,6 +108,31 @@ def spin():
     return tradeoff(SPIN.model_copy(update={"duration": 6.0}), engines)
 
 
+def test_errors_do_not_depend_on_the_number_of_jobs_and_costs_are_measured_alone(monkeypatch):
+    """No errors are being measured at the time."""
+    running, measure_errors, measure_cost = set(), study.errors_over_steps, study._cost
+
+    def errors_over_steps(entry, *given):
+        running.add(entry.label)
+        ladder = measure_errors(entry, *given)
+        running.remove(entry.label)
+        return ladder
+
+    def cost_of(entry, *given):
+        assert not running
+        return measure_cost(entry, *given)
+
+    monkeypatch.setattr(study, "errors_over_steps", errors_over_steps)
+    monkeypatch.setattr(study, "_cost", cost_of)
+    monkeypatch.setattr(errors, "MOST_STEPS", 200)
+    engines = ["mujoco[integrator=rk4]", "document[rotation=rk4]", "document[rotation=exact]"]
+    one, two = (tradeoff(SHORT, engines, worlds=[2], jobs=jobs) for jobs in (1, 2))
+    assert one.ladders == two.ladders
+    assert [(point.engine, point.dt, point.error) for point in one.points] == [
+        (point.engine, point.dt, point.error) for point in two.points
+    ]
+
+
 def test_recommended_step_has_the_stated_error(spin):
     """Also the errors at half the step are within the tolerance."""
     for within in (1e-2, 1e-4, 1e-8):

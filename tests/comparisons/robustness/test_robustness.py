@@ -279,6 +279,24 @@ def test_exact_engine_is_sound_everywhere(name):
     assert [(scan.axis.name, point.value, point.diagnosis) for scan in found.scans for point in scan.points if point.mode != "sound"] == []
 
 
+def test_limits_do_not_depend_on_the_number_of_jobs():
+    """Also where an engine ends its process."""
+
+    class Aborting(Planted):
+        name = "aborting"
+
+        def prepare(self, scene, dt):
+            if dt > 0.1:
+                os.abort()
+            return super().prepare(scene, dt)
+
+    studies = [
+        find_limits("spin-principal", ["document", Aborting()], ["spin", "step", "mass"], resources=QUICK, jobs=jobs) for jobs in (1, 2)
+    ]
+    assert repr(studies[0]) == repr(studies[1])
+    assert {point.mode for scan in studies[0].scans for point in scan.points} >= {"sound", "clamped", "crashed", "inaccurate"}
+
+
 def test_crash_of_the_process_is_a_failure_mode():
     class Leaving(Exact):
         name = "leaving"

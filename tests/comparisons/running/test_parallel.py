@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 import time
 
 import pandas as pd
@@ -10,6 +11,7 @@ from support import engines as made
 
 import dropspin as ds
 from comparisons.running import processes
+from comparisons.running.parallel import results_in_parallel
 
 SCENES = ["drop-ball", "spin-asymmetric", "fall-tilted"]
 DTS = [8e-3, 4e-3, 2e-3]
@@ -24,6 +26,22 @@ def test_results_do_not_depend_on_the_number_of_jobs():
     assert (several.measurements["time_per_step"] > 0.0).all()
     for key, motion in one.trajectories.items():
         assert (motion.states == several.trajectories[key].states).all()
+
+
+def test_results_of_pieces_are_in_their_order_and_pieces_run_at_the_same_time():
+    later, shares = threading.Event(), []
+
+    def work(piece, crew, report):
+        report(f"piece {piece}")
+        if piece == "first":
+            assert later.wait(20.0)
+        else:
+            later.set()
+        return piece.upper()
+
+    crews = [processes.EngineProcesses(ds.ResourceLimits()) for _ in range(2)]
+    assert results_in_parallel(["first", "second"], work, crews, lambda what, share: shares.append(share)) == ["FIRST", "SECOND"]
+    assert shares == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("jobs", [0, -1, 1.5, True, "2"])

@@ -54,6 +54,14 @@ def test_document_keeps_every_symmetry_of_every_scene_that_it_runs():
     assert {one.status for one in found if one.scene in ("spin-asymmetric", "drop-box-anyhow", "drop-box-sticking")} == {"kept"}
 
 
+def test_findings_do_not_depend_on_the_number_of_jobs():
+    one, two = (symmetries(["fall-tilted", "spin-principal"], [made.Exact(), "document"], dt=DT, jobs=jobs) for jobs in (1, 2))
+    assert repr(one) == repr(two)
+    assert [(found.scene, found.engine) for found in one if found.symmetry == AGAIN] == [
+        (scene, name) for scene in ("fall-tilted", "spin-principal") for name in ("exact", "document")
+    ]
+
+
 def pushed_along(axis, size):
     """An acceleration along an axis of the world that the scene does not have."""
 

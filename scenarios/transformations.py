@@ -16,6 +16,8 @@ from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 Array = NDArray[np.float64]
 
+AWAY = np.array([0.8, 0.0, 0.6])
+"""A horizontal direction that is no axis."""
 NEXT_AXES = np.array([0.5, 0.5, 0.5, 0.5])
 """The rotation that takes the x axis to the y axis, y to z, and z to x."""
 REFLECTED = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
@@ -127,6 +129,12 @@ def moving(scene: Scenario, offset: Array, velocity: Array) -> Scenario:
     state[POSITION] += offset
     state[VELOCITY] += velocity
     return scene.starting_at(state)
+
+
+def heavy_neighbour(scene: Scenario) -> Scenario:
+    """The scene with a body of 1,000 times the mass that starts alike, 100 times the body's size away, on the floor if there is one."""
+    height = scene.clearance if scene.starts_above_floor else 0.0
+    return moving(in_units(scene, mass=1e3), 1e2 * scene.body.size * AWAY - [0.0, height, 0.0], np.zeros(3))
 
 
 def is_sliding_free(scene: Scenario) -> bool:

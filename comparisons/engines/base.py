@@ -176,6 +176,8 @@ FEWEST_VALUES = 3
 """Values of an option that sets the accuracy: extrapolation needs as many."""
 PROFILES = ("calibrated", "default")
 """Settings that reproduce the scene as closely as the engine can; and the engine's defaults, with only the obvious settings made."""
+FLOOR_HALF_SIZE = 1e3
+"""Of a floor that is a box or a mesh [m]: thick enough that nothing tunnels, and engines in double precision lose no digits with it."""
 LATE_IMPACTS = "impacts detected late"
 SEMI_IMPLICIT_EULER = "semi-implicit Euler"
 EXPLICIT_GYROSCOPIC = "semi-implicit Euler with the gyroscopic term explicit"
@@ -202,6 +204,19 @@ def refusal_of_shape(scene: Scenario, hull: str = "", maps_vertices: bool = Fals
     if isinstance(scene.body, Sphere) and hull:
         return f"a {hull} would only approximate a ball"
     return None if maps_vertices or isinstance(scene.body, (Sphere, Box)) else "only spheres and boxes are mapped onto a floor"
+
+
+def refusal_of_floor(scene: Scenario, kind: str) -> str | None:
+    """Why a floor is too small for a scene; None for a plane, and if the body stays within `FLOOR_HALF_SIZE` of the origin.
+
+    Args:
+        scene: The scene.
+        kind: What represents the floor, such as `plane` or `box`.
+    """
+    travel = np.linalg.norm(scene.start.position) + np.linalg.norm(scene.start.velocity) * scene.duration + scene.body.size
+    if scene.floor is None or kind == "plane" or travel <= FLOOR_HALF_SIZE:
+        return None
+    return f"the floor is a {kind} of {2 * FLOOR_HALF_SIZE:g} m, and the body may leave it"
 
 
 def calibrated_label(label: str) -> str | None:
@@ -244,7 +259,8 @@ class Engine(ABC):
     Where an error does not vanish as dt → 0, `run` refines these options together with the time step.
     """
     representations: ClassVar[tuple[str, ...]] = ()
-    """Names of `choices` that represent the same scene in different ways, such as a box as a mesh: the motion does not depend on them.
+    """Names of `choices` on which the motion does not depend: they represent the same scene in different ways, such as a box as a mesh, or
+    add a body that is far away.
 
     `symmetries` compares the motions.
     """

@@ -1,14 +1,17 @@
 """The engine `dart`: DART's free joint over a half-space. DART solves contacts after gravity has acted, hence v+ = e (u + g dt)."""
 
+from typing import Any, ClassVar
+
 import dartpy as dart
 import numpy as np
 
 from comparisons.engines import base
-from comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLimitation, Simulation, version
-from scenarios.body import Array, Body, Box
+from comparisons.engines.base import FLOOR_HALF_SIZE, AsBuilt, Diverged, Engine, KnownLimitation, Simulation, version
+from scenarios.body import Array, Box
 from scenarios.model import Floor, Scenario
 from scenarios.rotations import cross, rotate
 from scenarios.state import ORIENTATION, SPIN
+from scenarios.transformations import heavy_neighbour
 
 REASONS = {
     "deactivation": "never falls asleep; else a block that tips over more slowly than 0.05 rad/s stops halfway",
@@ -22,9 +25,11 @@ REASONS = {
 
 
 class Dart(Engine):
-    """DART's rigid body over a plane."""
+    """DART's rigid body over a plane, or over a box."""
 
     name, order, reasons = "dart", 1.0, REASONS
+    choices: ClassVar = {"floor": ("plane", "box"), "beside": ("none", "heavy")}
+    representations: ClassVar = ("floor", "beside")
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Free flight agrees with MuJoCo's Euler to 1e-13 (to 1e-7 below 1e-3 rad a step, where DART truncates a series)."""
@@ -35,27 +40,39 @@ class Dart(Engine):
         moments, floor = np.linalg.eigvalsh(scene.body.inertia_tensor), scene.floor
         if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
             return "DART damps a free joint about the world's axes; angular damping needs a body of equal moments of inertia"
-        if (unfit := base.refusal_of_shape(scene)) is not None:
+        if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, self.option("floor"))) is not None:
             return unfit
         if floor is not None and floor.rest_speed > 0.0:
             return "DART has a fixed rebound speed below which restitution is 0, 0.1 m/s; floor.rest_speed cannot be set"
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DartSimulation(scene, dt)
+        return DartSimulation(scene, dt, self.option("floor"), self.option("beside"))
 
 
 class DartSimulation(Simulation):
     """A DART world with the body's skeleton and, if the scene has a floor, the floor's."""
 
-    def __init__(self, scene: Scenario, dt: float) -> None:
+    def __init__(self, scene: Scenario, dt: float, floor: str, beside: str) -> None:
         self.velocity_lag = 0.5 * dt
-        self._scene, self._world, skeleton, mounting = scene, dart.simulation.World(), dart.dynamics.Skeleton("body"), dart.math.Isometry3()
+        self._scene, self._world = scene, dart.simulation.World()
         self._world.setTimeStep(dt)
         self._world.setGravity(scene.acceleration)
-        joint, self._body = skeleton.createFreeJointAndBodyNodePair()
-        self._body.setInertia(dart.dynamics.Inertia(scene.body.mass, np.zeros(3), scene.body.inertia_tensor))
-        self.settings = {"version": version("dartpy")} | ({} if scene.floor is None else self._add_floor(scene.floor, scene.body))
+        self.settings = {"version": version("dartpy"), "floor": floor, "beside": beside}
+        if scene.floor is not None:
+            self.settings |= self._add_floor(scene.floor, floor)
+        self._body = self._add_body(scene)
+        if beside == "heavy":
+            self._add_body(heavy_neighbour(scene))
+
+    def _add_body(self, scene: Scenario) -> Any:
+        skeleton, mounting = dart.dynamics.Skeleton(f"body {self._world.getNumSkeletons()}"), dart.math.Isometry3()
+        joint, body = skeleton.createFreeJointAndBodyNodePair()
+        body.setInertia(dart.dynamics.Inertia(scene.body.mass, np.zeros(3), scene.body.inertia_tensor))
+        if scene.floor is not None:
+            size = 2.0 * scene.body.vertices.max(axis=0)
+            shape = dart.dynamics.BoxShape(size) if isinstance(scene.body, Box) else dart.dynamics.SphereShape(scene.body.size)
+            _add_shape(body, shape, self.settings["restitution"], self.settings["friction"])
         if scene.damping is not None:
             rates = scene.damping.angular * scene.body.inertia_tensor[0, 0], scene.damping.linear * scene.body.mass
             for axis, rate in enumerate(np.repeat(rates, 3)):
@@ -66,8 +83,9 @@ class DartSimulation(Simulation):
         joint.setAngularVelocity(scene.start.angular_velocity)
         joint.setLinearVelocity(scene.start.velocity)
         self._world.addSkeleton(skeleton)
+        return body
 
-    def _add_floor(self, floor: Floor, body: Body) -> dict[str, str | float]:
+    def _add_floor(self, floor: Floor, kind: str) -> dict[str, str | float]:
         solver, sleep = self._world.getConstraintSolver(), dart.simulation.DeactivationOptions()
         sleep.mEnabled = False
         self._world.setDeactivationOptions(sleep)
@@ -79,14 +97,12 @@ class DartSimulation(Simulation):
             solver.setBoxedLcpSolver(dart.constraint.NsgsFrictionSolver(options))
         friction = {"none": 0.0, "infinite": 1e6}[floor.friction] if isinstance(floor.friction, str) else floor.friction
         restitution = min(1.0, floor.restitution + (1.0 + floor.restitution) * 1e-5)
-        shape = dart.dynamics.BoxShape(2.0 * np.array(body.half_extents)) if isinstance(body, Box) else dart.dynamics.SphereShape(body.size)
-        ground, plane = dart.dynamics.Skeleton("floor"), dart.dynamics.PlaneShape([0.0, 1.0, 0.0], 0.0)
+        ground, half = dart.dynamics.Skeleton("floor"), np.full(3, FLOOR_HALF_SIZE)
+        shape = dart.dynamics.BoxShape(2.0 * half) if kind == "box" else dart.dynamics.PlaneShape([0.0, 1.0, 0.0], 0.0)
         # DART multiplies the two restitutions and uses the smaller friction.
-        for node, form, share in ((self._body, shape, restitution), (ground.createWeldJointAndBodyNodePair()[1], plane, 1.0)):
-            part = node.createShapeNode(form)
-            part.createCollisionAspect()
-            part.createDynamicsAspect().setRestitutionCoeff(share)
-            part.getDynamicsAspect().setFrictionCoeff(friction)
+        part = _add_shape(ground.createWeldJointAndBodyNodePair()[1], shape, 1.0, friction)
+        if kind == "box":
+            part.setRelativeTranslation([0.0, -FLOOR_HALF_SIZE, 0.0])
         self._world.addSkeleton(ground)
         solved = {"collision_detector": "ode", "lcp_solver": solver.getBoxedLcpSolver().getType(), "split_impulse": True}
         return solved | {"deactivation": False, "restitution": restitution, "friction": friction}
@@ -116,3 +132,11 @@ class DartSimulation(Simulation):
 
     def as_built(self) -> AsBuilt:
         return AsBuilt(self._body.getMass(), self._body.getInertia().getMoment(), self._world.getGravity())
+
+
+def _add_shape(node: Any, shape: Any, restitution: float, friction: float) -> Any:
+    part = node.createShapeNode(shape)
+    part.createCollisionAspect()
+    part.createDynamicsAspect().setRestitutionCoeff(restitution)
+    part.getDynamicsAspect().setFrictionCoeff(friction)
+    return part

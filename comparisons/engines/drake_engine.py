@@ -1,20 +1,31 @@
 """The engine `drake`: Drake's discrete plant, a body's corners over a half-space. Its contacts only dissipate: restitution is 0."""
 
 import logging
-from typing import Any
+from itertools import product
+from typing import Any, ClassVar
 
 import numpy as np
-from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties, Sphere
+from pydrake.geometry import AddContactMaterial, Box, Convex, HalfSpace, ProximityProperties, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction, DiscreteContactApproximation, MultibodyPlant
 from pydrake.multibody.tree import QuaternionFloatingJoint, RotationalInertia, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from comparisons.engines.base import SEMI_IMPLICIT_EULER, AsBuilt, Diverged, Engine, Simulation, version
+from comparisons.engines.base import (
+    FLOOR_HALF_SIZE,
+    SEMI_IMPLICIT_EULER,
+    AsBuilt,
+    Diverged,
+    Engine,
+    Simulation,
+    refusal_of_floor,
+    version,
+)
 from scenarios.body import Array
 from scenarios.model import Floor, Scenario
 from scenarios.state import ORIENTATION
+from scenarios.transformations import heavy_neighbour
 
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 
@@ -37,6 +48,8 @@ class Drake(Engine):
     name = "drake"
     order = 1.0
     reasons = REASONS
+    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": ("none", "heavy")}
+    representations: ClassVar = ("floor", "beside")
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Semi-implicit Euler without spin; else ω is as in MuJoCo's Euler, but a step turns by 2 atan(|ω| dt/2), as in Wang's method."""
@@ -49,35 +62,47 @@ class Drake(Engine):
             return "Drake damps a free joint's rotation with one coefficient; angular damping needs a body of equal moments of inertia"
         if scene.floor is not None and scene.floor.restitution > 0.0:
             return "Drake's contacts only dissipate; it has no coefficient of restitution"
-        return None
+        return refusal_of_floor(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DrakeSimulation(scene, dt)
+        return DrakeSimulation(scene, dt, self.option("floor"), self.option("beside"))
 
 
 class DrakeSimulation(Simulation):
     """A plant in a simulator, with a scene graph if the scene has a floor."""
 
-    def __init__(self, scene: Scenario, dt: float) -> None:
+    def __init__(self, scene: Scenario, dt: float, floor: str, beside: str) -> None:
         self.velocity_lag = 0.5 * dt
         builder: Any = DiagramBuilder()
-        inertia, self._dt, self._steps = scene.body.inertia_tensor, dt, 0
+        self._dt, self._steps = dt, 0
         self._plant = builder.AddSystem(MultibodyPlant(dt)) if scene.floor is None else AddMultibodyPlantSceneGraph(builder, dt)[0]
-        about_centre = RotationalInertia(*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
-        self._body = self._plant.AddRigidBody("body", SpatialInertia.MakeFromCentralInertia(scene.body.mass, np.zeros(3), about_centre))
+        scenes = [scene] if beside == "none" else [scene, heavy_neighbour(scene)]
+        bodies = [self._add_body(one, self._plant.AddModelInstance(f"body {number}")) for number, one in enumerate(scenes)]
+        self._body = bodies[0]
         self._plant.mutable_gravity_field().set_gravity_vector(scene.acceleration)
-        self.settings = {"version": version("drake")} | ({} if scene.floor is None else self._add_floor(scene, scene.floor))
-        if scene.damping is not None:
-            frames = self._plant.world_frame(), self._body.body_frame()
-            rates = scene.damping.angular * inertia[0, 0], scene.damping.linear * scene.body.mass
-            self._plant.AddJoint(QuaternionFloatingJoint("free", *frames, *rates))
+        self.settings = {"version": version("drake"), "floor": floor, "beside": beside}
+        if scene.floor is not None:
+            self.settings |= self._add_floor(scene, scene.floor, floor, bodies)
         self._plant.Finalize()
         self._simulator = Simulator(builder.Build())
         self._context = self._plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
-        self._plant.SetPositionsAndVelocities(self._context, scene.initial_state[[6, 3, 4, 5, 0, 1, 2, 10, 11, 12, 7, 8, 9]])
+        for one, body in zip(scenes, bodies, strict=True):
+            start = one.initial_state[[6, 3, 4, 5, 0, 1, 2, 10, 11, 12, 7, 8, 9]]
+            self._plant.SetPositionsAndVelocities(self._context, body.model_instance(), start)
         self._simulator.Initialize()
 
-    def _add_floor(self, scene: Scenario, floor: Floor) -> dict[str, Any]:
+    def _add_body(self, scene: Scenario, instance: Any) -> Any:
+        inertia = scene.body.inertia_tensor
+        about_centre = RotationalInertia(*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
+        spatial = SpatialInertia.MakeFromCentralInertia(scene.body.mass, np.zeros(3), about_centre)
+        body = self._plant.AddRigidBody("body", instance, spatial)
+        if scene.damping is not None:
+            frames = self._plant.world_frame(), body.body_frame()
+            rates = scene.damping.angular * inertia[0, 0], scene.damping.linear * scene.body.mass
+            self._plant.AddJoint(QuaternionFloatingJoint("free", *frames, *rates))
+        return body
+
+    def _add_floor(self, scene: Scenario, floor: Floor, kind: str, bodies: list[Any]) -> dict[str, Any]:
         plant, body, approximation = self._plant, scene.body, "sap" if isinstance(floor.friction, str) else "tamsi"
         friction = {"none": 0.0, "infinite": STICKING}[floor.friction] if isinstance(floor.friction, str) else floor.friction
         chosen = {"sap_near_rigid_threshold": 0.01, "relaxation_time": 1.0, "dissipation": 1e7, "friction": friction}
@@ -87,11 +112,10 @@ class DrakeSimulation(Simulation):
         for surface, spring in zip(surfaces, stiffness, strict=True):
             AddContactMaterial(surface, chosen["dissipation"], spring, CoulombFriction(friction, friction))
             surface.AddProperty("material", "relaxation_time", chosen["relaxation_time"])
-        upward = RigidTransform(RotationMatrix.MakeXRotation(-np.pi / 2))
-        plant.RegisterCollisionGeometry(plant.world_body(), upward, HalfSpace(), "floor", surfaces[0])
+        plant.RegisterCollisionGeometry(plant.world_body(), *_floor(kind), "floor", surfaces[0])
         # One shape would have one contact with the floor; balls of radius 0 give each corner its own.
-        for number, corner in enumerate(body.vertices):
-            plant.RegisterCollisionGeometry(self._body, RigidTransform(corner), Sphere(body.rounding), f"corner {number}", surfaces[1])
+        for (number, corner), one in product(enumerate(body.vertices), bodies):
+            plant.RegisterCollisionGeometry(one, RigidTransform(corner), Sphere(body.rounding), f"corner {number}", surfaces[1])
         return {"discrete_contact_approximation": approximation, "stiffness": stiffness} | chosen
 
     def advance(self, steps: int) -> None:
@@ -100,14 +124,25 @@ class DrakeSimulation(Simulation):
             self._simulator.AdvanceTo(self._steps * self._dt)
         except RuntimeError as error:
             raise Diverged(str(error).splitlines()[0]) from error
-        if not np.abs(self._plant.GetPositions(self._context)[:4]).max() < LONGEST:
+        if not np.abs(self._plant.GetPositions(self._context, self._body.model_instance())[:4]).max() < LONGEST:
             raise Diverged(f"the quaternion is longer than {LONGEST:g}; a step makes it sqrt(1 + (|ω| dt/2)²) times as long")
 
     def state(self) -> Array:
-        state = self._plant.GetPositionsAndVelocities(self._context)[[4, 5, 6, 1, 2, 3, 0, 10, 11, 12, 7, 8, 9]]
+        state = self._plant.GetPositionsAndVelocities(self._context, self._body.model_instance())[
+            [4, 5, 6, 1, 2, 3, 0, 10, 11, 12, 7, 8, 9]
+        ]
         state[ORIENTATION] /= np.linalg.norm(state[ORIENTATION])  # Drake normalises where it uses the quaternion, not in its state
         return state
 
     def as_built(self) -> AsBuilt:
         built, gravity = self._body.CalcSpatialInertiaInBodyFrame(self._context), self._plant.gravity_field().gravity_vector()
         return AsBuilt(built.get_mass(), built.CalcRotationalInertia().CopyToFullMatrix3(), gravity)
+
+
+def _floor(kind: str) -> tuple[RigidTransform, Shape]:
+    """The pose and the shape of the floor."""
+    if kind == "plane":
+        return RigidTransform(RotationMatrix.MakeXRotation(-np.pi / 2)), HalfSpace()
+    half = np.full(3, FLOOR_HALF_SIZE)
+    corners = half[:, np.newaxis] * np.array(list(product((-1.0, 1.0), repeat=3))).T
+    return RigidTransform([0.0, -FLOOR_HALF_SIZE, 0.0]), Box(2.0 * half) if kind == "box" else Convex(corners, "floor")

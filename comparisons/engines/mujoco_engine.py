@@ -16,6 +16,7 @@ from comparisons.engines.base import (
     NumericOption,
     Simulation,
     may_tumble,
+    refusal_of_floor,
     refusal_of_shape,
 )
 from comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
@@ -58,9 +59,10 @@ class MuJoCo(Engine):
         "integrator": tuple(INTEGRATORS),
         "profile": PROFILES,
         "body": ("geom", "mesh", "child"),
-        "floor": ("plane", "box"),
+        "floor": ("plane", "box", "mesh"),
+        "beside": ("none", "heavy"),
     }
-    representations: ClassVar = ("body", "floor")
+    representations: ClassVar = ("body", "floor", "beside")
     numbers: ClassVar = {"kappa": NumericOption(0.0, 0.0, 1.0), "spring_steps": NumericOption(0.0, 0.0, 1e4)}
 
     def __post_init__(self) -> None:
@@ -139,6 +141,7 @@ class MuJoCo(Engine):
     def _refusal_of_shape(self, scene: Scenario) -> str | None:
         """Why the shape of a scene's body cannot strike a floor."""
         unfit = refusal_of_shape(scene, "mesh" if self.option("body") == "mesh" else "", maps_vertices=True)
+        unfit = unfit or refusal_of_floor(scene, self.option("floor"))
         if unfit is None and scene.floor is not None and isinstance(scene.body, Vertices) and scene.body.resting_height == 0.0:
             return "a body of vertices is mapped onto a floor as a mesh, and MuJoCo has no flat meshes"
         return unfit
@@ -168,8 +171,8 @@ class MuJoCo(Engine):
         return MuJoCoBatch(self._prepare(members[0], dt), members) if VERSION >= BATCHES else None
 
     def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
-        form = Form(self.option("integrator"), self.option("body"), self.option("floor"))
-        settings = {name: self.option(name) for name in ("profile", "integrator", "body", "floor")}
+        form = Form(self.option("integrator"), **{name: self.option(name) for name in self.representations})
+        settings = {name: self.option(name) for name in ("profile", "integrator", *self.representations)}
         if self.option("profile") == "default":
             return MuJoCoSimulation(scene, default_specification(scene, dt, form), settings)
         pair = self._pair(scene, dt)

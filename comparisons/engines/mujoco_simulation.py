@@ -15,8 +15,8 @@ from reference_impl.threads import usable_cores
 from scenarios import Scenario
 from scenarios.rotations import conjugate, rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from scenarios.transformations import heavy_neighbour
 
-ROW = slice(1, 14)  # position, quaternion and velocities in a full state, which begins with the time
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 WXYZ = [6, 3, 4, 5]  # the quaternion's components in a state, in MuJoCo's order
@@ -44,7 +44,7 @@ class MuJoCoSimulation(Simulation):
         _raise_if_bad([self._data], f"within the first {self._steps} steps")
 
     def state(self) -> Array:
-        rows = np.concatenate([self._data.qpos, self._data.qvel])[None]
+        rows = np.concatenate([self._data.qpos[:7], self._data.qvel[:6]])[None]
         return to_world(rows)[0]
 
     def record(self, steps: int, every: int = 1) -> Array:
@@ -65,7 +65,7 @@ class MuJoCoSimulation(Simulation):
         now = _full_state(self._model, self._data)
         warm = self._data.qacc_warmstart.copy()
         states, _ = rollout.rollout(self._model, self._data, now, nstep=steps, initial_warmstart=warm)
-        return np.vstack([now, states[0]])[:, ROW]
+        return np.vstack([now, states[0]])[:, _columns(self._model)]
 
     @property
     def built(self) -> tuple[Any, Any]:
@@ -76,7 +76,7 @@ class MuJoCoSimulation(Simulation):
         rows = np.empty((1 + steps // every, 13))
         positions, velocities = rows[:, :7], rows[:, 7:]
         data, model, step = self._data, self._model, mujoco.mj_step
-        qpos, qvel = data.qpos, data.qvel
+        qpos, qvel = data.qpos[:7], data.qvel[:6]
         positions[0], velocities[0] = qpos, qvel
         for row in range(1, len(rows)):
             step(model, data, every)
@@ -84,7 +84,7 @@ class MuJoCoSimulation(Simulation):
         return rows
 
     def as_built(self) -> AsBuilt:
-        body = self._model.nbody - 1  # the free body, or its only child
+        body = int(np.argmax(self._model.body_mass > 0.0))  # the free body, or its child
         axes = rotate(self._model.body_iquat[body][[1, 2, 3, 0]], np.eye(3))
         inertia = axes.T @ np.diag(self._model.body_inertia[body]) @ axes
         return AsBuilt(float(self._model.body_mass[body]), inertia, self._model.opt.gravity.copy())
@@ -100,23 +100,25 @@ class MuJoCoBatch(BatchSimulation):
     def __init__(self, simulation: MuJoCoSimulation, members: Sequence[Scenario]) -> None:
         self.velocity_lag = simulation.velocity_lag
         self._model, data = simulation.built
+        self._columns = _columns(self._model)
         self._datas = [data, *(mujoco.MjData(self._model) for _ in range(usable_cores() - 1))]
         self._now = np.empty((len(members), mujoco.mj_stateSize(self._model, FULL_STATE)))
         self._now[:] = _full_state(self._model, data)
-        self._now[:, ROW] = from_world(np.array([member.initial_state for member in members]))
+        starts = np.array([np.concatenate(_starts(self._model, member)) for member in members])
+        self._now[:, 1 : 1 + starts.shape[1]] = starts
 
     def advance(self, steps: int) -> None:
         self._roll_out(steps, lambda worlds, states: None)
 
     def states(self) -> Array:
-        return to_world(self._now[:, ROW])
+        return to_world(self._now[:, self._columns])
 
     def record(self, steps: int, every: int = 1) -> Array:
         rows = np.empty((len(self._now), 1 + steps // every, 13))
         rows[:, 0] = self.states()
 
         def keep(worlds: slice, states: Array) -> None:
-            rows[worlds, 1:] = to_world(states[:, every - 1 :: every, ROW])
+            rows[worlds, 1:] = to_world(states[:, every - 1 :: every, self._columns])
 
         self._roll_out(steps, keep)
         return rows
@@ -141,9 +143,20 @@ class MuJoCoBatch(BatchSimulation):
 
 
 def _place(data: Any, scene: Scenario) -> None:
-    """Write a scene's start into the positions and velocities of the free body."""
-    start = from_world(scene.initial_state)
-    data.qpos[:], data.qvel[:] = start[:7], start[7:]
+    """Write a scene's start into the positions and velocities of a simulation."""
+    data.qpos[:], data.qvel[:] = _starts(data.model, scene)
+
+
+def _starts(model: Any, scene: Scenario) -> tuple[Array, Array]:
+    """The positions and velocities of the free body at the start, followed by those of the body far away if there is any."""
+    bodies = [scene, heavy_neighbour(scene)] if model.nq > 7 else [scene]
+    starts = from_world(np.array([one.initial_state for one in bodies]))
+    return starts[:, :7].ravel(), starts[:, 7:].ravel()
+
+
+def _columns(model: Any) -> Any:
+    """Where a full state, which begins with the time, has the position, the quaternion and the velocities of the scene's body."""
+    return np.r_[1:8, 1 + model.nq : 7 + model.nq]
 
 
 def _full_state(model: Any, data: Any) -> Array:
@@ -166,11 +179,11 @@ def _last_good_row(rows: Array) -> int:
 
 
 def set_damping(model: Any, scene: Scenario) -> None:
-    """Give a compiled model the scene's damping."""
+    """Give each body of a compiled model the scene's damping."""
     if scene.damping is not None:
         rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)
         rates[3:] *= np.diag(scene.body.inertia_tensor)
-        model.dof_damping[:] = rates
+        model.dof_damping[:] = np.outer(model.body_mass[model.body_mass > 0.0] / scene.body.mass, rates).ravel()
 
 
 def from_world(states: Array) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 
 from comparisons.engines.base import (
     EXPLICIT_GYROSCOPIC,
+    FLOOR_HALF_SIZE,
     IMPLICIT_GYROSCOPIC,
     LATE_IMPACTS,
     PROFILES,
@@ -14,12 +15,12 @@ from comparisons.engines.base import (
     Engine,
     Simulation,
     may_tumble,
+    refusal_of_floor,
     refusal_of_shape,
 )
 from comparisons.engines.programs import can_be_pasted, rendered
 from comparisons.engines.pybullet_settings import (
     FASTEST,
-    FLOOR_HALF_SIZE,
     REASONS,
     STRONGEST_FRICTION,
     contact_properties,
@@ -47,9 +48,10 @@ class PyBullet(Engine):
         "profile": PROFILES,
         "velocity_clamp": ("lifted", "kept"),
         "body": ("shape", "hull"),
-        "floor": ("fitting", "plane", "box"),
+        "floor": ("fitting", "plane", "box", "mesh"),
+        "beside": ("none", "heavy"),
     }
-    representations: ClassVar = ("body", "floor")
+    representations: ClassVar = ("body", "floor", "beside")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -105,9 +107,8 @@ class PyBullet(Engine):
             return unfit
         if isinstance(scene.body, Vertices) and not is_hull and len(scene.body.hull) > MOST_BALLS:
             return f"PyBullet's compound shapes have at most {MOST_BALLS} parts; the convex hull has {len(scene.body.hull)} vertices"
-        travel = np.linalg.norm(scene.start.position) + np.linalg.norm(scene.start.velocity) * scene.duration
-        if isinstance(scene.body, Box) and travel + scene.body.size > FLOOR_HALF_SIZE:
-            return f"the floor is a box of {2 * FLOOR_HALF_SIZE:g} m, and the body may leave it"
+        if (too_small := refusal_of_floor(scene, self._form.floor_in(scene))) is not None:
+            return too_small
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
             return f"Bullet caps friction at {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
         return None
@@ -127,6 +128,10 @@ class PyBullet(Engine):
             "urdf": rendered("pybullet.urdf.jinja", scene, moments=moments, sizes=sizes, **values),
         }
 
+    @property
+    def _form(self) -> Form:
+        represented = {name: self.option(name) for name in self.representations}
+        return Form(self.is_default, self.is_multibody, self.is_unclamped, **represented)
+
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        form = Form(self.is_default, self.is_multibody, self.is_unclamped, self.option("body"), self.option("floor"))
-        return PyBulletSimulation(scene, dt, form)
+        return PyBulletSimulation(scene, dt, self._form)

@@ -11,7 +11,6 @@ from scenarios import Scenario
 STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact to this
 FASTEST = 1e12  # m/s and rad/s; Bullet clamps the speeds of a multibody to 100 by default
 RESIDUAL = float(np.finfo(float).eps)  # of the speed that gravity gives in a step; Bullet's residuals are squares of speeds
-FLOOR_HALF_SIZE = 1e3  # m; thick enough that nothing tunnels, and Bullet loses no digits with it
 
 REASONS = {
     "coordinates": "maximal: a rebound of e times the approach speed; a multibody's is e (u + g dt), and its speeds are clamped at 100",

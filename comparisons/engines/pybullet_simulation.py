@@ -7,14 +7,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt, KnownLimitation, Simulation, version
+from comparisons.engines.base import FLOOR_HALF_SIZE, Array, AsBuilt, KnownLimitation, Simulation, version
 from comparisons.engines.pybullet_settings import (
     FASTEST,
-    FLOOR_HALF_SIZE,
     STRONGEST_FRICTION,
     contact_properties,
     damping_properties,
@@ -23,11 +23,17 @@ from comparisons.engines.pybullet_settings import (
 from scenarios import Scenario
 from scenarios.body import Box, Sphere, Vertices
 from scenarios.state import SPIN, VELOCITY
+from scenarios.transformations import heavy_neighbour
 
 ALMOST = 0.999
 NO_PUSH = 1e-6  # relative to what gravity adds in a step
 BALL = 1e-9  # of the body's size; the radius of the balls that are its vertices, which must not be 0
 MOST_BALLS = 16  # PyBullet drops all others without notice
+SQUARE = {
+    "vertices": [[x, 0.0, z] for x, z in product((-FLOOR_HALF_SIZE, FLOOR_HALF_SIZE), repeat=2)],
+    "indices": [0, 1, 2, 2, 1, 3],
+}
+"""The floor as a mesh: two triangles, with upward normals."""
 LARGEST_TURN = np.pi / 4  # rad a step; beyond it Bullet's rotation is too small
 
 
@@ -40,7 +46,8 @@ class Form:
         multibody: Whether the body is a btMultiBody rather than a btRigidBody.
         unclamped: Whether the clamp of a multibody's speeds is removed.
         body: `shape`, or `hull`, a body with corners as their convex hull.
-        floor: `plane`, `box`, or `fitting`: with calibrated settings a box for boxes, else a plane.
+        floor: `plane`, `box`, `mesh` (two triangles), or `fitting`: with calibrated settings a box for boxes, else a plane.
+        beside: `none`, or `heavy`, a second body far away.
     """
 
     default: bool
@@ -48,6 +55,13 @@ class Form:
     unclamped: bool
     body: str = "shape"
     floor: str = "fitting"
+    beside: str = "none"
+
+    def floor_in(self, scene: Scenario) -> str:
+        """The floor of a scene: `plane`, `box` or `mesh`."""
+        if self.floor == "fitting":
+            return "plane" if self.default or not isinstance(scene.body, Box) else "box"
+        return self.floor
 
 
 class PyBulletSimulation(Simulation):
@@ -75,7 +89,24 @@ class PyBulletSimulation(Simulation):
         contact = {} if scene.floor is None else contact_properties(scene, default)
         if scene.floor is not None:
             self._add_floor(scene, contact, form)
-        self._body = bullet.createMultiBody(
+        self._body, dynamics = self._add_body(scene, contact, form)
+        if form.beside == "heavy":
+            self._add_body(heavy_neighbour(scene), contact, form)
+        self.settings = {
+            "version": version("pybullet"),
+            "profile": "default" if default else "calibrated",
+            "coordinates": "multibody" if form.multibody else "maximal",
+            "body": form.body,
+            "floor": form.floor,
+            "beside": form.beside,
+            **parameters,
+            **dynamics,
+        }
+
+    def _add_body(self, scene: Scenario, contact: dict[str, float], form: Form) -> tuple[int, dict[str, float]]:
+        """Add a scene's body, and return its number and its dynamics."""
+        bullet, client = self._bullet, self._client
+        body = bullet.createMultiBody(
             baseMass=scene.body.mass,
             baseCollisionShapeIndex=-1 if scene.floor is None else self._shape(scene, form),
             basePosition=scene.start.position,
@@ -83,29 +114,21 @@ class PyBulletSimulation(Simulation):
             useMaximalCoordinates=not form.multibody,
             physicsClientId=client,
         )
-        dynamics = contact | damping_properties(scene, default)
-        if not default:
+        dynamics = contact | damping_properties(scene, form.default)
+        if not form.default:
             dynamics["activationState"] = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
         if form.unclamped:
             dynamics["maxJointVelocity"] = FASTEST
         bullet.changeDynamics(
-            self._body,
+            body,
             -1,
             mass=scene.body.mass,
             localInertiaDiagonal=[float(moment) for moment in np.diag(scene.body.inertia_tensor)],
             physicsClientId=client,
             **dynamics,
         )
-        bullet.resetBaseVelocity(self._body, scene.start.velocity, scene.start.angular_velocity, physicsClientId=client)
-        self.settings = {
-            "version": version("pybullet"),
-            "profile": "default" if default else "calibrated",
-            "coordinates": "multibody" if form.multibody else "maximal",
-            "body": form.body,
-            "floor": form.floor,
-            **parameters,
-            **dynamics,
-        }
+        bullet.resetBaseVelocity(body, scene.start.velocity, scene.start.angular_velocity, physicsClientId=client)
+        return body, dynamics
 
     def _shape(self, scene: Scenario, form: Form) -> int:
         bullet, client = self._bullet, self._client
@@ -123,10 +146,12 @@ class PyBulletSimulation(Simulation):
         return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=scene.body.half_extents, physicsClientId=client))
 
     def _add_floor(self, scene: Scenario, contact: dict[str, float], form: Form) -> None:
-        bullet, client = self._bullet, self._client
-        fits_plane = form.default or not isinstance(scene.body, Box)
-        if form.floor == "plane" or (form.floor == "fitting" and fits_plane):
+        bullet, client, kind = self._bullet, self._client, form.floor_in(scene)
+        if kind == "plane":
             shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0], physicsClientId=client)
+            top = 0.0
+        elif kind == "mesh":
+            shape = bullet.createCollisionShape(bullet.GEOM_MESH, physicsClientId=client, flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH, **SQUARE)
             top = 0.0
         else:  # on a plane, Bullet gives a box one contact point per step
             shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3, physicsClientId=client)

@@ -5,20 +5,34 @@ So a single contact rebounds exactly, several at once undo one another, and fric
 """
 
 import os
+from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from itertools import product
+from typing import Any, ClassVar
 
 import numpy as np
 import rapier3d
 from scipy.spatial.transform import Rotation
 
-from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, may_tumble, refusal_of_shape, version
+from comparisons.engines.base import (
+    FLOOR_HALF_SIZE,
+    Array,
+    AsBuilt,
+    Diverged,
+    Engine,
+    Simulation,
+    may_tumble,
+    refusal_of_floor,
+    refusal_of_shape,
+    version,
+)
 from comparisons.measuring.predictions import spins_steadily
 from scenarios import Scenario, truth_for
 from scenarios.body import Sphere
 from scenarios.mechanics import principal_axes
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, PARTS
+from scenarios.transformations import heavy_neighbour
 
 FRICTION = {"none": 0.0, "infinite": 1e6}
 LARGEST = float(np.finfo(np.float32).max)
@@ -43,13 +57,15 @@ REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
 
 
 class Rapier(Engine):
-    """Rapier's rigid body on a half-space."""
+    """Rapier's rigid body on a half-space, on a box, or on a mesh of two triangles."""
 
     name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
+    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": ("none", "heavy")}
+    representations: ClassVar = ("floor", "beside")
 
     def declines(self, scene: Scenario) -> str | None:
         body, floor = scene.body, scene.floor
-        if (unfit := refusal_of_shape(scene)) is not None or floor is None:
+        if (unfit := refusal_of_shape(scene) or refusal_of_floor(scene, self.option("floor"))) is not None or floor is None:
             return unfit
         if floor.rest_speed > 0.0:
             return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
@@ -65,15 +81,14 @@ class Rapier(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return RapierSimulation(scene, dt)
+        return RapierSimulation(scene, dt, self.option("floor"), self.option("beside"))
 
 
 class RapierSimulation(Simulation):
     """A Rapier world."""
 
-    def __init__(self, scene: Scenario, dt: float) -> None:
+    def __init__(self, scene: Scenario, dt: float, floor: str, beside: str) -> None:
         self.velocity_lag = 0.5 * dt
-        body, floor = scene.body, scene.floor
         self._world = rapier3d.PhysicsWorld(gravity=scene.acceleration)
         if FIRST_PROCESS() != os.getpid():  # a forked process has none of those threads and would wait for them forever
             self._world.set_num_threads(1)
@@ -81,23 +96,34 @@ class RapierSimulation(Simulation):
         parameters |= {"dt": dt, "normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
         for name, value in parameters.items():
             setattr(self._world.integration_parameters, name, rapier3d.SpringCoefficients(*value) if isinstance(value, tuple) else value)
-        gyroscopic = may_tumble(scene) and (floor is not None or not spins_steadily(scene))
+        gyroscopic = may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
         dynamics: dict[str, Any] = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic}
         for motion, rate in scene.damping.model_dump().items() if scene.damping else ():
             dynamics[f"{motion}_damping"] = float(np.expm1(rate * dt)) / dt
+        surface = {}
+        if scene.floor is not None:
+            surface = {"restitution": scene.floor.restitution, "friction": FRICTION.get(str(scene.floor.friction), scene.floor.friction)}
+        self._body = self._add_body(scene, dynamics, surface)
+        if surface:
+            self._world.add_collider(_floor(floor, surface))
+        if beside == "heavy":
+            self._add_body(heavy_neighbour(scene), dynamics, surface)
+        self.settings = {"version": version("rapier3d"), "floor": floor, "beside": beside, **parameters, **dynamics, **surface}
+
+    def _add_body(self, scene: Scenario, dynamics: Mapping[str, Any], surface: Mapping[str, Any]) -> Any:
+        """Add a scene's body with its collider, if the scene has a floor."""
+        body, world = scene.body, self._world
         moments, axes = principal_axes(body.inertia_tensor)
         inertia = rapier3d.MassProperties(np.zeros(3), body.mass, moments, Rotation.from_matrix(axes).as_quat())
         x, q, v, w = (scene.initial_state[part] for part in PARTS.values())
         moving = rapier3d.RigidBody.dynamic(**dynamics).position((x, q)).linvel(v).angvel(w).additional_mass_properties(inertia)
-        handle, surface = self._world.add_body(moving), {}
-        if floor is not None:
-            surface = {"restitution": floor.restitution, "friction": FRICTION.get(str(floor.friction), floor.friction)}
+        handle = world.add_body(moving)
+        if surface:
             shape = rapier3d.SharedShape.ball(body.size) if isinstance(body, Sphere) else rapier3d.SharedShape.cuboid(*body.vertices.max(0))
-            self._world.add_collider(rapier3d.Collider.new(shape, density=0.0, **surface), handle)
-            self._world.add_collider(rapier3d.Collider.halfspace((0.0, 1.0, 0.0), **surface))
-        self._body = self._world.rigid_bodies[handle]
-        self._body.recompute_mass_properties_from_colliders(self._world.colliders)  # else it has none before the first step
-        self.settings = {"version": version("rapier3d"), **parameters, **dynamics, **surface}
+            world.add_collider(rapier3d.Collider.new(shape, density=0.0, **surface), handle)
+        added = world.rigid_bodies[handle]
+        added.recompute_mass_properties_from_colliders(world.colliders)  # else it has none before the first step
+        return added
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):
@@ -113,3 +139,13 @@ class RapierSimulation(Simulation):
         built = self._body.mass_properties
         axes = Rotation.from_quat(built.principal_inertia_local_frame.to_tuple()).as_matrix()
         return AsBuilt(built.mass, axes @ np.diag(built.principal_inertia.to_tuple()) @ axes.T, np.array(self._world.gravity.to_tuple()))
+
+
+def _floor(kind: str, surface: Mapping[str, Any]) -> Any:
+    """The collider of the floor."""
+    if kind == "box":
+        return rapier3d.Collider.cuboid(FLOOR_HALF_SIZE, 1.0, FLOOR_HALF_SIZE, **surface).translation((0.0, -1.0, 0.0))
+    if kind == "mesh":
+        corners = [(x, 0.0, z) for x, z in product((-FLOOR_HALF_SIZE, FLOOR_HALF_SIZE), repeat=2)]
+        return rapier3d.Collider.trimesh(corners, [(0, 1, 2), (2, 1, 3)], **surface)
+    return rapier3d.Collider.halfspace((0.0, 1.0, 0.0), **surface)

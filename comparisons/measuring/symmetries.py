@@ -13,6 +13,7 @@ from scenarios import Scenario
 from scenarios.rotations import about, conjugate
 from scenarios.state import POSITION, UP, VELOCITY
 from scenarios.transformations import (
+    AWAY,
     REFLECTED,
     in_units,
     is_sliding_free,
@@ -26,9 +27,6 @@ from scenarios.transformations import (
 )
 
 Array = NDArray[np.float64]
-
-AWAY = np.array([0.8, 0.0, 0.6])
-"""A horizontal direction that is no axis."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from comparisons.engines.base import Engine
 from comparisons.judging.verdicts import Verdict
 from comparisons.measuring.differences import differences
-from comparisons.measuring.symmetries import AGAIN, AWAY, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
+from comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
 from comparisons.measuring.tolerances import perturbed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
@@ -22,7 +22,7 @@ from comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError, Scenario
 from scenarios.state import POSITION, RATES
-from scenarios.transformations import whole_steps
+from scenarios.transformations import AWAY, whole_steps
 
 Array = NDArray[np.float64]
 

@@ -32,8 +32,8 @@ def symmetries_command(
     """Test whether engines give the same motion for the same scene seen from elsewhere, in other units, or run again.
 
     Each scene is turned, mirrored, moved, described with other body axes and in other units, and run again: in a batch, in a new
-    process, on one core, and stopped and continued. If the engine has other representations of body or floor, they are compared too. No
-    exact solution is needed. The default is seven scenes with document, mujoco and pybullet.
+    process, on one core, and stopped and continued. If the engine has other representations of body or floor, or can simulate a second
+    body far away, these are compared too. No exact solution is needed. The default is seven scenes with document, mujoco and pybullet.
     """
     from comparisons.running.processes import ResourceLimits
     from comparisons.symmetries.study import SCENES

@@ -2,15 +2,12 @@
 
 import itertools
 import os
-from typing import ClassVar
 
 import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.engines.registry import engine
 from comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES
-from comparisons.running.recording import simulate
 from comparisons.symmetries.study import SCENES, symmetries
 from scenarios import DropspinError, load, truth_for
 
@@ -220,60 +217,6 @@ def test_boost_applies_where_nothing_slows_the_body():
     name = "moving at 10 m/s"
     having = {scene for scene in ("fall-spin", "drop-ball", "spin-damped", "slide-box") if SYMMETRIES[name].applies(load(scene))}
     assert having == {"fall-spin", "drop-ball"}
-
-
-def test_other_representation_with_another_motion_is_found():
-    """A mesh whose mass is 1 % wrong falls alike and bounces alike, but a push moves it otherwise; a box that is a box does not."""
-
-    class Meshes(made.Exact):
-        name = "meshes"
-        choices: ClassVar = {"body": ("box", "hull", "mesh")}
-        representations: ClassVar = ("body",)
-
-        def declines(self, scene):
-            return "a hull would only approximate a ball" if self.option("body") == "hull" else None
-
-        def prepare(self, scene, dt):
-            return made.ExactSimulation(scene, dt, pushed_along(1, 1e-3) if self.option("body") == "mesh" else None)
-
-    found = statuses(Meshes(), "fall-spin")
-    assert found["with body=mesh"].status == "lost"
-    assert (found["with body=hull"].status, found["with body=hull"].reason) == ("not run", "a hull would only approximate a ball")
-    assert {one.status for name, one in found.items() if not name.startswith("with ")} == {"kept"}
-    [mesh] = [one for one in found.values() if one.motions is not None]
-    assert mesh.symmetry == "with body=mesh"
-    own, other = mesh.motions
-    assert np.abs(other - own).max() == pytest.approx(1e-3 * load("fall-spin").duration ** 2)
-
-
-def test_representations_are_options_with_choices():
-    class Unknown(made.Exact):
-        name = "unknown"
-        representations: ClassVar = ("shape",)
-
-    with pytest.raises(DropspinError, match="unknown's representation 'shape' is unknown"):
-        Unknown()
-
-
-@pytest.mark.parametrize("label", ["mujoco[body=mesh,floor=box]", "mujoco[body=child]", "mujoco[body=child,profile=default]"])
-def test_mujoco_represents_a_box_in_several_ways(label):
-    """Its mass and inertia are read back, and the box strikes the floor with its edge at the same time."""
-    scene = load("drop-box-edge")
-    with engine(label).prepare(scene, DT) as simulation:
-        built = simulation.as_built()
-    assert built.mass == scene.body.mass
-    np.testing.assert_allclose(built.inertia, scene.body.inertia_tensor, rtol=1e-12)
-    profile = ["profile=default"] * ("default" in label)
-    own = simulate(scene, f"mujoco[{','.join(profile)}]" if profile else "mujoco", dt=DT)
-    np.testing.assert_allclose(simulate(scene, label, dt=DT).states, own.states, atol=1e-5)
-
-
-def test_pybullet_gives_a_box_one_contact_on_a_plane():
-    """On a plane a box that falls flat begins to turn; on a box it does not."""
-    scene = load("drop-box-flat")
-    turned = {floor: simulate(scene, f"pybullet[floor={floor}]", dt=1e-3).states[:, 3:6] for floor in ("plane", "box")}
-    assert np.abs(turned["plane"]).max() > 0.05
-    assert np.abs(turned["box"]).max() < 1e-9
 
 
 def test_engines_that_do_not_run_have_a_reason_and_cost_no_other_engine_its_findings():

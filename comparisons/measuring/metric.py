@@ -107,6 +107,11 @@ class Average(NamedTuple):
         return float(np.max(np.abs(self.parts) + self.jumps)) - abs(self.value)
 
     @property
+    def noise(self) -> float:
+        """The largest change of the value by the sampling noise of its parts, or of the impact of one start phase."""
+        return float(np.max(np.abs(self.parts) + np.maximum(self.resolutions, self.jumps))) - abs(self.value)
+
+    @property
     def value(self) -> float:
         """The part with the largest absolute value, with its sign."""
         return float(self.parts.flat[np.argmax(np.abs(self.parts))])

@@ -18,7 +18,7 @@ from tomlkit.items import InlineTable, Item
 
 from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.symmetries import kind_of
-from comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results
+from comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results, verify_comparable
 from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.output import written_whole
 from comparisons.results.provenance import digest, versions_behind
@@ -183,7 +183,11 @@ def accept(
     Returns:
         The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
         `before` in `unit`, and the `change`: new, worse, moved, better, same or gone.
+
+    Raises:
+        DropspinError: The run is quick.
     """
+    verify_comparable(results)
     mine = comparable_results(results)
     mine["known_failure"] = (mine["verdict"] == "failed") & known_failures
     old = asked_for(earlier.results, results)

@@ -9,7 +9,7 @@ import pandas as pd
 from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import FAILURES, Verdict
 from comparisons.regressions.baseline import Baseline
-from comparisons.regressions.values import KEY, asked_for, changes, comparable_results, most_changed_first, step_names
+from comparisons.regressions.values import KEY, asked_for, changes, comparable_results, most_changed_first, step_names, verify_comparable
 from comparisons.results.measurement import Measurement, as_table
 from comparisons.results.results import Results
 from scenarios import DropspinError
@@ -58,12 +58,14 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
         `changes`, its results compared with the accepted ones; and `not_run`, the accepted results that the run does not cover.
 
     Raises:
+        DropspinError: The run is quick, and there is a baseline.
         NothingAccepted: The run covers no accepted result, so that the check would be empty. Not raised if engines broke down, which is
             reported instead.
     """
     if baseline is None:
         nothing = comparable_results(results).iloc[:0]
         return Checked(results, changes(nothing, nothing), nothing)
+    verify_comparable(results)
     accepted = asked_for(_with_current_names(baseline, results), results)
     if accepted.empty and not results.breakdowns.any():
         raise NothingAccepted(

@@ -8,7 +8,7 @@ import pandas as pd
 from comparisons.regressions.attribution import Attribution, attribute, surroundings
 from comparisons.regressions.motions import EqualMotions, equal_motions
 from comparisons.regressions.speed import SpeedChange, speed_changes
-from comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed
+from comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed, verify_comparable
 from comparisons.results.results import Results
 from scenarios import DropspinError
 
@@ -60,9 +60,10 @@ def compare(old: Results, new: Results) -> Changes:
         `motions`, how many motions are equal bit for bit.
 
     Raises:
-        DropspinError: The runs have no scene, engine and time step in common.
+        DropspinError: The runs have no scene, engine and time step in common, or one is quick.
     """
     other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
+    verify_comparable(old, new)
     before, after = comparable_results(old), comparable_results(new)
     found = changes(*(held[~held["scene"].isin(other)] for held in (asked_for(before, new), asked_for(after, old))))
     if found.empty and other:

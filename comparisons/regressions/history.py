@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from comparisons.regressions.attribution import Attribution, attribute
-from comparisons.regressions.values import KEY, changes, comparable_results, most_changed_first
+from comparisons.regressions.values import KEY, changes, comparable_results, most_changed_first, verify_comparable
 from comparisons.results.provenance import versions_behind
 from comparisons.results.results import Results
 from scenarios import DropspinError
@@ -59,10 +59,11 @@ def history(runs: Mapping[str, Results]) -> History:
         runs in which results changed, and the cause to which each change is attributed.
 
     Raises:
-        DropspinError: There are fewer than two runs.
+        DropspinError: There are fewer than two runs, or one is quick.
     """
     if len(runs) < 2:
         raise DropspinError(f"a history needs two or more runs, got {len(runs)}; give more, or a folder of runs.")
+    verify_comparable(*runs.values())
     ordered = sorted(runs.items(), key=lambda item: str(item[1].provenance["started"]))
     names, results = [name for name, _ in ordered], [one for _, one in ordered]
     stamps = [

@@ -10,6 +10,7 @@ from comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
 from comparisons.judging.verdicts import BREAKDOWNS
 from comparisons.results.results import Results
 from comparisons.results.stored_table import OF_SYMMETRIES
+from scenarios import DropspinError
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
 """The columns that identify a result; `steps` is the time step as text, or, for orders and asymptotic errors, all time steps used."""
@@ -24,6 +25,12 @@ BETTER: Mapping[str, Literal["smaller", "larger", "neither"]] = {
     "determinism": "smaller",
 }
 """Kinds of comparable rows, with the direction of an improvement: errors towards 0, orders upwards; a mean has none."""
+
+
+def verify_comparable(*runs: Results) -> None:
+    """Raise `DropspinError` if a run is quick: its means are over fewer starts, and its results have no tolerances."""
+    if any(run.provenance["asked"].get("quick") for run in runs):
+        raise DropspinError("a quick run has too few starts to be compared with other runs or accepted; run it again without --quick.")
 
 
 def comparable_results(results: Results) -> pd.DataFrame:

@@ -10,6 +10,8 @@ Array = NDArray[np.float64]
 
 SAMPLES = 41
 """Times at which an ensemble's energy is kept, the start and the end among them."""
+QUICK_MEMBERS = 16
+"""Members that a quick run simulates; they are drawn independently, so the first ones are a sample."""
 
 
 @dataclass(frozen=True, eq=False)

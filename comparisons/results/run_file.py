@@ -48,6 +48,7 @@ class _Asked(_Table):
     engines: list[Text]
     dts: Annotated[list[Seconds], Field(min_length=1)]
     time_limit: Seconds
+    quick: bool = False
     draw: Annotated[int, Field(ge=1)] | None = None
     seed: Annotated[int, Field(ge=0)] | None = None
 

@@ -5,6 +5,7 @@ A folder may be damaged, or somebody else's: all of it is verified on loading, a
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from comparisons.results.arrays import loaded_arrays, stored_arrays
-from comparisons.results.ensembles import SAMPLES, EnsembleOutcome
+from comparisons.results.ensembles import QUICK_MEMBERS, SAMPLES, EnsembleOutcome
 from comparisons.results.results import Results, TrajectoryKey
 from comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
 from comparisons.results.stored_files import file_name, read_stored, sha256
@@ -81,7 +82,8 @@ def _loaded(folder: Path, file: RunFile, content: Mapping[str, Any], arrays: boo
     scenes = {name: _scene(file, name) for name in file.scenes}
     rows = _from_file(folder, TABLE, file, lambda content: loaded_table(content, scenes, file.engines, file.provenance.asked.dts))
     trajectories = dict(_arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory))
-    ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, _outcome))
+    of_ensemble = partial(_outcome, most=QUICK_MEMBERS if file.provenance.asked.quick else None)
+    ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, of_ensemble))
     is_prediction, is_agreement = (rows["kind"] == kind for kind in ("prediction", "agreement"))
     table, *others = (rows[kept].reset_index(drop=True) for kept in (~(is_prediction | is_agreement), is_prediction, is_agreement))
     return Results(table, scenes, tuple(file.engines), trajectories, ensembles, content["provenance"], *others)
@@ -110,10 +112,10 @@ def _trajectory(content: bytes, scene: Scenario, dt: float) -> Trajectory:
     return Trajectory(**found, velocity_lag=velocity_lag)
 
 
-def _outcome(content: bytes, scene: Scenario, dt: float) -> EnsembleOutcome:
+def _outcome(content: bytes, scene: Scenario, dt: float, most: int | None) -> EnsembleOutcome:
     if scene.ensemble is None:
         raise ValueError("its scene has no ensemble")
-    size = scene.ensemble.size
+    size = min(scene.ensemble.size, most or scene.ensemble.size)
     shapes = {"t": (SAMPLES,), "energy": (size, SAMPLES), "rebound": (size,), "rest_time": (size,), "angular_momentum": (size, SAMPLES)}
     return EnsembleOutcome(**loaded_arrays(content, shapes))
 

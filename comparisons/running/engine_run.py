@@ -10,7 +10,7 @@ import numpy as np
 from comparisons.engines.base import Engine, KnownLimitation
 from comparisons.measuring.metrics import metrics_for
 from comparisons.measuring.tolerances import perturbed
-from comparisons.results.ensembles import EnsembleOutcome
+from comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
 from comparisons.running.ensembles import run_ensemble
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.progress import OnSimulations
@@ -60,6 +60,8 @@ def run_engine(
     dt: float,
     starts: Sequence[Scenario],
     on_simulations: OnSimulations = lambda done, total: None,
+    *,
+    quick: bool = False,
 ) -> EngineRun:
     """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result.
 
@@ -69,6 +71,7 @@ def run_engine(
         dt: Time step [s].
         starts: The scene from each of its start phases.
         on_simulations: Called after each simulation.
+        quick: Whether perturbed starts are run only where verdicts need them, in single precision, and few members of an ensemble.
     """
     engine, found = entry.engine, EngineRun(entry.label)
     if entry.absence:
@@ -81,7 +84,7 @@ def run_engine(
             found.breakdown = Breakdown("declined", refusal)
             return found
         found.discretisation, found.order, found.precision = verified_claims(engine, scene)
-        sets = perturbed(scene, starts, found.precision)
+        sets = [] if quick and found.precision is np.float64 else perturbed(scene, starts, found.precision)
         others = [*(starts if len(starts) > 1 else []), *chain(*sets)]
         total = 1 + len(others)
         own = record(engine, scene, dt)
@@ -90,7 +93,7 @@ def run_engine(
         motions = iter(record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else [])
         found.phases = [own.motion] if len(starts) == 1 else [next(motions) for _ in starts]
         found.perturbed = [[next(motions) for _ in moved] for moved in sets]
-        found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt)
+        found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)
         # The predicted error of a bounce is a mean over start phases.
         found.predicted = _predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}
     except Exception as error:  # whatever an engine raises costs its own row only

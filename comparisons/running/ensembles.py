@@ -25,8 +25,8 @@ BATCH_SIZE = 32
 CONFIDENCE = 0.95
 
 
-def run_ensemble(engine: Engine, scene: Scenario, dt: float) -> EnsembleOutcome:
-    """Run an ensemble through an engine.
+def run_ensemble(engine: Engine, scene: Scenario, dt: float, most: int | None = None) -> EnsembleOutcome:
+    """Run an ensemble, or at most a number of its first members, through an engine.
 
     Raises:
         Diverged: A motion is not finite.
@@ -34,7 +34,7 @@ def run_ensemble(engine: Engine, scene: Scenario, dt: float) -> EnsembleOutcome:
     steps = scene.steps(dt)
     rows = np.round(np.linspace(0.0, steps, SAMPLES)).astype(int)
     energies, momenta, rebounds, rest_times = [], [], [], []
-    starts = members(scene)
+    starts = members(scene)[:most]
     for first in range(0, len(starts), BATCH_SIZE):
         batch = starts[first : first + BATCH_SIZE]
         for member, motion in zip(batch, record_batch(engine, batch, dt), strict=True):

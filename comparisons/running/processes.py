@@ -111,6 +111,8 @@ class EngineProcesses:
         dt: float,
         starts: Sequence[Scenario],
         on_simulations: OnSimulations = lambda done, total: None,
+        *,
+        quick: bool = False,
     ) -> EngineRun:
         """Run a scene with an engine in its process; failures are part of the result.
 
@@ -120,11 +122,13 @@ class EngineProcesses:
             dt: Time step [s].
             starts: The scene from each of its start phases.
             on_simulations: Called while the engine works, twice a second.
+            quick: As for `run_engine`.
         """
         if entry.absence:
             return run_engine(entry, scene, dt, starts)
         try:
-            return self.call(entry, _run_engine, scene, dt, starts, while_waiting=lambda: on_simulations(*self._counts[entry.label]))
+            counts = self._counts
+            return self.call(entry, _run_engine, scene, dt, starts, quick, while_waiting=lambda: on_simulations(*counts[entry.label]))
         except Failed as failure:
             return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
 
@@ -261,13 +265,13 @@ _entry: list[EngineEntry] = []
 """The engine of this process; empty in the parent."""
 
 
-def _run_engine(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario]) -> EngineRun:
+def _run_engine(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool) -> EngineRun:
     """Run a scene with an engine in this process, and share the numbers of simulations with the parent."""
 
     def on_simulations(done: int, total: int) -> None:
         _counts[0][:] = [done, total]
 
-    return run_engine(entry, scene, dt, starts, on_simulations)
+    return run_engine(entry, scene, dt, starts, on_simulations, quick=quick)
 
 
 def _start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", counts: "ctypes.Array[ctypes.c_long]") -> None:

@@ -38,6 +38,7 @@ def run(
     keep: Callable[[Results], None] | None = None,
     done: Iterable[Results] = (),
     jobs: int | None = None,
+    quick: bool = False,
 ) -> Results:
     """Run every scene with every engine at every time step, measure, and judge.
 
@@ -55,6 +56,9 @@ def run(
         done: Results of scenes from an earlier run. Those with the same request, versions and machine are not run again.
         jobs: Number of scenes to run at a time; by default, the number of processors that this process may use. It changes no result: steps
             are timed before, while nothing else runs.
+        quick: Whether to run few starts: 8 instead of 32 start phases, 16 members of an ensemble, and no perturbed starts in double
+            precision. A check that the sampling noise may decide is `measured`, intervals are wider, and the results have no tolerances,
+            so that `check` with a baseline, `accept`, `compare` and `history` refuse them.
 
     Returns:
         The measurements with their verdicts, predictions, agreements of engines, and the motions.
@@ -64,7 +68,7 @@ def run(
     """
     prepared = prepare_run(scenes, engines, dt, resources)
     entries, dts = prepared.entries, prepared.dts
-    stamp = _stamp(prepared, resources)
+    stamp = _stamp(prepared, resources, quick)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if not what_changed(part.provenance, stamp)}
     parts: dict[str, Results] = {}
     pending: list[StartPhase] = []
@@ -81,7 +85,7 @@ def run(
             for entry, step in product(entries, dts):
                 report(Progress(scene.name, entry.label, step, finished=True))
         else:
-            pending.append(StartPhase(scene, truth))
+            pending.append(StartPhase(scene, truth, quick))
     number = min(as_jobs(jobs), max(len(pending), 1))
     with ExitStack() as stack:
         crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(number)]
@@ -183,13 +187,14 @@ def _verify_request(scenes: Sequence[Scenario], truths: Sequence[Truth | None], 
         raise DropspinError(f"an engine is given twice: {', '.join(labels)}; give each once.")
 
 
-def _stamp(prepared: PreparedRun, resources: ResourceLimits) -> dict[str, Any]:
+def _stamp(prepared: PreparedRun, resources: ResourceLimits, quick: bool) -> dict[str, Any]:
     """The provenance of a run before it starts."""
     asked = {
         "scenes": [scene.name for scene in prepared.scenes],
         "engines": [entry.label for entry in prepared.entries],
         "dts": list(prepared.dts),
         "time_limit": resources.processor_time,
+        "quick": quick,
     }
     adapters = {entry.label: code_of(entry.engine) for entry in prepared.entries if entry.engine is not None}
     return provenance(asked) | {"names": prepared.names, "adapters": adapters}
@@ -199,8 +204,9 @@ def what_changed(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> str:
     """What differs between the provenance of two runs so that results of one do not belong to the other; empty if nothing does."""
     adapters = earlier["adapters"] | stamp["adapters"]
     codes = [f"the code of {label}" for label in adapters if earlier["adapters"].get(label) != stamp["adapters"].get(label)]
-    asked = [name for name in ("engines", "dts", "time_limit") if earlier["asked"][name] != stamp["asked"][name]]
-    words = {"engines": "the engines", "dts": "the time steps", "time_limit": "the time limit", "code": "dropspin", "cpu": "the processor"}
+    asked = [name for name in ("engines", "dts", "time_limit", "quick") if earlier["asked"].get(name) != stamp["asked"][name]]
+    words = {"engines": "the engines", "dts": "the time steps", "time_limit": "the time limit", "quick": "the option --quick"}
+    words |= {"code": "dropspin", "cpu": "the processor"}
     rest = [name for name in ("versions", "python", "cpu", "code") if earlier[name] != stamp[name]]
     return " and ".join([*(words.get(name, name) for name in asked), *([] if asked else codes), *(words.get(name, name) for name in rest)])
 

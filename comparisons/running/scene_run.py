@@ -104,7 +104,7 @@ def _run(
     """Run a scene with an engine, unless its process ended while it was timed."""
     if timing.ended:
         return EngineRun(entry.label, timing.breakdown)
-    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases], on_simulations)
+    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases], on_simulations, quick=own.quick)
     return engine_run if engine_run.breakdown else replace(engine_run, breakdown=timing.breakdown)
 
 

@@ -10,24 +10,25 @@ import numpy as np
 
 from scenarios import Scenario, Truth
 
-START_PHASES = 32
+START_PHASES, QUICK_START_PHASES = 32, 8
 REST_SHARE = 0.1
 """A scene whose impacts are over in this share of its duration is about rest, not about impacts."""
 
 
 class StartPhase(NamedTuple):
-    """A scene from one start, and its exact solution, if it is known."""
+    """A scene from one start, and its exact solution, if it is known; `quick` if the scene is to be run from few starts."""
 
     scene: Scenario
     truth: Truth | None
+    quick: bool = False
 
 
-def start_phases(scene: Scenario, truth: Truth | None, dt: float) -> list[StartPhase]:
-    """The scene from 32 starts that put its first impact at 32 phases of a time step.
+def start_phases(scene: Scenario, truth: Truth | None, dt: float, count: int = START_PHASES) -> list[StartPhase]:
+    """The scene from a number of starts that put its first impact at as many phases of a time step.
 
     Only the scene itself if no impact comes after the first step, or if all are over in a tenth of its duration.
     """
     if truth is None or not truth.events or truth.events[0].time <= dt or truth.events[-1].time < REST_SHARE * scene.duration:
         return [StartPhase(scene, truth)]
-    delays = (np.arange(START_PHASES) + 0.5) / START_PHASES * dt
+    delays = (np.arange(count) + 0.5) / count * dt
     return [StartPhase(scene.starting_at(state), truth.after(delay)) for state, delay in zip(truth(delays).states, delays, strict=True)]

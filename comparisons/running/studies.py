@@ -116,7 +116,8 @@ def _measured_at(own: StartPhase, entry: EngineEntry, dt: float, processes: Engi
         return []
     phases, exact = phases_at(own, dt)
     progress = Progress(own.scene.name, entry.label, dt, added=True)
-    engine_run = processes.run_engine(entry, own.scene, dt, [phase.scene for phase in phases], reporter(progress, on_progress))
+    starts, on_simulations = [phase.scene for phase in phases], reporter(progress, on_progress)
+    engine_run = processes.run_engine(entry, own.scene, dt, starts, on_simulations, quick=own.quick)
     return [] if breakdown_of(engine_run) else measure(own, dt, engine_run, phases, exact, compare(engine_run.phases, phases, exact))
 
 

@@ -43,6 +43,7 @@ CORE_ENGINES = ("document", "mujoco", "pybullet")
 @click.option("--symmetries", "test_symmetries", is_flag=True, help="Also test the symmetries of each scene at the finest time step.")
 @time_limit_option(300.0, "an engine may use for one scene at one time step")
 @jobs_option("scenes to run")
+@click.option("--quick", is_flag=True, help="Run few starts, for a first answer from a slow engine; fewer checks are decided.")
 @baseline_option
 @click.option("--resume", is_flag=True, help="Resume an interrupted run: scenes that are already measured are not run again.")
 @click.option("-v", "--verbose", is_flag=True, help="Also print a table of every metric for each scene.")
@@ -57,6 +58,7 @@ def run_command(
     test_symmetries: bool,
     time_limit: float,
     jobs: int | None,
+    quick: bool,
     baseline: str | None,
     resume: bool,
     verbose: bool,
@@ -82,6 +84,8 @@ def run_command(
 
     if seed is not None and count is None:
         raise click.UsageError("--seed has an effect only with random scenes; add --draw N.")
+    if quick and baseline is not None:
+        raise click.UsageError("a quick run has too few starts to be compared with a baseline; leave out --quick or --baseline.")
     named = scenes or (() if count is not None else ("core",))
     loaded = [scene for name in named for scene in (_core() if name == "core" else [load(name)])]
     drawn: dict[str, int] = {}
@@ -91,7 +95,7 @@ def run_command(
         echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
     file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
     show = None if json_output else print_table if verbose else print_summary
-    results = _run(loaded, drawn, engines, dts, output, time_limit, jobs, resume, show, test_symmetries=test_symmetries)
+    results = _run(loaded, drawn, engines, dts, output, time_limit, jobs, resume, show, quick=quick, test_symmetries=test_symmetries)
     checked = _checked(results, file, json_output)
     if json_output:
         echo(json_rows(checked.results.table))
@@ -113,6 +117,7 @@ def _run(
     resume: bool,
     show: "Callable[[Results], None] | None",
     *,
+    quick: bool,
     test_symmetries: bool,
 ) -> "Results":
     """Run the scenes, print the results and write the run; an interrupted run keeps the scenes that were measured."""
@@ -136,8 +141,9 @@ def _run(
                     show_progress(progress)
 
                 resources = ResourceLimits(processor_time=time_limit)
+                keep = measured.keep
                 results = run(
-                    scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=measured.keep, done=earlier, jobs=jobs
+                    scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=keep, done=earlier, jobs=jobs, quick=quick
                 )
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:

@@ -202,8 +202,8 @@ def reproduce_scenes(
         named = [repr(scene.origin) if scene.origin else f"<scene {scene.name!r}>" for scene in scenes]
         named_scenes = named[0] if len(named) == 1 else f"[{', '.join(named)}]"
         named_engine = f"<engine {label!r}>" if engine is None else repr(engine)
-        return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]})"
-    options = [*_options(steps, asked["time_limit"]), *["--symmetries"] * symmetries]
+        return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]}{', quick=True' * asked.get('quick', False)})"
+    options = [*_options(steps, asked), *["--symmetries"] * symmetries]
     options += [] if baseline is None else ["--baseline", baseline]
     return shlex.join(["dropspin", "run", *(scene.origin for scene in scenes), "-e", engine, *options, "-o", "out/again"])
 
@@ -215,12 +215,14 @@ def reproduce_drawn(results: Results) -> list[str]:
         return []
     named = [results.scenes[name].origin for name in asked["scenes"][: -asked["draw"]]]
     engines = [word for label in results.engines for word in ("-e", results.provenance["names"][label])]
-    options = _options(sorted(asked["dts"], reverse=True), asked["time_limit"])
+    options = _options(sorted(asked["dts"], reverse=True), asked)
     command = ["dropspin", "run", *named, "--draw", str(asked["draw"]), "--seed", str(asked["seed"]), *engines, *options, "-o", "out/again"]
     return [f"Scenes drawn with seed {asked['seed']}: {asked['draw']}. Reproduce: {shlex.join(command)}"]
 
 
-def _options(dts: Sequence[float], time_limit: float) -> list[str]:
-    """The options of `dropspin run` for time steps [s] and for a time limit [s] that is not the default one."""
+def _options(dts: Sequence[float], asked: Mapping[str, Any]) -> list[str]:
+    """The options of `dropspin run` for time steps [s], a quick run, and a time limit [s] that is not the default one."""
     options = [word for dt in dts for word in ("--dt", repr(float(dt)))]
-    return options if time_limit == ResourceLimits().processor_time else [*options, "--time-limit", f"{time_limit:g}"]
+    options += ["--quick"] * asked.get("quick", False)
+    limit = asked["time_limit"]
+    return options if limit == ResourceLimits().processor_time else [*options, "--time-limit", f"{limit:g}"]

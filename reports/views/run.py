@@ -3,7 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from comparisons.results.ensembles import QUICK_MEMBERS
 from comparisons.results.results import Results, Status
+from comparisons.running.measured import UNDECIDED_BY_STARTS
+from comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from reports.views.failures import Failure, failures, reproduce_drawn
 from reports.views.findings import (
     Counts,
@@ -22,7 +25,7 @@ class Overview:
 
     Attributes:
         verdict: The outcome of the checks in one sentence.
-        findings: The main finding on each engine, and the command that draws the same random scenes again.
+        findings: What a quick run left out, the main finding on each engine, and the command that draws the same random scenes again.
         counts: The number of checks with each verdict.
         statuses: The status of each engine in each scene, by scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
@@ -41,5 +44,17 @@ def overview(results: Results) -> Overview:
     """The overview of a run."""
     tally, profiles = counts(results), profile_comparisons(results)
     findings = finding_sentences(results, {cause: asymptotic_errors(results, cause) for cause in ("model", "setting")}, profiles)
-    findings = [*findings, *reproduce_drawn(results)]
+    findings = [*_quick(results), *findings, *reproduce_drawn(results)]
     return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results))
+
+
+def _quick(results: Results) -> list[str]:
+    """A sentence on what a quick run left out, and the number of its checks that are not decided; empty for other runs."""
+    if not results.provenance["asked"].get("quick"):
+        return []
+    undecided = int(results.table["reason"].str.startswith(UNDECIDED_BY_STARTS).sum())
+    return [
+        f"Quick run: {QUICK_START_PHASES} start phases instead of {START_PHASES}, at most {QUICK_MEMBERS} members of an ensemble, and no "
+        f"perturbed starts in double precision. {undecided} {'check is' if undecided == 1 else 'checks are'} not decided by so few starts; "
+        "run again without --quick to decide more, and to compare or accept the results."
+    ]

@@ -41,6 +41,7 @@ BUILT_IN = {
     "drake": _Home("comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
     "sapien": _Home("comparisons.engines.sapien_engine", "Sapien", "sapien", "pip install 'dropspin[sapien]'"),
     "exudyn": _Home("comparisons.engines.exudyn_engine", "Exudyn", "exudyn", "pip install 'dropspin[exudyn]'"),
+    "jsbsim": _Home("comparisons.engines.jsbsim_engine", "JSBSim", "jsbsim", "pip install 'dropspin[jsbsim]'"),
     "mjx": _Home("comparisons.engines.mjx_engine", "MJX", "jax", "pip install 'dropspin[mjx]'"),
     "mujoco-warp": _Home("comparisons.engines.mujoco_warp_engine", "MuJoCoWarp", "mujoco_warp", "pip install 'dropspin[mujoco-warp]'"),
     "newton": _Home("comparisons.engines.newton_engine", "Newton", "newton", "pip install 'dropspin[newton]'"),

@@ -16,7 +16,7 @@ from scenarios.text import printable
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 ENGINES = (
     *("mujoco", "pybullet", "rapier3d", "dartpy", "drake"),
-    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien"),
+    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien", "exudyn", "jsbsim"),
 )
 STAMPED = (*MEASURING, *ENGINES)
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))

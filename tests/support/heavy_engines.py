@@ -34,5 +34,11 @@ CASES = {
         Case("exudyn[integrator=trapezoidal]", 1.23e-7, None, batch=None),
         Case("exudyn[integrator=midpoint]", 9.3e-8, None, batch=None),
     ],
+    "jsbsim": [
+        Case("jsbsim", 2.85e-4, None, batch=None),
+        Case("jsbsim[integrator=trapezoidal]", 5.69e-4, None, batch=None),
+        Case("jsbsim[integrator=adams-bashforth-5]", 7.3e-7, None, batch=None),
+        Case("jsbsim[integrator=local-linearization]", 3.5e-7, None, batch=None),
+    ],
     "sapien": [Case("sapien", 2.8e-4, 2.5e-3, batch=None)],
 }

@@ -32,13 +32,21 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
         file = Path(inspect.getfile(adapter)).resolve()
     except (OSError, TypeError):
         return None
-    if file.is_relative_to(HOME / "comparisons"):  # a built-in adapter: its files share the beginning of their names
-        files = dict.fromkeys(file.parent.glob(f"{file.stem.partition('_')[0]}*.py"))
-    else:
-        files = {file: None}
-        _add_imports(files, file, adapter.__module__)
-        for name in loaded:
-            _add(files, name)
+    if file.is_relative_to(HOME / "comparisons"):
+        return built_in_code(file)
+    files: dict[Path, None] = {file: None}
+    _add_imports(files, file, adapter.__module__)
+    for name in loaded:
+        _add(files, name)
+    return _hashed(files)
+
+
+def built_in_code(file: Path) -> str:
+    """The short hash of a built-in adapter, by its file: all of its files, whose names begin alike; none is imported."""
+    return _hashed(file.parent.glob(f"{file.stem.partition('_')[0]}*.py"))
+
+
+def _hashed(files: Iterable[Path]) -> str:
     found = hashlib.sha256()
     for one in sorted(files, key=lambda path: path.name):
         found.update(one.read_bytes())

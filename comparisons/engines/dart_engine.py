@@ -42,6 +42,8 @@ class Dart(Engine):
             return "DART damps a free joint about the world's axes; angular damping needs a body of equal moments of inertia"
         if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, self.option("floor"))) is not None:
             return unfit
+        if floor is not None and not hasattr(dart.constraint, "NsgsFrictionSolver"):
+            return f"dartpy {version('dartpy')} is installed, without the settings of exact contacts; update it to 6.20 or later"
         if floor is not None and floor.rest_speed > 0.0:
             return "DART has a fixed rebound speed below which restitution is 0, 0.1 m/s; floor.rest_speed cannot be set"
         return None

@@ -1,0 +1,73 @@
+"""The plan of the record, `plan.toml`: which releases, engines with options, scenes and time steps it has."""
+
+import json
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+
+from pydantic import Field
+
+from comparisons.engines.mujoco_versions import numbers_of
+from comparisons.results.stored_files import sha256
+from scenarios import Scenario, load
+from scenarios.body import Table
+from scenarios.loading import read_toml
+
+FILE = Path(__file__).with_name("plan.toml")
+NUMPY_1 = ["numpy<2", "pandas<3"]
+"""pandas 3 needs NumPy 2."""
+
+
+class Releases(Table):
+    """The releases of one engine.
+
+    Attributes:
+        package: The name on PyPI.
+        together: Another package, of which the same release is installed; empty if there is none.
+        extra: The extra with which the package is installed; empty for none.
+        oldest: The first release to measure.
+        numpy_1_until: The last release that was compiled for NumPy 1, which does not work with NumPy 2; empty if all work.
+        labels: The engine with each set of options.
+    """
+
+    package: str
+    together: str = Field(default="", alias="with")
+    extra: str = ""
+    oldest: str
+    numpy_1_until: str = ""
+    labels: tuple[str, ...]
+
+    def requirements(self, release: str) -> list[str]:
+        """What pip installs for a release."""
+        extra = f"[{self.extra}]" if self.extra else ""
+        chosen = [f"{self.package}{extra}=={release}", *([f"{self.together}=={release}"] if self.together else [])]
+        return chosen + (NUMPY_1 if self.numpy_1_until and numbers_of(release) <= numbers_of(self.numpy_1_until) else [])
+
+
+class Plan(Table):
+    """The plan of the record.
+
+    Attributes:
+        dts: Time steps [s].
+        scenes: Names of scenes in the catalogue.
+        engines: The releases of each engine, by its name.
+    """
+
+    dts: tuple[float, ...]
+    scenes: tuple[str, ...]
+    engines: Mapping[str, Releases]
+
+    @cached_property
+    def loaded_scenes(self) -> list[Scenario]:
+        """The scenes."""
+        return [load(name) for name in self.scenes]
+
+    def digest(self, engine: str) -> str:
+        """A short hash of everything that is measured of each release of an engine."""
+        asked = [self.dts, [[scene.name, scene.digest] for scene in self.loaded_scenes], self.engines[engine].labels]
+        return sha256(json.dumps(asked).encode())[:12]
+
+
+def load_plan() -> Plan:
+    """The plan that dropspin comes with."""
+    return Plan.model_validate(read_toml(FILE, FILE.name, "plan"))

@@ -1,0 +1,206 @@
+"""The folder of the record: a Parquet file for each engine, release and machine, whose name ends with the hash of its content.
+
+`origin=own` has what was measured here, `origin=unsigned` what others sent: a reader of partitioned Parquet files makes a column of that.
+A file is complete or absent, never changed, and whoever has it can verify it; the hash does not prove who measured it.
+"""
+
+import io
+import json
+import math
+import platform
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from comparisons.judging.verdicts import VERDICTS
+from comparisons.measuring.metrics import METRICS
+from comparisons.record.environments import NOT_INSTALLABLE, without_paths
+from comparisons.results.output import written_whole
+from comparisons.results.provenance import processor
+from comparisons.results.stored_files import read_stored, sha256
+from scenarios import DropspinError
+
+Row = Mapping[str, Any]
+OWN, OTHERS = "origin=own", "origin=unsigned"
+RELEASES = "_releases.json"
+HASH = 16
+NAME = re.compile(r"([a-z][a-z-]*)-(\w[\w.+!]*)-([0-9a-f]{16})\.parquet", re.ASCII)
+TEXTS = (
+    *("engine", "release", "label", "profile", "scene", "scene_digest", "metric", "unit", "verdict", "reason", "trajectory"),
+    *("adapter", "plan", "versions", "processor", "system", "python", "measured"),
+)
+NUMBERS = ("dt", "value")
+SCHEMA = pa.schema([*((name, pa.string()) for name in TEXTS), *((name, pa.float64()) for name in NUMBERS)])
+CONSTANT = ("engine", "release", "plan", "versions", "processor", "system", "python", "measured")
+MACHINE = ("processor", "system", "python")
+SAME = ("plan", "adapter", *MACHINE)
+"""What a stored release must share with a new measurement, so that it is not measured again."""
+SHA256 = re.compile("[0-9a-f]{64}|")
+
+
+def machine() -> dict[str, str]:
+    """The processor, system and Python of this machine, without names that somebody chose."""
+    system = " ".join(filter(None, [platform.system(), platform.machine(), *platform.libc_ver()]))
+    return {"processor": processor(), "system": system, "python": platform.python_version()}
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A file of the record: its path, the engine and release that its name has, and its content."""
+
+    path: Path
+    engine: str
+    release: str
+    content: bytes
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows, if the file is what `write` wrote.
+
+        Raises:
+            DropspinError: It is not.
+        """
+        try:
+            found = pq.ParquetFile(io.BytesIO(self.content)).read(use_threads=False).replace_schema_metadata(None)
+            if found.schema != SCHEMA:
+                raise ValueError("has other columns or types than the record")
+            rows: list[dict[str, Any]] = found.to_pylist()
+            _verify(rows, {"engine": self.engine, "release": self.release})
+        except Exception as error:  # whatever pyarrow raises for a file that is none
+            raise DropspinError(f"{self.path.name}: refused: {' '.join(str(error).split())}.") from None
+        return rows
+
+
+class Record:
+    """The folder of the record.
+
+    Args:
+        folder: The folder; it need not exist.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+
+    def write_releases(self, listed: Mapping[str, Sequence[str]]) -> None:
+        """Write which releases the index had, engine by engine; those of other engines stay."""
+        path = self.folder / RELEASES
+        known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        known |= {engine: {"listed": date.today().isoformat(), "releases": list(names)} for engine, names in listed.items()}
+        with written_whole(path) as unfinished:
+            unfinished.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+    def own(self, engine: str, release: str) -> Iterator[tuple[Path, list[dict[str, Any]]]]:
+        """The files that were measured here of a release, and their rows."""
+        for path in sorted((self.folder / OWN).glob(f"{engine}-{release}-*.parquet")):
+            yield path, stored(path).rows()
+
+    def has(self, engine: str, release: str, same: Row) -> bool:
+        """Whether a release is measured, with this plan, adapter and machine; one that was not installable may be another day."""
+        return any(
+            all({row[name] for row in rows if row[name]} <= {same[name]} for name in SAME)
+            and not rows[0]["reason"].startswith(NOT_INSTALLABLE)
+            for _, rows in self.own(engine, release)
+        )
+
+    def write(self, engine: str, release: str, rows: Iterable[Row], common: Row) -> Path | None:
+        """Write the rows of a release, in the place of earlier ones of this machine; None if these failed for the same reason.
+
+        Args:
+            engine: The engine.
+            release: Its release.
+            rows: The rows, some columns of which may be missing.
+            common: Columns that are the same in all rows.
+        """
+        blank = dict.fromkeys(TEXTS, "") | dict.fromkeys(NUMBERS, math.nan) | {"engine": engine, "release": release}
+        whole = [{**blank, **common, **row, "measured": date.today().isoformat()} for row in rows]
+        for row in whole:
+            row["profile"] = "" if not row["label"] else "default" if "profile=default" in row["label"] else "calibrated"
+        earlier = [one for one in self.own(engine, release) if all(one[1][0][name] == whole[0][name] for name in MACHINE)]
+        if any([row["reason"] for row in rows] == [whole[0]["reason"]] and not whole[0]["label"] for _, rows in earlier):
+            return None
+        content = io.BytesIO()
+        pq.write_table(pa.Table.from_pylist(whole, SCHEMA), content, compression="zstd", compression_level=19, store_schema=False)
+        path = self.folder / OWN / f"{engine}-{release}-{sha256(content.getvalue())[:HASH]}.parquet"
+        with written_whole(path) as unfinished:
+            unfinished.write_bytes(content.getvalue())
+        for old, _ in earlier:
+            if old != path:
+                old.unlink()
+        return path
+
+    def merge(self, places: Iterable[str]) -> list[str]:
+        """Add files that others sent, unless the record has them.
+
+        Args:
+            places: Files of a record, or folders that have some, at any depth.
+
+        Returns:
+            The names of the files that were added.
+
+        Raises:
+            DropspinError: A file is refused; none is added then.
+        """
+        sent = [stored(path) for place in places for path in _files(Path(place))]
+        known = {path.name for path in self.folder.rglob("*.parquet")}
+        for one in sent:
+            one.rows()
+        new = {one.path.name: one for one in sent if one.path.name not in known}
+        for name, one in new.items():
+            with written_whole(self.folder / OTHERS / name) as unfinished:
+                unfinished.write_bytes(one.content)
+        return list(new)
+
+
+def stored(path: Path) -> Stored:
+    """A file of the record whose content has the hash in its name.
+
+    Raises:
+        DropspinError: It is not such a file, or it was changed.
+    """
+    named = NAME.fullmatch(path.name)
+    if named is None:
+        raise DropspinError(f"{path.name}: refused: its name is not ENGINE-RELEASE-HASH.parquet, as dropspin record writes it.")
+    try:
+        content = read_stored(path.parent, path.name)
+    except (OSError, ValueError) as error:
+        raise DropspinError(f"{path.name}: cannot be read: {error}.") from None
+    if sha256(content)[:HASH] != named[3]:
+        raise DropspinError(f"{path.name}: refused: it was changed or damaged; its content does not have the hash in its name.")
+    return Stored(path, named[1], named[2], content)
+
+
+def _files(place: Path) -> list[Path]:
+    """The Parquet files of a place."""
+    found = sorted(place.rglob("*.parquet")) if place.is_dir() else [place]
+    if not found or not place.exists():
+        raise DropspinError(f"{place}: has no file of a record; give a folder that dropspin record wrote, or a file in it.")
+    return found
+
+
+def _verify(rows: Sequence[Row], named: Mapping[str, str]) -> None:
+    """Raise `ValueError` if a file has rows that no record has."""
+    keys = [tuple(row[name] for name in ("label", "scene", "dt", "metric")) for row in rows]
+    problems = {
+        "no rows": not rows,
+        "gaps": any(row[name] is None for row in rows for name in SCHEMA.names),
+        "another engine or release than its name": any(row[name] != given for row in rows for name, given in named.items()),
+        "rows of several machines, dates or plans": any(len({row[name] for row in rows}) > 1 for name in CONSTANT),
+        "two rows of one result": len(set(keys)) < len(keys),
+        "a verdict that dropspin does not have": not {row["verdict"] for row in rows} <= set(VERDICTS),
+        "a metric that dropspin does not have": not {row["metric"] for row in rows} <= {"", *METRICS},
+        "another unit than its metric": any(row["unit"] != METRICS[row["metric"]].unit for row in rows if row["metric"] in METRICS),
+        "a time step that is not above 0": any(not (row["dt"] > 0.0) and row["scene"] for row in rows),
+        "a label of another engine": any(row["label"].partition("[")[0] not in {"", row["engine"]} for row in rows),
+        "a trajectory that is no SHA-256": not all(SHA256.fullmatch(row["trajectory"]) for row in rows),
+        "text with control characters, or a path": any(
+            not row[name].isprintable() or without_paths(row[name]) != row[name] for row in rows for name in TEXTS
+        ),
+    }
+    if found := [problem for problem, is_one in problems.items() if is_one]:
+        raise ValueError(f"it has {found[0]}")
+    date.fromisoformat(rows[0]["measured"])

@@ -1,0 +1,45 @@
+"""`dropspin record`."""
+
+import click
+
+from reports.commands.interrupts import stop_if_interrupted
+from reports.commands.options import jobs_option, time_limit_option
+from reports.terminal.safe import echo
+
+
+@click.command("record")
+@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine of the record; repeat for more.")
+@click.option("--release", "releases", multiple=True, metavar="VERSION", help="A release; repeat for more. [default: all that pip finds]")
+@click.option("--merge", "sent", multiple=True, metavar="PATH", help="Add a record that somebody sent, a folder or a file; run nothing.")
+@click.option("-o", "--output", default="record", show_default=True, metavar="DIR", help="Folder of the record.")
+@jobs_option("releases")
+@time_limit_option(60.0, "an engine may use for one simulation")
+def record_command(
+    engines: tuple[str, ...], releases: tuple[str, ...], sent: tuple[str, ...], output: str, jobs: int | None, time_limit: float
+) -> None:
+    """Measure every release of each engine, in an environment of its own, and keep the results.
+
+    pip lists the releases and installs each into a temporary environment, in which the same scenes are run with the same settings. A
+    release that the record has already is not run again.
+    """
+    from comparisons.record.plan import load_plan
+    from comparisons.record.store import Record
+    from comparisons.record.study import Release, record
+    from comparisons.running.parallel import as_jobs
+
+    if sent and (engines or releases):
+        raise click.UsageError("--merge runs nothing; leave out --engine and --release.")
+    folder = Record(output)
+    if sent:
+        echo(f"{len(folder.merge(sent))} files added to {output}, as unsigned")
+        return
+
+    def on_done(one: Release, left: int) -> None:
+        stop_if_interrupted()
+        echo(f"{one.engine} {one.release}: {one.reason or f'{one.results} results'} ({left} left)", err=True)
+
+    try:
+        record(folder, load_plan(), engines, releases, jobs=as_jobs(jobs), time_limit=time_limit, on_done=on_done)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("finished releases are kept; the same command continues") from None
+    echo(f"Record: {output}")

@@ -1,0 +1,266 @@
+"""The record of releases: measured once, resumed, merged, and refused if changed. pip is replaced: no test needs a network."""
+
+import re
+import sys
+from pathlib import Path
+from threading import Event
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from support.cli import assert_refused, dropspin
+
+import dropspin as ds
+from comparisons.engines.registry import BUILT_IN
+from comparisons.record import environments, study
+from comparisons.record.environments import NotMeasured, measured, without_paths
+from comparisons.record.plan import Plan, load_plan
+from comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, machine
+from comparisons.results.stored_files import sha256
+from scenarios import DropspinError
+
+RELEASES = ["1.0", "1.1", "1.2"]
+PLAN = Plan.model_validate(
+    {
+        "dts": [0.01],
+        "scenes": ["spin-principal"],
+        "engines": {"document": {"package": "dropspin", "oldest": "1.0", "labels": ["document", "document[rotation=exact]"]}},
+    }
+)
+
+
+class Stub:
+    """Measures a release without an environment: the value is the release's number; some releases raise."""
+
+    def __init__(self):
+        self.asked, self.failures = [], {}
+
+    def __call__(self, plan, engine, release, time_limit, stopping):
+        self.asked.append(release)
+        if release in self.failures:
+            raise self.failures[release]
+        row = {"label": "document", "scene": "spin-principal", "dt": 0.01, "metric": "energy_error", "unit": "1", "verdict": "measured"}
+        return {"rows": [row | {"value": float(release), "reason": ""}], "versions": f"numpy {release}"}
+
+
+@pytest.fixture
+def stub(monkeypatch):
+    replaced = Stub()
+    monkeypatch.setattr(study, "measured", replaced)
+    monkeypatch.setattr(study, "releases", lambda package, oldest: RELEASES)
+    return replaced
+
+
+def record(folder, plan=PLAN, on_done=lambda one, left: None, **filters):
+    study.record(Record(folder), plan, jobs=1, time_limit=10.0, on_done=on_done, **filters)
+
+
+def table(folder):
+    return pd.read_parquet(folder).sort_values(["engine", "release", "processor"], ignore_index=True)
+
+
+def files(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_complete_release_is_not_measured_again(stub, tmp_path):
+    record(tmp_path, chosen=["1.1"])
+    before = files(tmp_path)
+    record(tmp_path)
+    assert stub.asked == ["1.1", "1.0", "1.2"]
+    assert before.items() <= files(tmp_path).items()
+    rows = table(tmp_path)
+    assert rows[["release", "value", "profile", "versions", "origin"]].to_numpy().tolist() == [
+        [release, float(release), "calibrated", f"numpy {release}", "own"] for release in RELEASES
+    ]
+    assert rows.loc[0, ["processor", "system", "python"]].to_dict() == machine()
+
+
+def test_a_changed_plan_is_measured_again_in_the_place_of_the_old(stub, tmp_path):
+    record(tmp_path)
+    record(tmp_path, PLAN.model_copy(update={"dts": (0.02,)}))
+    assert stub.asked == 2 * RELEASES
+    assert len(table(tmp_path)) == 3
+
+
+def test_an_interrupt_keeps_whole_files_and_the_next_call_continues(stub, tmp_path):
+    def interrupt(one, left):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        record(tmp_path, on_done=interrupt)
+    assert 1 <= len(table(tmp_path)) < 3
+    assert not list(tmp_path.rglob(".*"))
+    record(tmp_path)
+    assert sorted(stub.asked) == RELEASES
+    assert table(tmp_path)["release"].tolist() == RELEASES
+
+
+def test_a_release_that_fails_costs_its_own_row(stub, tmp_path):
+    stub.failures = {"1.0": NotMeasured("not installable: no wheel"), "1.1": NotMeasured("not runnable: exit code -11")}
+    record(tmp_path)
+    rows = table(tmp_path)
+    assert rows["verdict"].tolist() == ["missing", "broken", "measured"]
+    assert rows["reason"].tolist() == ["not installable: no wheel", "not runnable: exit code -11", ""]
+    before = files(tmp_path)
+    record(tmp_path)  # another day it may be installable
+    assert stub.asked == [*RELEASES, "1.0"]
+    assert files(tmp_path) == before
+    stub.failures = {}
+    record(tmp_path)
+    assert table(tmp_path)["verdict"].tolist() == ["measured", "broken", "measured"]
+
+
+def rewrite(path, **changes):
+    """Change a file of one row."""
+    row = pq.ParquetFile(path).read().to_pylist()[0] | changes
+    types = pa.schema([(field.name, pa.string() if isinstance(row[field.name], str) else field.type) for field in SCHEMA])
+    pq.write_table(pa.Table.from_pylist([row], types), path)
+
+
+@pytest.fixture
+def two_records(stub, tmp_path, monkeypatch):
+    """Of two machines."""
+    mine, sent = tmp_path / "mine", tmp_path / "sent"
+    record(mine)
+    monkeypatch.setattr(study, "machine", lambda: machine() | {"processor": "another"})
+    record(sent, chosen=["1.0", "1.2"])
+    return mine, sent
+
+
+def test_merging_loses_nothing_and_merging_twice_changes_nothing(two_records):
+    mine, sent = two_records
+    expected = sorted([*table(mine).drop(columns="origin").to_numpy().tolist(), *table(sent).drop(columns="origin").to_numpy().tolist()])
+    assert dropspin("record", "--merge", sent, "-o", mine, cwd=mine).stdout == f"2 files added to {mine}, as unsigned\n"
+    after = files(mine)
+    rows = table(mine)
+    assert sorted(rows.drop(columns="origin").to_numpy().tolist()) == expected
+    assert rows["origin"].tolist() == ["own", "unsigned", "own", "own", "unsigned"]
+    assert Record(mine).merge([str(sent), *map(str, sent.rglob("*.parquet"))]) == []
+    assert Record(sent).merge([str(mine)]) == sorted(path.name for path in (mine / OWN).iterdir())
+    assert files(mine) == after
+
+
+def test_a_changed_digit_is_refused_with_the_name_of_the_file(two_records):
+    mine, sent = two_records
+    path = max(sent.rglob("*.parquet"))
+    rewrite(path, value=1.2 + 4e-16)
+    before = files(mine)
+    assert_refused(dropspin("record", "--merge", sent, "-o", mine, cwd=mine), f"{path.name}: refused: it was changed")
+    assert files(mine) == before
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("value", "0.5", "other columns or types"),
+        ("unit", "m", "another unit"),
+        ("metric", "beauty", "a metric that dropspin does not have"),
+        ("verdict", "wonderful", "a verdict that dropspin does not have"),
+        ("dt", -0.01, "a time step that is not above 0"),
+        ("release", "1.3", "another engine or release than its name"),
+        ("reason", "cannot open /home/someone/engine.so", "a path"),
+        ("reason", "\x1b[2J", "control characters"),
+        ("trajectory", "12", "no SHA-256"),
+        ("label", "mujoco", "a label of another engine"),
+        ("measured", "yesterday", "isoformat"),
+    ],
+)
+def test_rows_that_no_record_has_are_refused(two_records, column, value, words):
+    """With the right hash in the name: whoever writes a file can compute it."""
+    mine, sent = two_records
+    path = max(sent.rglob("*.parquet"))
+    rewrite(path, **{column: value})
+    path = path.rename(path.with_name(f"document-1.2-{sha256(path.read_bytes())[:HASH]}.parquet"))
+    with pytest.raises(DropspinError, match=f"{re.escape(path.name)}: refused: .*{words}"):
+        Record(mine).merge([str(path)])
+    assert not (mine / OTHERS).exists()
+
+
+@pytest.mark.parametrize(("name", "words"), [("results.parquet", "its name is not"), ("absent", "no file of a record")])
+def test_what_is_no_record_is_refused(tmp_path, name, words):
+    (tmp_path / "results.parquet").touch()
+    assert_refused(dropspin("record", "--merge", name, cwd=tmp_path), words)
+
+
+def test_unknown_engines_and_releases_are_refused(stub, tmp_path):
+    assert_refused(dropspin("record", "-e", "mujoko", cwd=tmp_path), "mujoco")
+    assert_refused(dropspin("record", "-e", "mujoco", "--release", "0.9", cwd=tmp_path), "release '0.9'")
+    assert stub.asked == []
+
+
+def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_one(monkeypatch):
+    """The engine is dropspin's own, of which a package of another version is installed; the values are those of this process."""
+
+    def pip_writes(name):
+        def replaced(command, stopping):
+            if "pip" not in command:
+                return real(command, stopping)
+            python = Path(command[command.index("--python") + 1])
+            [packages] = python.parents[1].glob("[Ll]ib/**/site-packages")
+            (packages / f"{name}-9.9.dist-info").mkdir()
+            (packages / f"{name}-9.9.dist-info/METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 9.9\n")
+            return 0, ""
+
+        return replaced
+
+    real = environments.run
+    monkeypatch.setattr(environments, "run", pip_writes("dropspin"))
+    found = measured(PLAN, "document", "9.9", 60.0, Event())
+    motion = ds.simulate("spin-principal", "document", 0.01)
+    values = ds.measure("spin-principal", motion)
+    rows = [row for row in found["rows"] if row["label"] == "document"]
+    assert {row["metric"]: row["value"] for row in rows} == pytest.approx(values, rel=0.0, abs=0.0, nan_ok=True)
+    assert {row["trajectory"] for row in rows} == {sha256(motion.states.tobytes())}
+    assert found["versions"].startswith("dropspin 9.9, numpy ")
+    monkeypatch.setattr(environments, "run", pip_writes("another"))
+    with pytest.raises(NotMeasured, match=r"^not runnable: exit code 1: version .* is imported instead of 9\.9$"):
+        measured(PLAN, "document", "9.9", 60.0, Event())
+
+
+def test_pip_that_fails_is_named_with_its_error(monkeypatch, tmp_path):
+    monkeypatch.setattr(environments, "run", lambda command, stopping: (1, "ERROR: first\nERROR: No matching distribution\nsome advice\n"))
+    with pytest.raises(NotMeasured, match=r"^not installable: No matching distribution$"):
+        measured(PLAN, "document", "1.0", 60.0, Event())
+    with pytest.raises(DropspinError, match="pip cannot list the releases of dropspin: No matching distribution"):
+        environments.releases("dropspin", "1.0")
+
+
+def test_releases_are_those_from_the_oldest_on(monkeypatch):
+    output = "WARNING: experimental\nmujoco (4.0.0)\nAvailable versions: 4.0.0, 3.10.0, 3.9.0, 3.2.4, 3.2.3\n"
+    monkeypatch.setattr(environments, "run", lambda command, stopping: (0, output))
+    assert environments.releases("mujoco", "3.2.4") == ["3.2.4", "3.9.0", "3.10.0", "4.0.0"]
+    with pytest.raises(DropspinError, match="oldest release"):
+        environments.releases("mujoco", "3.2.0")
+
+
+def test_a_command_ends_when_the_work_stops():
+    stopping = Event()
+    stopping.set()
+    with pytest.raises(environments.Closed):
+        environments.run([sys.executable, "-c", "import time; time.sleep(60)"], stopping)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("cannot open /home/someone/env/lib/engine.so: no", "cannot open engine.so: no"),
+        (r"in C:\Users\someone\engine.dll", "in engine.dll"),
+        ("the unit is m/s, not kg/m/s²", "the unit is m/s, not kg/m/s²"),
+    ],
+)
+def test_paths_become_file_names(text, expected):
+    assert without_paths(text) == expected
+
+
+def test_the_plan_names_engines_with_canonical_labels():
+    plan = load_plan()
+    assert plan.engines.keys() <= BUILT_IN.keys()
+    for name in ("mujoco", "rapier", "dart", "drake"):
+        assert [ds.engine(label).label for label in plan.engines[name].labels] == list(plan.engines[name].labels)
+    assert plan.engines["mjx"].requirements("3.3.0") == ["mujoco-mjx==3.3.0", "mujoco==3.3.0"]
+    assert plan.engines["newton"].requirements("1.0.0") == ["newton[sim]==1.0.0"]
+    assert plan.engines["pybullet"].requirements("3.2.6") == ["pybullet==3.2.6", "numpy<2", "pandas<3"]
+    assert plan.engines["pybullet"].requirements("3.2.7") == ["pybullet==3.2.7"]
+    assert all(scene.steps(dt) * dt == pytest.approx(scene.duration, abs=dt) for scene in plan.loaded_scenes for dt in plan.dts)

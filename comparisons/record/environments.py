@@ -72,7 +72,7 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
             raise NotMeasured(f"{NOT_INSTALLABLE}: {without_paths(last_line(output))}")
         request, answer = Path(folder, "request.json"), Path(folder, "answer.json")
         asked = {"package": own.package, "release": release, "labels": own.labels, "time_limit": time_limit}
-        request.write_text(json.dumps(asked | {"scenes": plan.scenes, "dts": plan.dts}), encoding="utf-8")
+        request.write_text(json.dumps(asked | {"scenes": plan.scenes_of(engine), "dts": plan.dts}), encoding="utf-8")
         code, output = run([python, "-P", "-m", "comparisons.record.release", str(request), str(answer)], stopping)
         if code:
             raise NotMeasured(f"not runnable: exit code {code}: {without_paths(last_line(output))}")

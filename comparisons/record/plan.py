@@ -2,14 +2,13 @@
 
 import json
 from collections.abc import Mapping
-from functools import cached_property
 from pathlib import Path
 
 from pydantic import Field
 
 from comparisons.engines.mujoco_versions import numbers_of
 from comparisons.results.stored_files import sha256
-from scenarios import Scenario, load
+from scenarios import load
 from scenarios.body import Table
 from scenarios.loading import read_toml
 
@@ -28,6 +27,7 @@ class Releases(Table):
         oldest: The first release to measure.
         numpy_1_until: The last release that was compiled for NumPy 1, which does not work with NumPy 2; empty if all work.
         labels: The engine with each set of options.
+        scenes: Names of scenes, if they are not those of the plan.
     """
 
     package: str
@@ -36,6 +36,7 @@ class Releases(Table):
     oldest: str
     numpy_1_until: str = ""
     labels: tuple[str, ...]
+    scenes: tuple[str, ...] = ()
 
     def requirements(self, release: str) -> list[str]:
         """What pip installs for a release."""
@@ -57,14 +58,13 @@ class Plan(Table):
     scenes: tuple[str, ...]
     engines: Mapping[str, Releases]
 
-    @cached_property
-    def loaded_scenes(self) -> list[Scenario]:
-        """The scenes."""
-        return [load(name) for name in self.scenes]
+    def scenes_of(self, engine: str) -> tuple[str, ...]:
+        """The names of the scenes in which an engine is measured."""
+        return self.engines[engine].scenes or self.scenes
 
     def digest(self, engine: str) -> str:
         """A short hash of everything that is measured of each release of an engine."""
-        asked = [self.dts, [[scene.name, scene.digest] for scene in self.loaded_scenes], self.engines[engine].labels]
+        asked = [self.dts, [[name, load(name).digest] for name in self.scenes_of(engine)], self.engines[engine].labels]
         return sha256(json.dumps(asked).encode())[:12]
 
 

@@ -16,7 +16,7 @@ from comparisons.engines.registry import BUILT_IN
 from comparisons.record import environments, study
 from comparisons.record.environments import NotMeasured, measured, without_paths
 from comparisons.record.plan import Plan, load_plan
-from comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, machine
+from comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, Stored, machine
 from comparisons.results.stored_files import sha256
 from scenarios import DropspinError
 
@@ -263,4 +263,22 @@ def test_the_plan_names_engines_with_canonical_labels():
     assert plan.engines["newton"].requirements("1.0.0") == ["newton[sim]==1.0.0"]
     assert plan.engines["pybullet"].requirements("3.2.6") == ["pybullet==3.2.6", "numpy<2", "pandas<3"]
     assert plan.engines["pybullet"].requirements("3.2.7") == ["pybullet==3.2.7"]
-    assert all(scene.steps(dt) * dt == pytest.approx(scene.duration, abs=dt) for scene in plan.loaded_scenes for dt in plan.dts)
+    assert plan.scenes_of("mjx") == ("drop-ball", "spin-dzhanibekov")
+    assert plan.scenes_of("dart") == plan.scenes
+    assert len({plan.digest(name) for name in plan.engines}) == len(plan.engines)  # each loads its scenes
+
+
+def test_a_file_with_any_changed_byte_is_refused_or_read(two_records):
+    """With the right hash in the name, so that the reader of Parquet gets it."""
+    path = max(two_records[1].rglob("*.parquet"))
+    content, refused = path.read_bytes(), []
+    for place in range(0, len(content), max(1, len(content) // 100)):
+        changed = bytearray(content)
+        changed[place] ^= 0x55
+        name = f"document-1.2-{sha256(changed)[:HASH]}.parquet"
+        try:
+            Stored(Path(name), "document", "1.2", bytes(changed)).rows()
+        except DropspinError as error:
+            refused.append(str(error).startswith(f"{name}: refused: "))
+    assert len(refused) > 50
+    assert all(refused)

@@ -30,6 +30,8 @@ PERTURBATION = 16.0
 _FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
 SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
 """The signs of the perturbations: two random sets and their opposites."""
+SETS_OF_STARTS = 2
+"""Number of perturbations of many initial states at a time."""
 FEW_DRAWS = 10.0
 """Factor on the largest effect of a few perturbations, because others may have ten times the effect."""
 TRUTH_ACCURACY = 1e-12
@@ -68,7 +70,7 @@ def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> l
     if scene.floor is None or scene.starts_above_floor:
         return []
     # It rolls about its corner: perturbed by ulps of single precision it would slip, which is another motion.
-    return [[_moved(start, signs, np.float64) for start in starts] for signs in SIGNS[:2]]
+    return [[_moved(start, signs, np.float64) for start in starts] for signs in SIGNS[:SETS_OF_STARTS]]
 
 
 def _moved(scene: Scenario, signs: Array, precision: type) -> Scenario:

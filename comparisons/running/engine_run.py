@@ -109,12 +109,14 @@ class Timing(NamedTuple):
         compilation: What the first simulation took longer than later ones [s]; 0 for an engine that does not compile.
         breakdown: Why there is no time; None if there is one, or if the engine cannot take part or declines the scene.
         ended: Whether the engine's process ended.
+        in_batches: Whether the engine can step many starts together.
     """
 
     per_step: float = float("nan")
     compilation: float = 0.0
     breakdown: Breakdown | None = None
     ended: bool = False
+    in_batches: bool = False
 
 
 def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
@@ -127,7 +129,8 @@ def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
         least = min(time_steps(engine, scene, dt, steps).stepping for _ in range(TIMING_REPEATS))
     except Exception as error:  # whatever an engine raises costs its own row only
         return Timing(breakdown=classify(error))
-    return Timing(least / steps, 0.0 if first is None else max(first.building + first.stepping - least, 0.0))
+    compilation = 0.0 if first is None else max(first.building + first.stepping - least, 0.0)
+    return Timing(least / steps, compilation, in_batches=type(engine).prepare_batch is not Engine.prepare_batch)
 
 
 def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:

@@ -16,7 +16,7 @@ from comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from comparisons.results.measurement import Case, Measurement
 from comparisons.running.engine_run import EngineRun
 from comparisons.running.recording import Breakdown, divergence
-from comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES, StartPhase, start_phases
+from comparisons.running.start_phases import StartPhase, start_phases
 from scenarios import Scenario, Trajectory, Truth
 
 UNDECIDED_BY_STARTS = "not decided by the few starts of a quick run"
@@ -42,7 +42,7 @@ class Measured(NamedTuple):
 
 def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[Trajectory | None]]:
     """The start phases at a time step [s], and the exact motion from each at every step, as far as there is an exact solution."""
-    phases = start_phases(own.scene, own.truth, dt, QUICK_START_PHASES if own.quick else START_PHASES)
+    phases = start_phases(own.scene, own.truth, dt, quick=own.quick)
     times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
     return phases, [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
 

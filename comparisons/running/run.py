@@ -16,6 +16,7 @@ from comparisons.results.provenance import provenance
 from comparisons.results.results import Results, joined
 from comparisons.running.engine_run import Timing, time_engine
 from comparisons.running.entries import CONSTRUCTION, engine_entry
+from comparisons.running.forecast import Forecast, forecast
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.parallel import as_jobs, work_in_parallel
 from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
@@ -39,6 +40,7 @@ def run(
     done: Iterable[Results] = (),
     jobs: int | None = None,
     quick: bool = False,
+    on_forecast: Callable[[Forecast], None] | None = None,
 ) -> Results:
     """Run every scene with every engine at every time step, measure, and judge.
 
@@ -59,6 +61,7 @@ def run(
         quick: Whether to run few starts: 8 instead of 32 start phases, 16 members of an ensemble, and no perturbed starts in double
             precision. A check that the sampling noise may decide is `measured`, intervals are wider, and the results have no tolerances,
             so that `check` with a baseline, `accept`, `compare` and `history` refuse them.
+        on_forecast: Called once, when the steps are timed, with the time that the simulations will take.
 
     Returns:
         The measurements with their verdicts, predictions, agreements of engines, and the motions.
@@ -90,6 +93,8 @@ def run(
     with ExitStack() as stack:
         crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(number)]
         timings = _timings([own.scene for own in pending], entries, dts, crews[0], report)
+        if on_forecast is not None:
+            on_forecast(forecast(pending, entries, dts, timings, number))
 
         def of_scene(own: StartPhase, processes: EngineProcesses, _: Callable[[], None]) -> Results:
             return run_scene(own, entries, dts, processes, report, stamp, timings)

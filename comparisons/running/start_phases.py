@@ -23,12 +23,18 @@ class StartPhase(NamedTuple):
     quick: bool = False
 
 
-def start_phases(scene: Scenario, truth: Truth | None, dt: float, count: int = START_PHASES) -> list[StartPhase]:
-    """The scene from a number of starts that put its first impact at as many phases of a time step.
-
-    Only the scene itself if no impact comes after the first step, or if all are over in a tenth of its duration.
-    """
+def number_of_phases(own: StartPhase, dt: float) -> int:
+    """The number of start phases: 1 if no impact comes after the first step [s], or if all are over in a tenth of the duration."""
+    scene, truth, quick = own
     if truth is None or not truth.events or truth.events[0].time <= dt or truth.events[-1].time < REST_SHARE * scene.duration:
+        return 1
+    return QUICK_START_PHASES if quick else START_PHASES
+
+
+def start_phases(scene: Scenario, truth: Truth | None, dt: float, *, quick: bool = False) -> list[StartPhase]:
+    """The scene from starts that put its first impact at as many phases of a time step, or only the scene itself: `number_of_phases`."""
+    count = number_of_phases(StartPhase(scene, truth, quick), dt)
+    if truth is None or count == 1:
         return [StartPhase(scene, truth)]
     delays = (np.arange(count) + 0.5) / count * dt
     return [StartPhase(scene.starting_at(state), truth.after(delay)) for state, delay in zip(truth(delays).states, delays, strict=True)]

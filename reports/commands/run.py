@@ -4,6 +4,7 @@ import os
 import secrets
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -15,6 +16,7 @@ from reports.terminal.safe import echo
 if TYPE_CHECKING:
     from comparisons.regressions.checking import Checked
     from comparisons.results.results import Results
+    from comparisons.running.forecast import Forecast
     from comparisons.running.progress import Progress
     from reports.views.check import BaselineFile
     from scenarios import Scenario
@@ -141,16 +143,12 @@ def _run(
                     show_progress(progress)
 
                 resources = ResourceLimits(processor_time=time_limit)
-                keep = measured.keep
-                results = run(
-                    scenes, chosen, steps, on_progress=on_progress, resources=resources, keep=keep, done=earlier, jobs=jobs, quick=quick
-                )
+                work = partial(run, scenes, chosen, steps, resources=resources, done=earlier, jobs=jobs, quick=quick)
+                results = work(on_progress=on_progress, keep=measured.keep, on_forecast=_print_forecast)
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
                 echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)
-            asked = {**results.provenance["asked"], **drawn}
-            named = sorted({name.strip() for name in engines})
-            results = replace(results, provenance={**results.provenance, "asked": asked, "named": named})
+            results = _with_request(results, engines, drawn)
             if test_symmetries:
                 finest = min(steps)
                 results = with_symmetries(results, with_progress(scenes, chosen, finest, resources, jobs), finest)
@@ -164,6 +162,19 @@ def _run(
         raise KeyboardInterrupt(message) from None
     measured.clear()
     return results
+
+
+def _print_forecast(found: "Forecast") -> None:
+    from reports.views.run import forecast_sentence
+
+    if sentence := forecast_sentence(found):
+        echo(sentence, err=True)
+
+
+def _with_request(results: "Results", engines: tuple[str, ...], drawn: dict[str, int]) -> "Results":
+    """The results with what was named on the command line and drawn."""
+    asked = {**results.provenance["asked"], **drawn}
+    return replace(results, provenance={**results.provenance, "asked": asked, "named": sorted({name.strip() for name in engines})})
 
 
 def _checked(results: "Results", file: "BaselineFile | None", json_output: bool) -> "Checked":

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from comparisons.results.ensembles import QUICK_MEMBERS
 from comparisons.results.results import Results, Status
+from comparisons.running.forecast import Forecast
 from comparisons.running.measured import UNDECIDED_BY_STARTS
 from comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from reports.views.failures import Failure, failures, reproduce_drawn
@@ -58,3 +59,24 @@ def _quick(results: Results) -> list[str]:
         f"perturbed starts in double precision. {undecided} {'check is' if undecided == 1 else 'checks are'} not decided by so few starts; "
         "run again without --quick to decide more, and to compare or accept the results."
     ]
+
+
+WORTH_SAYING = 60.0
+"""Shortest run whose time is forecast on the terminal [s]."""
+MUCH_SHORTER = 0.5
+"""Share of the time of a run below which a quick run is mentioned."""
+
+
+def forecast_sentence(found: Forecast) -> str:
+    """The time that a run will take, with that of the engine that takes longest and of a quick run; empty if it is short."""
+    if found.seconds < WORTH_SAYING:
+        return ""
+    longest = max(found.by_engine, key=found.by_engine.__getitem__)
+    of_engine = f", of which {longest} {_minutes(found.by_engine[longest])}" if len(found.by_engine) > 1 else ""
+    of_quick = f"; --quick takes {_minutes(found.quick)}" if found.quick < MUCH_SHORTER * found.seconds else ""
+    processors = f"{found.jobs} {'processor' if found.jobs == 1 else 'processors'}"
+    return f"{_minutes(found.seconds)} on {processors}{of_engine}{of_quick}"
+
+
+def _minutes(seconds: float) -> str:
+    return "less than 1 min" if seconds < WORTH_SAYING else f"about {seconds / WORTH_SAYING:.0f} min"

@@ -10,7 +10,7 @@ from support.heavy_engines import CASES
 
 PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
 FINDING = re.compile(
-    r"^- .+: (?P<order>order of )?`(?P<name>[\w ]+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
+    r"^- .+: (?P<order>order of )?`(?P<name>[\w =]+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
     r"  `dropspin (?P<command>run .+)`$",
     re.MULTILINE,
 )

@@ -12,16 +12,8 @@ from pydrake.multibody.tree import QuaternionFloatingJoint, RotationalInertia, S
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from comparisons.engines.base import (
-    FLOOR_HALF_SIZE,
-    SEMI_IMPLICIT_EULER,
-    AsBuilt,
-    Diverged,
-    Engine,
-    Simulation,
-    refusal_of_floor,
-    version,
-)
+from comparisons.engines import base
+from comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
 from scenarios.body import Array
 from scenarios.model import Floor, Scenario
 from scenarios.state import ORIENTATION
@@ -54,7 +46,7 @@ class Drake(Engine):
     def discretisation(self, scene: Scenario) -> str | None:
         """Semi-implicit Euler without spin; else ω is as in MuJoCo's Euler, but a step turns by 2 atan(|ω| dt/2), as in Wang's method."""
         falls = scene.floor is None and scene.damping is None and not any(scene.start.angular_velocity)
-        return SEMI_IMPLICIT_EULER if falls else None
+        return base.SEMI_IMPLICIT_EULER if falls else None
 
     def declines(self, scene: Scenario) -> str | None:
         moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
@@ -62,7 +54,7 @@ class Drake(Engine):
             return "Drake damps a free joint's rotation with one coefficient; angular damping needs a body of equal moments of inertia"
         if scene.floor is not None and scene.floor.restitution > 0.0:
             return "Drake's contacts only dissipate; it has no coefficient of restitution"
-        return refusal_of_floor(scene, self.option("floor"))
+        return base.refusal_of_floor(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return DrakeSimulation(scene, dt, self.option("floor"), self.option("beside"))
@@ -143,6 +135,6 @@ def _floor(kind: str) -> tuple[RigidTransform, Shape]:
     """The pose and the shape of the floor."""
     if kind == "plane":
         return RigidTransform(RotationMatrix.MakeXRotation(-np.pi / 2)), HalfSpace()
-    half = np.full(3, FLOOR_HALF_SIZE)
+    half = np.full(3, base.FLOOR_HALF_SIZE)
     corners = half[:, np.newaxis] * np.array(list(product((-1.0, 1.0), repeat=3))).T
-    return RigidTransform([0.0, -FLOOR_HALF_SIZE, 0.0]), Box(2.0 * half) if kind == "box" else Convex(corners, "floor")
+    return RigidTransform([0.0, -base.FLOOR_HALF_SIZE, 0.0]), Box(2.0 * half) if kind == "box" else Convex(corners, "floor")

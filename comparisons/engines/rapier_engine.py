@@ -14,18 +14,8 @@ import numpy as np
 import rapier3d
 from scipy.spatial.transform import Rotation
 
-from comparisons.engines.base import (
-    FLOOR_HALF_SIZE,
-    Array,
-    AsBuilt,
-    Diverged,
-    Engine,
-    Simulation,
-    may_tumble,
-    refusal_of_floor,
-    refusal_of_shape,
-    version,
-)
+from comparisons.engines import base
+from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, version
 from comparisons.measuring.predictions import spins_steadily
 from scenarios import Scenario, truth_for
 from scenarios.body import Sphere
@@ -65,7 +55,7 @@ class Rapier(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         body, floor = scene.body, scene.floor
-        if (unfit := refusal_of_shape(scene) or refusal_of_floor(scene, self.option("floor"))) is not None or floor is None:
+        if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, self.option("floor"))) is not None or floor is None:
             return unfit
         if floor.rest_speed > 0.0:
             return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
@@ -96,7 +86,7 @@ class RapierSimulation(Simulation):
         parameters |= {"dt": dt, "normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
         for name, value in parameters.items():
             setattr(self._world.integration_parameters, name, rapier3d.SpringCoefficients(*value) if isinstance(value, tuple) else value)
-        gyroscopic = may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
+        gyroscopic = base.may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
         dynamics: dict[str, Any] = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic}
         for motion, rate in scene.damping.model_dump().items() if scene.damping else ():
             dynamics[f"{motion}_damping"] = float(np.expm1(rate * dt)) / dt
@@ -144,8 +134,8 @@ class RapierSimulation(Simulation):
 def _floor(kind: str, surface: Mapping[str, Any]) -> Any:
     """The collider of the floor."""
     if kind == "box":
-        return rapier3d.Collider.cuboid(FLOOR_HALF_SIZE, 1.0, FLOOR_HALF_SIZE, **surface).translation((0.0, -1.0, 0.0))
+        return rapier3d.Collider.cuboid(base.FLOOR_HALF_SIZE, 1.0, base.FLOOR_HALF_SIZE, **surface).translation((0.0, -1.0, 0.0))
     if kind == "mesh":
-        corners = [(x, 0.0, z) for x, z in product((-FLOOR_HALF_SIZE, FLOOR_HALF_SIZE), repeat=2)]
+        corners = [(x, 0.0, z) for x, z in product((-base.FLOOR_HALF_SIZE, base.FLOOR_HALF_SIZE), repeat=2)]
         return rapier3d.Collider.trimesh(corners, [(0, 1, 2), (2, 1, 3)], **surface)
     return rapier3d.Collider.halfspace((0.0, 1.0, 0.0), **surface)

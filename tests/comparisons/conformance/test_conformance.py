@@ -83,9 +83,9 @@ def test_shipped_engines_pass(name, noted):
 
 @pytest.mark.parametrize("name", ["rapier", "dart", "drake"])
 def test_third_party_adapters_are_short(name):
-    """An adapter takes less than 120 lines."""
+    """An adapter takes less than 150 lines, other representations of the floor and a heavy body far away included."""
     source = Path(sys.modules[type(engine(name)).__module__].__file__)
-    assert len(source.read_text(encoding="utf-8").splitlines()) < 120
+    assert len(source.read_text(encoding="utf-8").splitlines()) < 150
 
 
 def test_exact_engine_passes():

@@ -106,6 +106,10 @@ class Average(NamedTuple):
         """The change of the value if the impact of one start phase moves to the neighbouring time step; 0 for a single start."""
         return float(np.max(np.abs(self.parts) + self.jumps)) - abs(self.value)
 
+    def less_certain(self, factor: float) -> "Average":
+        """The same means with larger sampling noise."""
+        return self._replace(resolutions=factor * self.resolutions, jumps=factor * self.jumps)
+
     @property
     def noise(self) -> float:
         """The largest change of the value by the sampling noise of its parts, or of the impact of one start phase."""

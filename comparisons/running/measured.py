@@ -80,9 +80,10 @@ def measure(
     rows = [Measured(case.remark("limited", one.message)) for one in engine_run.limitations if not one.is_minor]
     for metric in metrics_for(scene, truth):
         average, judgement = _judge_metric(scene, truth, dt, engine_run.label, metric, cases)
-        if quick and len(cases) > 1:
-            judgement = _unless_noise_decides(judgement, scene, engine_run.label, dt, metric, average)
         components = None if np.isnan(average.value) else metric.average_components(cases)
+        if quick and len(cases) > 1:
+            average, components = average.less_certain(QUICK_NOISE), components and components.less_certain(QUICK_NOISE)
+            judgement = _unless_noise_decides(judgement, scene, engine_run.label, dt, metric, average)
         moved = float(np.max([abs(metric.value_or_nan(some) - average.value) for some in perturbed], initial=0.0))
         sampling_noise = FEW_DRAWS * moved if len(cases) == 1 else average.jump + moved
         allowed = tolerance(scene, metric.unit, engine_run.precision, case.steps, sampling_noise)
@@ -101,7 +102,7 @@ def measure(
 
 def _unless_noise_decides(judgement: Judgement, scene: Scenario, label: str, dt: float, metric: Metric, average: Average) -> Judgement:
     """A judgement of a mean over few start phases, unless a value within its sampling noise is judged otherwise: then it is undecided."""
-    noise = np.inf if metric.name in JUMPING else QUICK_NOISE * average.noise
+    noise = np.inf if metric.name in JUMPING else average.noise
     near = [bound for bound in (judgement.lower, judgement.upper) if abs(bound - average.value) <= noise]
     others = (judge(scene, label, dt, metric, value).verdict for value in (average.value - noise, average.value + noise, *near))
     if judgement.verdict not in ("passed", "failed", "known") or {judgement.verdict} >= set(others):

@@ -64,7 +64,9 @@ class Killed(made.Exact):
 def test_engine_that_ends_its_process_costs_its_own_rows_and_is_tried_once(monkeypatch):
     called = []
     run_engine = processes.EngineProcesses.run_engine
-    monkeypatch.setattr(processes.EngineProcesses, "run_engine", lambda *given: called.append(given[1].label) or run_engine(*given))
+    monkeypatch.setattr(
+        processes.EngineProcesses, "run_engine", lambda *given, **named: called.append(given[1].label) or run_engine(*given, **named)
+    )
     table = ds.run(["fall-spin", "spin-principal"], [Killed(), "document"], 0.01, jobs=2).table
     broken = table[table["verdict"] == "crashed"]
     assert list(zip(broken["scene"], broken["engine"], strict=True)) == [("fall-spin", "killed")]

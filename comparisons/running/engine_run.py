@@ -19,6 +19,8 @@ from comparisons.running.verification import verified_claims, verified_predictio
 from scenarios import Scenario, Trajectory, truth_for
 
 TIMING_REPEATS = 3
+LONG_ENOUGH = 1.0
+"""A simulation that takes this long is timed once [s]; other load disturbs it little, and a slow engine costs less."""
 
 
 @dataclass
@@ -126,7 +128,9 @@ def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
         if verified_refusal(engine.declines(scene)) is not None:
             return Timing()
         first = time_steps(engine, scene, dt, steps) if engine.compiles else None
-        least = min(time_steps(engine, scene, dt, steps).stepping for _ in range(TIMING_REPEATS))
+        least, repeats = time_steps(engine, scene, dt, steps).stepping, 1
+        while repeats < TIMING_REPEATS and least < LONG_ENOUGH:
+            least, repeats = min(least, time_steps(engine, scene, dt, steps).stepping), repeats + 1
     except Exception as error:  # whatever an engine raises costs its own row only
         return Timing(breakdown=classify(error))
     compilation = 0.0 if first is None else max(first.building + first.stepping - least, 0.0)

@@ -136,7 +136,7 @@ def _run(
             if not resume:
                 measured.clear()
             earlier = measured.parts()
-            with progress_bar(len(scenes), len(chosen) * len(steps)) as show_progress:
+            with progress_bar(len(scenes), len(chosen) * len(steps)) as (show_progress, show_line):
 
                 def on_progress(progress: "Progress") -> None:
                     stop_if_interrupted()
@@ -144,7 +144,7 @@ def _run(
 
                 resources = ResourceLimits(processor_time=time_limit)
                 work = partial(run, scenes, chosen, steps, resources=resources, done=earlier, jobs=jobs, quick=quick)
-                results = work(on_progress=on_progress, keep=measured.keep, on_forecast=_print_forecast)
+                results = work(on_progress=on_progress, keep=measured.keep, on_forecast=lambda found: _show_forecast(found, show_line))
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
                 echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)
@@ -164,11 +164,11 @@ def _run(
     return results
 
 
-def _print_forecast(found: "Forecast") -> None:
+def _show_forecast(found: "Forecast", show_line: "Callable[[str], None]") -> None:
     from reports.views.run import forecast_sentence
 
     if sentence := forecast_sentence(found):
-        echo(sentence, err=True)
+        show_line(sentence)
 
 
 def _with_request(results: "Results", engines: tuple[str, ...], drawn: dict[str, int]) -> "Results":

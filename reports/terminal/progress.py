@@ -10,13 +10,13 @@ from rich.progress import Progress as Bar
 from rich.text import Text
 
 from comparisons.running.progress import OnProgress, Progress
-from reports.terminal.safe import echo, safe
+from reports.terminal.safe import echo, safe, styled
 from reports.views.numbers import in_ms
 
 
 @contextmanager
-def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
-    """A progress bar of scenes on a terminal; elsewhere, a line for each scene with the elapsed time."""
+def progress_bar(scenes: int, pieces: int) -> Iterator[tuple[OnProgress, Callable[[str], None]]]:
+    """A progress bar of scenes on a terminal; elsewhere, a line for each scene with the elapsed time. Also a function to print a line."""
     console, start = Console(stderr=True), time.monotonic()
     if not console.is_terminal:
         seen: set[str] = set()
@@ -31,7 +31,7 @@ def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
                 elapsed = _duration(time.monotonic() - start)
                 echo(f"running {progress.scene} (scene {len(seen - {''})} of {scenes}, {elapsed} elapsed)", err=True)
 
-        yield line
+        yield line, lambda text: echo(text, err=True)
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console, transient=True) as bar:
@@ -44,7 +44,7 @@ def progress_bar(scenes: int, pieces: int) -> Iterator[OnProgress]:
             shares[progress.scene] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
             bar.update(task, completed=finished + sum(shares.values()), description=safe(_described(progress)))
 
-        yield advance
+        yield advance, lambda text: console.print(styled(text), soft_wrap=True)
 
 
 @contextmanager

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.engines.base import Engine
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import present_entry
 from comparisons.running.inputs import EngineEntry, verify_time_step
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.start_phases import START_PHASES
 from comparisons.running.verification import verified_refusal, verified_settings
 from scenarios import DropspinError, Scenario, load

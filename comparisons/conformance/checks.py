@@ -15,9 +15,10 @@ from comparisons.conformance.protocol import check_builds, check_claims, check_r
 from comparisons.conformance.symmetries import check_symmetries
 from comparisons.conformance.waiting import check_waiting
 from comparisons.engines.base import Diverged, Engine
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import present_entry
 from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.verification import BuildMismatch
 from scenarios.errors import UnknownName
 

@@ -9,9 +9,10 @@ from comparisons.published.printed import ABSENT, SHOWN, agreement
 from comparisons.published.quantities import quantity
 from comparisons.published.results import Result, compared
 from comparisons.published.sources import Case, Group, Source, sources
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, ignore
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import Breakdown, divergence, try_record
 from scenarios import Scenario
 

@@ -12,9 +12,10 @@ from comparisons.engines.stand_in import code_of
 from comparisons.measuring.metrics import METRICS
 from comparisons.results.provenance import STAMPED
 from comparisons.results.stored_files import sha256
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import Breakdown, Recording, divergence, try_record
 from comparisons.running.run import measure
 from scenarios import Scenario, load

@@ -12,8 +12,9 @@ from comparisons.robustness.axes import Axis
 from comparisons.robustness.failure_modes import SOUND, Diagnosis, ExtendedMotion, FailureMode, clamped, diagnose, held_speeds, worst
 from comparisons.robustness.operating_point import OperatingPoint
 from comparisons.robustness.transformations import in_nominal_units
+from comparisons.running.engine_process import Failed
 from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, Failed
+from comparisons.running.processes import EngineProcesses
 from comparisons.running.recording import Breakdown, Recording, try_record
 from comparisons.running.start_phases import start_phases
 from scenarios import DropspinError, Scenario, Trajectory, truth_for

@@ -7,8 +7,9 @@ from comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from comparisons.engines.registry import engine as engine_named
 from comparisons.engines.registry import is_foreign, parsed
 from comparisons.engines.stand_in import Traits, stand_in, traits
+from comparisons.running.engine_process import Failed
 from comparisons.running.inputs import EngineEntry, described_value
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from scenarios import DropspinError
 
 CONSTRUCTION = ResourceLimits(processor_time=60.0)

@@ -7,28 +7,23 @@ piece of work; each leads a process group, with which the engine's own children 
 """
 
 import ctypes
-import faulthandler
 import os
 import signal
-import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as OutOfTime
 from concurrent.futures import wait
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar, TypeVarTuple
+from typing import Self, TypeVar, TypeVarTuple
 
 from pebble import ProcessExpired, ProcessPool
 
-from comparisons.engines.adapter_code import adapter_code
-from comparisons.engines.base import EngineBroken
 from comparisons.engines.exceptions import described
-from comparisons.engines.registry import constructed
-from comparisons.engines.stand_in import StandIn
 from comparisons.judging.verdicts import Verdict
+from comparisons.running.engine_process import Failed, call, run_and_count, start_process
 from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.progress import OnSimulations
@@ -70,17 +65,6 @@ class ResourceLimits:
         for name, value, most in (("processor_time", self.processor_time, MOST_SECONDS), ("memory", self.memory, MOST_BYTES)):
             if not 0.0 < value <= most:
                 raise DropspinError(f"{name}: got {value:g}; give a number above 0 and at most {most:g}.")
-
-
-class Failed(Exception):
-    """Work that did not finish: the verdict and the reason."""
-
-    def __init__(self, verdict: Verdict, reason: str) -> None:
-        super().__init__(verdict, reason)
-        self.verdict, self.reason = verdict, reason
-
-    def __str__(self) -> str:
-        return self.reason
 
 
 class Closed(Exception):
@@ -128,7 +112,7 @@ class EngineProcesses:
             return run_engine(entry, scene, dt, starts)
         try:
             counts = self._counts
-            return self.call(entry, _run_engine, scene, dt, starts, quick, while_waiting=lambda: on_simulations(*counts[entry.label]))
+            return self.call(entry, run_and_count, scene, dt, starts, quick, while_waiting=lambda: on_simulations(*counts[entry.label]))
         except Failed as failure:
             return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
 
@@ -166,7 +150,7 @@ class EngineProcesses:
         self._processes[entry.label].value = 0
         self._counts[entry.label][:] = [0, 0]
         allowed = self._resources.processor_time + (COMPILATION if entry.engine is not None and entry.engine.compiles else 0.0)
-        task = self._pools[entry.label].schedule(_call, args=[work, given, allowed], timeout=WALL_TIME_FACTOR * allowed)
+        task = self._pools[entry.label].schedule(call, args=[work, given, allowed], timeout=WALL_TIME_FACTOR * allowed)
         largest = 0
         try:
             while not wait([task], timeout=POLL).done:
@@ -229,7 +213,7 @@ class EngineProcesses:
         self._processes[entry.label] = process = context.RawValue("l", 0)
         self._counts[entry.label] = counts = context.RawArray("l", 2)
         shared = [entry, self._resources.memory, process, counts]
-        return ProcessPool(max_workers=1, initializer=_start_process, initargs=shared, context=context)
+        return ProcessPool(max_workers=1, initializer=start_process, initargs=shared, context=context)
 
     def __enter__(self) -> Self:
         return self
@@ -255,86 +239,3 @@ def _verdict(exit_code: int | None, allowed: float) -> tuple[Verdict, str]:
     if exit_code is not None and exit_code < 0:
         return "crashed", f"its process was ended by {signal.Signals(-exit_code).name}"
     return "crashed", f"its process ended with exit code {exit_code}"
-
-
-_busy: list["ctypes.c_long"] = []
-"""The shared number in which this process, the leader of its group, writes its process id while it works."""
-_counts: list["ctypes.Array[ctypes.c_long]"] = []
-"""The shared numbers of simulations that this process has done and is to do."""
-_entry: list[EngineEntry] = []
-"""The engine of this process; empty in the parent."""
-
-
-def _run_engine(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool) -> EngineRun:
-    """Run a scene with an engine in this process, and share the numbers of simulations with the parent."""
-
-    def on_simulations(done: int, total: int) -> None:
-        _counts[0][:] = [done, total]
-
-    return run_engine(entry, scene, dt, starts, on_simulations, quick=quick)
-
-
-def _start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", counts: "ctypes.Array[ctypes.c_long]") -> None:
-    """Start a process: drop its output, leave interrupts to the parent, limit its memory."""
-    _entry.append(entry)
-    _busy.append(process)
-    _counts.append(counts)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, even if the parent handles its own
-    faulthandler.disable()
-    if hasattr(os, "setpgid"):
-        os.setpgid(0, 0)
-    null = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
-    for stream in (1, 2):
-        os.dup2(null.fileno(), stream)
-    sys.stdout = sys.stderr = null
-    if sys.platform == "linux":
-        import resource
-
-        _end_with_parent()
-        with open("/proc/self/statm", encoding="ascii") as file:
-            taken = int(file.read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
-
-
-PR_SET_PDEATHSIG = 1
-
-
-def _end_with_parent() -> None:
-    """Have the system end this process when its parent is killed: the processes of several engines would wait for each other."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def _call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
-    _busy[0].value = os.getpgrp() if hasattr(os, "getpgrp") else os.getpid()  # not a child that the engine forked
-    if sys.platform == "linux":
-        import resource
-
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        until = int(used.ru_utime + used.ru_stime + processor_time) + 1
-        resource.setrlimit(resource.RLIMIT_CPU, (until, resource.RLIM_INFINITY))
-    try:
-        if not _entry[0].absence:
-            _entry[0] = _constructed(_entry[0])
-        return work(_entry[0], *given)
-    except BaseException as error:  # an engine is somebody else's code; sys.exit() or an interrupt that it raises is not the user's
-        raise Failed("crashed", described(error)) from None
-
-
-def _constructed(entry: EngineEntry) -> EngineEntry:
-    """An entry with its engine in place of a stand-in; the working directory comes last on Python's path, after all that is installed.
-
-    Raises:
-        EngineBroken: The engine cannot be imported or constructed, or its code has changed since it was described.
-    """
-    if entry.engine is not None and not isinstance(entry.engine, StandIn):
-        return entry
-    if (here := os.getcwd()) not in sys.path:
-        sys.path.append(here)
-    if entry.engine is None:
-        return entry
-    known, before = entry.engine.traits, frozenset(sys.modules)
-    engine = constructed(known.source, entry.engine.options)
-    if adapter_code(type(engine), frozenset(sys.modules) - before) != known.code:
-        raise EngineBroken(f"the code of {known.source} has changed since the command began; give the command again")
-    return replace(entry, engine=engine)

@@ -14,12 +14,13 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
 from comparisons.results.provenance import provenance
 from comparisons.results.results import Results, joined
+from comparisons.running.engine_process import Failed
 from comparisons.running.engine_run import Timing, time_engine
 from comparisons.running.entries import CONSTRUCTION, engine_entry
 from comparisons.running.forecast import Forecast, forecast
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.parallel import as_jobs, work_in_parallel
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.progress import OnProgress, Progress
 from comparisons.running.recording import Breakdown
 from comparisons.running.scene_run import Timings, run_scene

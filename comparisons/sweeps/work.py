@@ -13,8 +13,9 @@ import pyarrow as pa
 from comparisons.engines.document import Document
 from comparisons.engines.stand_in import code_of
 from comparisons.results.provenance import code, provenance, versions
+from comparisons.running.engine_process import Failed
 from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import Breakdown
 from comparisons.sweeps.dispatch import run_jobs
 from comparisons.sweeps.folder import PARTS_PER_FOLDER, SweepFolder

@@ -13,10 +13,11 @@ from comparisons.judging.verdicts import Verdict
 from comparisons.measuring.differences import differences
 from comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
 from comparisons.measuring.tolerances import perturbed
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
 from comparisons.running.parallel import results_in_parallel, started_crews
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import Breakdown, classify, divergence, record_batch, try_record
 from comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
 from reference_impl.threads import usable_cores

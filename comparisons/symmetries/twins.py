@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from comparisons.engines.base import Engine
 from comparisons.measuring.differences import differences
 from comparisons.measuring.motions import Motions
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import Breakdown
 from comparisons.symmetries.findings import Effects, Finding, Status, judged
 from comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of

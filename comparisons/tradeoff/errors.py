@@ -14,8 +14,9 @@ import numpy as np
 from comparisons.engines.base import Diverged
 from comparisons.measuring.comparison import Comparison, Unresolved
 from comparisons.measuring.metrics import METRICS
+from comparisons.running.engine_process import Failed
 from comparisons.running.inputs import MOST_STEPS, EngineEntry
-from comparisons.running.processes import EngineProcesses, Failed
+from comparisons.running.processes import EngineProcesses
 from comparisons.running.recording import record
 from comparisons.running.start_phases import StartPhase, start_phases
 from comparisons.running.verification import verified_refusal

@@ -13,10 +13,11 @@ import numpy as np
 
 from comparisons.engines.base import Engine
 from comparisons.measuring.metrics import leading_metric, metrics_for
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
 from comparisons.running.parallel import as_jobs, results_in_parallel
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps
 from comparisons.tradeoff.ladder import Ladder

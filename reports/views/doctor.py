@@ -4,9 +4,10 @@ import sys
 from collections.abc import Sequence
 
 from comparisons.results.provenance import processor, versions
+from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import simulate
 from scenarios import DropspinError, load
 

@@ -59,9 +59,10 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     Raises:
         DropspinError: The engine cannot run, or breaks down while it builds the scene.
     """
+    from comparisons.running.engine_process import Failed
     from comparisons.running.entries import present_entry
     from comparisons.running.inputs import verify_time_step
-    from comparisons.running.processes import EngineProcesses, Failed, ResourceLimits
+    from comparisons.running.processes import EngineProcesses, ResourceLimits
 
     verify_time_step(scene, dt)
     entry = present_entry(engine_name)

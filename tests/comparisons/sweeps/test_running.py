@@ -19,7 +19,8 @@ import pytest
 from support import engines as test_engines
 
 from comparisons.engines.base import Diverged
-from comparisons.running.processes import Closed, Failed, ResourceLimits
+from comparisons.running.engine_process import Failed
+from comparisons.running.processes import Closed, ResourceLimits
 from comparisons.sweeps.running import read_sweep, run_sweep
 from comparisons.sweeps.spec import load_sweep
 from comparisons.sweeps.work import Work

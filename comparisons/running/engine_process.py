@@ -1,0 +1,122 @@
+"""What runs in an engine's process: the start of the process, and calls of functions with the engine.
+
+The process drops the output of the engine, leaves interrupts to its parent, and ends when it exceeds its limits or its parent ends.
+"""
+
+import ctypes
+import faulthandler
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from comparisons.engines.adapter_code import adapter_code
+from comparisons.engines.base import EngineBroken
+from comparisons.engines.exceptions import described
+from comparisons.engines.registry import constructed
+from comparisons.engines.stand_in import StandIn
+from comparisons.judging.verdicts import Verdict
+from comparisons.running.engine_run import EngineRun, run_engine
+from comparisons.running.inputs import EngineEntry
+from scenarios import Scenario
+
+
+class Failed(Exception):
+    """Work that did not finish: the verdict and the reason."""
+
+    def __init__(self, verdict: Verdict, reason: str) -> None:
+        super().__init__(verdict, reason)
+        self.verdict, self.reason = verdict, reason
+
+    def __str__(self) -> str:
+        return self.reason
+
+
+_busy: list["ctypes.c_long"] = []
+"""The shared number in which this process, the leader of its group, writes its process id while it works."""
+_counts: list["ctypes.Array[ctypes.c_long]"] = []
+"""The shared numbers of simulations that this process has done and is to do."""
+_entry: list[EngineEntry] = []
+"""The engine of this process; empty in the parent."""
+
+
+def run_and_count(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool) -> EngineRun:
+    """Run a scene with an engine in this process, and share the numbers of simulations with the parent."""
+
+    def on_simulations(done: int, total: int) -> None:
+        _counts[0][:] = [done, total]
+
+    return run_engine(entry, scene, dt, starts, on_simulations, quick=quick)
+
+
+def start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", counts: "ctypes.Array[ctypes.c_long]") -> None:
+    """Start a process: drop its output, leave interrupts to the parent, limit its memory."""
+    _entry.append(entry)
+    _busy.append(process)
+    _counts.append(counts)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, even if the parent handles its own
+    faulthandler.disable()
+    if hasattr(os, "setpgid"):
+        os.setpgid(0, 0)
+    null = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - as long as the process lives
+    for stream in (1, 2):
+        os.dup2(null.fileno(), stream)
+    sys.stdout = sys.stderr = null
+    if sys.platform == "linux":
+        import resource
+
+        _end_with_parent()
+        with open("/proc/self/statm", encoding="ascii") as file:
+            taken = int(file.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
+
+
+PR_SET_PDEATHSIG = 1
+
+
+def _end_with_parent() -> None:
+    """Have the system end this process when its parent is killed: the processes of several engines would wait for each other."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
+    """Call a function with this process's engine, within a limit of processor time [s].
+
+    Raises:
+        Failed: The engine cannot be constructed, or the function raised.
+    """
+    _busy[0].value = os.getpgrp() if hasattr(os, "getpgrp") else os.getpid()  # not a child that the engine forked
+    if sys.platform == "linux":
+        import resource
+
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        until = int(used.ru_utime + used.ru_stime + processor_time) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (until, resource.RLIM_INFINITY))
+    try:
+        if not _entry[0].absence:
+            _entry[0] = _constructed(_entry[0])
+        return work(_entry[0], *given)
+    except BaseException as error:  # an engine is somebody else's code; sys.exit() or an interrupt that it raises is not the user's
+        raise Failed("crashed", described(error)) from None
+
+
+def _constructed(entry: EngineEntry) -> EngineEntry:
+    """An entry with its engine in place of a stand-in; the working directory comes last on Python's path, after all that is installed.
+
+    Raises:
+        EngineBroken: The engine cannot be imported or constructed, or its code has changed since it was described.
+    """
+    if entry.engine is not None and not isinstance(entry.engine, StandIn):
+        return entry
+    if (here := os.getcwd()) not in sys.path:
+        sys.path.append(here)
+    if entry.engine is None:
+        return entry
+    known, before = entry.engine.traits, frozenset(sys.modules)
+    engine = constructed(known.source, entry.engine.options)
+    if adapter_code(type(engine), frozenset(sys.modules) - before) != known.code:
+        raise EngineBroken(f"the code of {known.source} has changed since the command began; give the command again")
+    return replace(entry, engine=engine)

@@ -1,8 +1,8 @@
 """The study of the command `dropspin twins`: from which time step on engines that should give the same motion differ, and by how much.
 
 Twins are engines that state the same algorithm, such as one engine on a processor and its port to a GPU. No exact solution is needed. As
-for symmetries, a difference is attributed to rounding as long as perturbations of the initial state by a few ulp explain it; they are
-those of the engine of lower precision.
+for symmetries, a difference is attributed to rounding as long as perturbations of the initial state by a few ulp have as large an effect
+in one of the two engines.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -108,6 +108,9 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
         [entry] = [one for one in entries if one.label == label]
         return processes.call(entry, _effects, scene, dt)
 
+    def effects_of_both(label: str, other: str) -> list[Array]:
+        return effects(label) + effects(other)
+
     found = []
     for (entry, own), (twin, other) in combinations(motions, 2):
         broken = {one.label: motion for one, motion in ((entry, own), (twin, other)) if isinstance(motion, Breakdown)}
@@ -116,8 +119,8 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
             reasons = [f"{label}: {one.reason.removesuffix('.')}" for label, one in broken.items()]
             found.append(replace(none, reason="; ".join(reasons)))
         else:
-            coarser, precision = max((entry, own[1]), (twin, other[1]), key=lambda one: float(np.finfo(one[1]).eps))
-            found.append(_compared(none, scene, dt, (own[0], other[0]), partial(effects, coarser.label), precision))
+            coarser = max(own[1], other[1], key=lambda precision: float(np.finfo(precision).eps))
+            found.append(_compared(none, scene, dt, (own[0], other[0]), partial(effects_of_both, entry.label, twin.label), coarser))
     return found
 
 

@@ -88,7 +88,11 @@ def test_page_on_choosing_a_step_shows_the_output_of_its_commands(tmp_path):
 
 def test_every_finding_on_the_page_on_engines_has_a_value_and_a_command():
     text = PAGE.read_text(encoding="utf-8")
-    assert sum(map(len, findings().values())) == len(re.findall("^- ", text, re.MULTILINE)) == text.count("`dropspin run ")
+    assert (
+        sum(map(len, findings().values()))
+        == len(re.findall("^- ", text, re.MULTILINE))
+        == len(re.findall("`dropspin (?:run|twins) ", text))
+    )
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from support.heavy_engines import CASES
 PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
 FINDING = re.compile(
     r"^- .+: (?P<order>order of )?`(?P<name>[\w =]+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
-    r"  `dropspin (?P<command>run .+)`$",
+    r"  `dropspin (?P<command>(?:run|twins) .+)`$",
     re.MULTILINE,
 )
 
@@ -31,8 +31,19 @@ def heavy_engine(command):
     return "".join(named & CASES.keys())
 
 
+def verify_twins(command, folder, run):
+    """Run a command that compares two engines."""
+    [found] = json.loads(run(*shlex.split(command), "--json", cwd=folder).stdout)
+    for row in findings()[command]:
+        measured = found[row["name"].replace(" ", "_")]
+        assert measured < float(row["value"]) if row["relation"] else float(f"{measured:.1e}") == float(row["value"])
+
+
 def verify_findings(command, folder, run=cli.dropspin):
     """Run a command: it measures the printed digits, at the finest time step or as dt → 0. A word is a verdict."""
+    if command.startswith("twins"):
+        verify_twins(command, folder, run)
+        return
     results = json.loads(run(*shlex.split(command), "--json", "-o", "out", cwd=folder).stdout)
     finest = min((one["dt"] for one in results if one["dt"]), default=None)
     for row in findings()[command]:

@@ -8,7 +8,7 @@ PYTHON ?= $(shell for python in python3.11 python3; do "$$python" $(IS_NEW) 2> /
 # Extras that are too large for the environment of `make test`, or exclude one another: each is tested in its own environment.
 HEAVY_ENGINES := mjx mujoco-warp newton sapien exudyn jsbsim
 
-.PHONY: report test test-browser test-engines test-all fuzz faults coverage bench examples docs lint clean
+.PHONY: report test test-browser test-engines test-all fuzz faults coverage bench examples docs site lint clean
 
 report: $(VENV)/.installed            ## set up, run the core catalogue, say where the report is
 	$(BIN)/dropspin run
@@ -47,6 +47,10 @@ examples: $(VENV)/.installed         ## the pictures of docs/examples.md, each b
 
 docs: $(VENV)/.installed-dev          ## the documentation, links within it checked: out/site/index.html
 	$(BIN)/python -m sphinx -q -W --keep-going docs out/site
+
+site: $(VENV)/.installed-dev          ## the documentation with the pages of the record in record/: out/site/releases/index.html
+	$(BIN)/python -m sphinx -q -W --keep-going -t releases docs out/site
+	$(BIN)/dropspin publish record -o out/site/releases
 
 lint: $(VENV)/.installed-dev          ## style, types, import contracts
 	$(BIN)/ruff check .

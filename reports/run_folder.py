@@ -2,8 +2,8 @@
 
 import os
 import shutil
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 from comparisons.results.output import OLD, unfinished_folder
@@ -67,17 +67,27 @@ def _write_plots(results: Results, folder: Path, kinds: Collection[str]) -> None
                 {"svg": save_svg, "png": save_png}[kind](figure_of(charts), folder / f"{number:02d}-{name}.{kind}")
 
 
+def run_folder(folder: str | Path) -> AbstractContextManager[Path]:
+    """`replaced_folder` for a run."""
+    return replaced_folder(folder, _files_of_run, "run")
+
+
 @contextmanager
-def run_folder(folder: str | Path) -> Iterator[Path]:
+def replaced_folder(folder: str | Path, ours: Callable[[Path], set[str]], command: str) -> Iterator[Path]:
     """An empty temporary folder, which replaces the requested folder if the block succeeds, and is deleted otherwise.
 
+    Args:
+        folder: The requested folder.
+        ours: The paths, within a folder, that the command wrote there.
+        command: The command.
+
     Raises:
-        DropspinError: The requested folder holds files that are not of a run, or cannot be written; raised on entering the block.
+        DropspinError: The requested folder holds files that are not of the command, or cannot be written; raised on entering the block.
     """
     target = Path(os.path.realpath(folder))
     made = []
     try:
-        _assert_replaceable(folder, target)
+        _assert_replaceable(folder, target, ours, command)
         made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
         with unfinished_folder(target.parent, target.name) as unfinished:
@@ -86,14 +96,14 @@ def run_folder(folder: str | Path) -> Iterator[Path]:
             if target.exists():
                 new.chmod(target.stat().st_mode)
             yield new
-            _assert_replaceable(folder, target)
+            _assert_replaceable(folder, target, ours, command)
             _swap(new, target, unfinished / OLD)
     except OSError as error:
         unchanged = "the folder is unchanged" if target.is_dir() else "choose another folder"
         raise DropspinError(f"{folder}: cannot be written: {error.strerror or error}; {unchanged}.") from error
     finally:
         for parent in made:
-            with suppress(OSError):  # it holds the run, or other files
+            with suppress(OSError):  # it holds the output, or other files
                 parent.rmdir()
 
 
@@ -144,19 +154,20 @@ def _swap(new: Path, target: Path, old: Path) -> None:
         raise
 
 
-def _assert_replaceable(given: str | Path, target: Path) -> None:
-    """Raise `DropspinError` if writing a run there would delete files that are not of a run."""
+def _assert_replaceable(given: str | Path, target: Path, ours: Callable[[Path], set[str]], command: str) -> None:
+    """Raise `DropspinError` if writing an output there would delete files that are not of the command."""
     if not target.exists():
         return
     if not target.is_dir():
         raise DropspinError(f"{given}: this is a file; choose a folder.")
     if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
         raise DropspinError(f"{given}: the working directory and mount points cannot be replaced; choose a folder inside it.")
-    known = _files_of_run(target)
+    known = ours(target)
     strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
     if strangers:
         raise DropspinError(
-            f"{given}: has files that dropspin run did not write, such as {strangers[0]!r}; move them, or choose an empty or new folder."
+            f"{given}: has files that dropspin {command} did not write, such as {strangers[0]!r}; "
+            "move them, or choose an empty or new folder."
         )
 
 

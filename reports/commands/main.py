@@ -22,6 +22,7 @@ COMMANDS = {
     "limits": "Find where engines break down.",
     "list": "List the scenes, the engines or the metrics.",
     "new-adapter": "Write a working adapter, to change into that of your engine.",
+    "publish": "Write the record of releases as a site.",
     "record": "Measure every release of each engine.",
     "replay": "Show the motions of a run in 3D.",
     "report": "Write the report of a run again.",

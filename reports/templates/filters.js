@@ -1,8 +1,8 @@
 // Filters of the report: they hide elements of scenes and engines that are not selected, and the lines of these engines in plots.
 "use strict";
 (() => {
-  const form = document.getElementById("filters"), total = document.querySelectorAll("#scenes > details").length;
-  const cells = [...document.querySelectorAll("#matrix td[data-status]")];
+  const form = document.getElementById("filters"), cells = [...document.querySelectorAll("#matrix td[data-status]")];
+  const total = new Set(cells.map((cell) => cell.parentElement.dataset.scene)).size;
 
   const apply = () => {
     const engines = new Set([...form.querySelectorAll("[name=engine]:checked")].map((box) => box.value));

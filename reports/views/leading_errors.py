@@ -51,7 +51,7 @@ def leading_errors(results: Results) -> dict[str, Leading]:
         least = [engine for engine, size in sizes.items() if (engine in rounded if rounded else size <= 1.01 * values.min())]
         unit = METRICS[metric].unit
         of = scale(scene, unit)
-        levels = {engine: _level(size / of) for engine, size in sizes.items()}
+        levels = {engine: level(size / of) for engine, size in sizes.items()}
         found[name] = Leading(name, metric, unit, dt, of, sizes, levels, least)
     return found
 
@@ -68,7 +68,7 @@ def step_times(results: Results) -> dict[str, float]:
     return {engine: float(means.get(engine, math.nan)) for engine in results.engines}
 
 
-def _level(error: float) -> int | None:
+def level(error: float) -> int | None:
     """The decade of a relative error, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1)."""
     if math.isnan(error):
         return None

@@ -1,0 +1,28 @@
+"""`dropspin publish`."""
+
+import os
+from pathlib import Path
+
+import click
+
+from reports.terminal.safe import echo
+
+
+@click.command("publish")
+@click.argument("record", default="record")
+@click.option("-o", "--output", default="out/site-record", show_default=True, metavar="DIR", help="Folder of the site.")
+def publish_command(record: str, output: str) -> None:
+    """Write a record as a site: which release of which engine changed what.
+
+    RECORD is the folder that dropspin record wrote. The site needs no server and no network. In a folder of the documentation's site, it
+    links to the documentation.
+    """
+    from comparisons.record.findings import read
+    from reports.html.record import INDEX, Site, files_of_site
+    from reports.run_folder import replaced_folder
+
+    found = read(record)
+    docs = "../" if (Path(output).resolve().parent / "problems.html").is_file() else ""
+    with replaced_folder(output, files_of_site, "publish") as folder:
+        Site(found, docs).write(folder)
+    echo(f"Site: {os.path.join(output, INDEX)}")

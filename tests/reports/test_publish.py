@@ -1,0 +1,145 @@
+"""The site of a record: its pages, links and badges, and the folder that it replaces."""
+
+import json
+import re
+from html.parser import HTMLParser
+from itertools import product
+
+import pytest
+from support.cli import assert_refused, dropspin
+
+from comparisons.record.store import Record, machine
+from scenarios import load
+
+HOSTILE = "<img src=x onerror=alert(1)>"
+SCENES = {"spin-asymmetric": ("orientation_error", "rad"), "drop-ball": ("bounce_height_error", "1")}
+
+
+def rows(label, value, declined=()):
+    """The rows of a label, whose errors are `value` times the time step."""
+    motion = f"{int(value * 1e3):064x}"
+    for (scene, (metric, unit)), dt in product(SCENES.items(), (0.004, 0.001)):
+        case = {"label": label, "scene": scene, "scene_digest": load(scene).digest, "dt": dt, "adapter": "a"}
+        if scene in declined:
+            yield case | {"verdict": "declined", "reason": HOSTILE}
+        else:
+            found = {"metric": metric, "unit": unit, "value": value * dt}
+            yield case | found | {"verdict": "measured", "reason": "", "trajectory": motion}
+
+
+def write_record(folder):
+    """MuJoCo with and without its default settings, in three releases and one that cannot be installed, and PyBullet in one."""
+    record, common = Record(folder), machine()
+    for release, value, declined in (("3.9.0", 12.7, ["drop-ball"]), ("3.10.0", 12.7, []), ("3.11.0", 1e-3, [])):
+        found = [row for label in ("mujoco", "mujoco[profile=default]") for row in rows(label, value, declined)]
+        record.write("mujoco", release, found, common | {"versions": f"mujoco {release}, numpy 2.0.0"})
+    record.write("mujoco", "3.10.1", [{"verdict": "missing", "reason": f"not installable: {HOSTILE}"}], common)
+    record.write("pybullet", "3.2.7", list(rows("pybullet", 0.0)), common | {"versions": "pybullet 3.2.7"})
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    write_record(folder / "record")
+    done = dropspin("publish", cwd=folder)
+    assert (done.returncode, done.stdout) == (0, "Site: out/site-record/index.html\n"), done.stderr
+    return folder / "out/site-record"
+
+
+class Page(HTMLParser):
+    """The links, the ids and the text of a page."""
+
+    def __init__(self, file):
+        super().__init__()
+        self.links, self.ids, self.texts = [], [], []
+        self.feed(file.read_text(encoding="utf-8"))
+        self.text = " ".join(" ".join(self.texts).split())
+
+    def handle_starttag(self, tag, attributes):
+        assert tag != "img"
+        given = dict(attributes)
+        self.links += [given["href"]] if "href" in given else []
+        self.ids += [given["id"]] if "id" in given else []
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+def test_every_link_leads_to_a_page_and_ids_are_unique(site):
+    pages = {file.name: Page(file) for file in site.glob("*.html")}
+    engines, scenes = ("engine-mujoco.html", "engine-pybullet.html"), tuple(f"scene-{scene}.html" for scene in SCENES)
+    assert sorted(pages) == sorted(["index.html", *engines, *scenes])
+    for name, page in pages.items():
+        assert len(set(page.ids)) == len(page.ids)
+        for link in page.links:
+            file, _, place = link.partition("#")
+            assert (site / (file or name)).is_file(), link
+            assert not place or place in pages[file or name].ids, link
+
+
+def test_page_of_an_engine_says_what_changed_in_which_release(site):
+    """12.7 dt before and 0.001 dt from 3.11.0 on; 3.10.1 could not be installed and is passed over."""
+    text = Page(site / "engine-mujoco.html").text
+    both = "mujoco, mujoco[profile=default]"
+    newest, older = text[text.index("3.11.0 after 3.10.0; 8 results changed") :].split("3.10.0 after 3.9.0; 4 results changed")
+    assert f"{both}: orientation error of spin-asymmetric 0.0127 → 1.00e-06 rad at dt = 1 ms" in newest
+    assert f"{both}: drop-ball: declined → measured (before: {HOSTILE})" in older
+    assert f"3.10.1: not installable: {HOSTILE}" in older
+    assert "unchanged since" in text
+    assert "3.10.0 3.11.0" in text  # the columns of releases
+    page = (site / "engine-mujoco.html").read_text(encoding="utf-8")
+    [title] = set(re.findall('title="(orientation error 1.00e-06 rad, mujoco 3.11.0[^"]*)"', page))
+    assert title.endswith("measure again: dropspin record -e mujoco --release 3.11.0 -o again")
+
+
+def test_index_has_the_digits_of_the_newest_releases(site):
+    """1e-3 ms: 6 digits; PyBullet's error of 0: 15. PyBullet has no default settings in the record."""
+    page = (site / "index.html").read_text(encoding="utf-8")
+    calibrated, default = page.split('id="division-2"')[0], page.split('id="division-2"')[1].split("<section")[0]
+    found = re.findall(r'data-engine="(\d)" data-status="measured"><a href="([^"]*)">([\d.]+)</a>', calibrated)
+    mujoco, pybullet = ("0", "engine-mujoco.html#options-1", "6.0"), ("2", "engine-pybullet.html#options-1", "15.0")
+    assert found == [mujoco, pybullet, mujoco, pybullet]
+    assert re.findall(r'data-engine="(\d)" data-status', default) == ["1", "1"]
+
+
+def test_badges_are_those_of_shields_io(site):
+    assert {file.name: json.loads(file.read_text()) for file in (site / "badges").iterdir()} == {
+        "mujoco.json": {
+            "schemaVersion": 1,
+            "label": "mujoco 3.11.0",
+            "message": "median 6.0 digits in 2 of 2 scenes",
+            "color": "brightgreen",
+        },
+        "pybullet.json": {
+            "schemaVersion": 1,
+            "label": "pybullet 3.2.7",
+            "message": "median 15.0 digits in 2 of 2 scenes",
+            "color": "brightgreen",
+        },
+    }
+
+
+def test_site_replaces_an_earlier_site_and_nothing_else(site):
+    before = {file: file.read_bytes() for file in site.rglob("*.html")}
+    stale = site / "engine-gone.html"
+    stale.write_text("")
+    assert dropspin("publish", cwd=site.parents[1]).returncode == 0
+    assert {file: file.read_bytes() for file in site.rglob("*.html")} == before
+    other = site.parents[1] / "other"
+    other.mkdir()
+    (other / "index.html").write_text("mine")
+    assert_refused(dropspin("publish", "-o", "other", cwd=site.parents[1]), "has files that dropspin publish did not write")
+    assert (other / "index.html").read_text() == "mine"
+
+
+def test_site_within_the_documentation_links_to_it(site):
+    folder = site.parents[1]
+    (folder / "docs").mkdir()
+    (folder / "docs/problems.html").write_text("")
+    assert dropspin("publish", "record", "-o", "docs/record", cwd=folder).returncode == 0
+    assert "../problems/DS-008.html" in Page(folder / "docs/record/scene-spin-asymmetric.html").links
+    assert "../index.html" in Page(folder / "docs/record/index.html").links
+
+
+def test_folder_without_a_record_is_refused(tmp_path):
+    assert_refused(dropspin("publish", "nothing", cwd=tmp_path), "nothing: has no release that was measured here")

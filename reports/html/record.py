@@ -183,7 +183,9 @@ class Site:
         found = findings.profile(errors)
         end = 2.0 * max(float(ratios[-1]) for ratios, _ in found.values())
         lines = []
-        for label, (colour, marker) in engine_styles(labels).items():
+        for label, (colour, marker) in engine_styles(list(self.engine_of)).items():
+            if label not in found:
+                continue
             ratios, shares = found[label]
             lines.append(Line(label, np.append(ratios, end), np.append(shares, shares[-1]), colour, marker=marker, is_step=True))
         return Chart("τ: error over the smallest error of the scene", "share of scenes within τ", lines, x_log=True)

@@ -61,6 +61,9 @@
     return linearTicks([10 ** low, 10 ** high], 4).filter(([value]) => value > 0).map(([value]) => [Math.log10(value), shown(value, 2)]);
   };
 
+  // The label of a row: a long one has a line for the engine and one for each option.
+  const linesOf = (text) => (text.length > 22 && text.includes("[") ? text.split(/(?=\[)|(?<=,)/) : [text]);
+
   class Chart {
     constructor(home, raw, section, engines) {
       Object.assign(this, { home, raw, section, engines });
@@ -168,7 +171,7 @@
       let [[x0, x1], [y0, y1]] = this.ranges();
       this.yTicks = raw.rows ? raw.rows.map((row, i) => [i, row]) : (this.yLog ? logTicks : linearTicks)([y0, y1], 6);
       const longest = Math.max(0, ...this.yTicks.map(([, text]) => text.length));
-      const left = raw.rows ? 0.36 * width : raw.map ? RIGHT : Math.max(LEFT, CHARACTER * longest + BESIDE), height = raw.rows ? 60 + 26 * raw.rows.length : HEIGHT;
+      const left = raw.rows ? 0.36 * width : raw.map ? RIGHT : Math.max(LEFT, CHARACTER * longest + BESIDE), height = raw.rows ? 60 + Math.max(26, ...raw.rows.map((row) => 12 * linesOf(row).length)) * raw.rows.length : HEIGHT;
       const [wide, tall] = [width - left - RIGHT, height - TOP - (raw.map ? TOP : BOTTOM)];
       if (raw.map) {   // the same scale along both axes
         const scale = Math.max((x1 - x0) / wide, (y1 - y0) / tall), [mx, my] = [(x0 + x1) / 2, (y0 + y1) / 2];
@@ -223,7 +226,7 @@
     }
 
     inRows(text, x, y) {
-      const parts = text.length > 22 && text.includes("[") ? [text.slice(0, text.indexOf("[")), text.slice(text.indexOf("["))] : [text];
+      const parts = linesOf(text);
       return parts.map((part, i) => drawn("tspan", { x, y: y + 4 + (i - (parts.length - 1) / 2) * 11 }, part));
     }
 

@@ -91,7 +91,8 @@ def _gained(change: Change) -> float:
 def _moved(change: Change) -> str:
     old, new = _apart(change.old, change.new)
     name = change.metric.replace("_", " ")
-    return f"{name} of {change.scene} {old} → {new}{_unit(change.metric)} at dt = {in_ms(change.dt)}"
+    step = f"dt = {in_ms(change.dt)}".replace(" ", "\xa0")  # in one line
+    return f"{name} of {change.scene} {old} → {new}{_unit(change.metric)} at {step}"
 
 
 def _apart(old: float, new: float) -> tuple[str, str]:

@@ -3,38 +3,10 @@
 import json
 import re
 from html.parser import HTMLParser
-from itertools import product
 
 import pytest
 from support.cli import assert_refused, dropspin
-
-from comparisons.record.store import Record, machine
-from scenarios import load
-
-HOSTILE = "<img src=x onerror=alert(1)>"
-SCENES = {"spin-asymmetric": ("orientation_error", "rad"), "drop-ball": ("bounce_height_error", "1")}
-
-
-def rows(label, value, declined=()):
-    """The rows of a label, whose errors are `value` times the time step."""
-    motion = f"{int(value * 1e3):064x}"
-    for (scene, (metric, unit)), dt in product(SCENES.items(), (0.004, 0.001)):
-        case = {"label": label, "scene": scene, "scene_digest": load(scene).digest, "dt": dt, "adapter": "a"}
-        if scene in declined:
-            yield case | {"verdict": "declined", "reason": HOSTILE}
-        else:
-            found = {"metric": metric, "unit": unit, "value": value * dt}
-            yield case | found | {"verdict": "measured", "reason": "", "trajectory": motion}
-
-
-def write_record(folder):
-    """MuJoCo with and without its default settings, in three releases and one that cannot be installed, and PyBullet in one."""
-    record, common = Record(folder), machine()
-    for release, value, declined in (("3.9.0", 12.7, ["drop-ball"]), ("3.10.0", 12.7, []), ("3.11.0", 1e-3, [])):
-        found = [row for label in ("mujoco", "mujoco[profile=default]") for row in rows(label, value, declined)]
-        record.write("mujoco", release, found, common | {"versions": f"mujoco {release}, numpy 2.0.0"})
-    record.write("mujoco", "3.10.1", [{"verdict": "missing", "reason": f"not installable: {HOSTILE}"}], common)
-    record.write("pybullet", "3.2.7", list(rows("pybullet", 0.0)), common | {"versions": "pybullet 3.2.7"})
+from support.small_record import HOSTILE, SCENES, write_record
 
 
 @pytest.fixture(scope="module")

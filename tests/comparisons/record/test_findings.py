@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.record.findings import NEGLIGIBLE, Case, Release, changes, digits, periods, profile, read, successive
+from comparisons.record.findings import NEGLIGIBLE, SINGLE, Case, Release, changes, digits, periods, profile, read, successive
+from comparisons.record.plan import load_plan
 from comparisons.record.store import Record, machine
+from comparisons.running.entries import engine_entry
 from scenarios import DropspinError, load
 
 LABEL, SCENE, DT, METRIC = "mujoco", "spin-asymmetric", 0.01, "orientation_error"
@@ -47,6 +49,13 @@ def test_noise_of_rounding_is_no_step():
 def test_rounding_of_an_error_above_its_scale_is_in_proportion_to_it():
     assert steps(series(measured(6385356.819724), measured(6385356.819723))) == []
     assert len(steps(series(measured(6385356.8), measured(6385357.8)))) == 1
+
+
+def test_engines_in_single_precision_are_those_whose_adapters_say_so():
+    """Of those that are installed here."""
+    installed = {name: entry.engine for name in load_plan().engines if (entry := engine_entry(name)).engine is not None}
+    assert {"mujoco", "rapier"} <= installed.keys()
+    assert {name for name, engine in installed.items() if engine.precision is np.float32} == SINGLE & installed.keys()
 
 
 def test_residuals_of_a_contact_solver_are_no_step():

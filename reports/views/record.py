@@ -1,7 +1,7 @@
 """The pages of a record in words: the digits in a cell, what changed in a release, and what an engine gets right and wrong."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,20 +9,16 @@ import numpy as np
 from comparisons.judging.verdicts import MARKS
 from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.tolerances import scale
-from comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
+from comparisons.record.findings import Change, Release, digits, leading, problem, relative_error
 from reports.views.leading_errors import level
 from reports.views.numbers import formatted, in_ms, word
 
-MANY, FEW = 5.0, 2.0
-"""The numbers of digits that divide the scenes of an engine into three: errors below 1e-5 do not matter to any use of an engine."""
-COLOURS = ((1.0, "red"), (2.0, "orange"), (3.0, "yellow"), (5.0, "green"), (math.inf, "brightgreen"))
-"""The colours of a badge: each up to a median of digits."""
-MOST_SHOWN = 15
-"""Largest number of significant digits in which two values are shown, so that they differ."""
+GROUPS = {"at least 5 digits": 5.0, "2 to 5 digits": 2.0, "fewer than 2 digits": 0.0}
+"""What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""
 
 
 class Cell(NamedTuple):
-    """A cell of a matrix: its text, the decade of the error for its colour, the verdict in words, and what it shows when pointed at."""
+    """A cell of a matrix: its text, the decade of the error for its colour, the status, and what it shows when pointed at."""
 
     text: str
     level: int | None
@@ -32,24 +28,17 @@ class Cell(NamedTuple):
 
 def cell(engine: str, release: Release, label: str, scene: str, dt: float) -> Cell:
     """The digits of a release in a scene."""
-    case = release.cases.get((label, scene, dt))
+    case, metric = release.cases.get((label, scene, dt)), leading(scene)
     if case is None:
         return Cell("", None, "not measured", "not measured")
-    metric, error = leading(scene), relative_error(case, scene)
-    again = f"{label} {release.name}, dt = {in_ms(dt)}; measure again: {rerun(engine, release.name)}"
-    if case.verdict != "measured":
-        return Cell(f"{MARKS[case.verdict]} {word(case.verdict)}", None, word(case.verdict), f"{case.reason}; {again}")
-    if math.isnan(error):
-        return Cell("too coarse", None, "too coarse", f"the time step is too coarse for the {metric.replace('_', ' ')}; {again}")
-    remark = f"known limitation: {case.reason}; " if case.reason else ""
-    text = f"{'! ' if case.reason else ''}{digits(error):.1f}"
-    return Cell(text, level(error), "known limitation" if case.reason else "measured", f"{remark}{value_of(case, scene)}, {again}")
-
-
-def value_of(case: Case, scene: str) -> str:
-    """The leading error of a scene with its name and unit."""
-    metric = leading(scene)
-    return f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}"
+    error, again = relative_error(case, scene), f"{label} {release.name}, dt = {in_ms(dt)}; measure again: {rerun(engine, release.name)}"
+    remark = f"{case.reason}; " if case.reason else ""
+    if math.isnan(error):  # a motion without this error: the time step is too coarse
+        status = "too coarse" if case.verdict == "measured" else word(case.verdict)
+        return Cell(f"{MARKS[case.verdict]} {status}", None, status, remark + again)
+    shown = f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}, "
+    status, mark = ("known limitation", "! ") if case.reason else ("measured", "")
+    return Cell(f"{mark}{digits(error):.1f}", level(error), status, remark + shown + again)
 
 
 def rerun(engine: str, release: str) -> str:
@@ -60,72 +49,53 @@ def rerun(engine: str, release: str) -> str:
 def told(changed: Sequence[Change]) -> dict[str, list[str]]:
     """What changed in each release, newest first: a sentence for each scene, the largest change of digits first.
 
-    Labels whose results changed alike have one sentence, and so have scenes that are declined no longer, or from now on.
+    Labels and scenes that changed alike have one sentence.
     """
-    by_scene: dict[tuple[str, str, str], list[Change]] = {}
+    groups: dict[tuple[str, str, str], list[Change]] = {}
     for change in changed:
-        by_scene.setdefault((change.release, change.label, change.scene), []).append(change)
-    sentences: dict[str, dict[tuple[str, ...], list[str]]] = {}
+        groups.setdefault((change.release, change.label, change.scene), []).append(change)
     scenes: dict[tuple[str, str, str], list[str]] = {}
-    for (release, label, scene), found in sorted(by_scene.items(), key=lambda item: -max(map(_gained, item[1]))):
-        finest = [one for one in found if one.dt == min(change.dt for change in found)]
-        shown = next((one for one in finest if one.metric == leading(scene)), finest[0])
-        if shown.metric:
-            sentences.setdefault(release, {}).setdefault((_moved(shown),), []).append(label)
-        else:
-            scenes.setdefault((release, label, _began(shown)), []).append(scene)
+    for (release, label, scene), found in sorted(groups.items(), key=lambda item: -max(map(_gained, item[1]))):
+        scenes.setdefault((release, label, _words(found)), []).append(scene)
+    labels: dict[str, dict[tuple[str, str], list[str]]] = {change.release: {} for change in reversed(changed)}
     for (release, label, words), names in scenes.items():
-        sentences.setdefault(release, {}).setdefault((", ".join(names), words), []).append(label)
-    order = list(dict.fromkeys(change.release for change in changed))[::-1]
-    return {release: [": ".join([", ".join(labels), *said]) for said, labels in sentences[release].items()] for release in order}
+        labels[release].setdefault((", ".join(names), words), []).append(label)
+    return {
+        release: [f"{names} with {', '.join(own)}: {words}" for (names, words), own in found.items()] for release, found in labels.items()
+    }
 
 
 def _gained(change: Change) -> float:
     """The size of the change of digits; infinite where there is a value in one of the releases only."""
-    if not change.metric:
-        return math.inf
-    of = scale(problem(change.scene), METRICS[change.metric].unit)
-    return abs(digits(abs(change.new) / of) - digits(abs(change.old) / of))
+    of = scale(problem(change.scene), METRICS[change.metric].unit) if change.metric else math.nan
+    return abs(digits(abs(change.new) / of) - digits(abs(change.old) / of)) if change.metric else math.inf
 
 
-def _moved(change: Change) -> str:
-    old, new = _apart(change.old, change.new)
-    name = change.metric.replace("_", " ")
-    step = f"dt = {in_ms(change.dt)}".replace(" ", "\xa0")  # in one line
-    return f"{name} of {change.scene} {old} → {new}{_unit(change.metric)} at {step}"
-
-
-def _apart(old: float, new: float) -> tuple[str, str]:
-    """Two values with at least three significant digits, and so many that they differ."""
-    if formatted(old) != formatted(new):
-        return formatted(old), formatted(new)
-    pairs = ((f"{old:.{count}g}", f"{new:.{count}g}") for count in range(4, MOST_SHOWN + 1))
-    return next((pair for pair in pairs if pair[0] != pair[1]), (f"{old!r}", f"{new!r}"))
-
-
-def _began(change: Change) -> str:
-    reason = change.now.reason if change.now.verdict != "measured" else f"before: {change.was.reason}"
-    return f"{word(change.was.verdict)} → {word(change.now.verdict)}{f' ({reason})' if reason else ''}"
+def _words(found: Sequence[Change]) -> str:
+    """The change of a scene at the finest time step: of its leading error, else of the metric that changed most."""
+    finest = [change for change in found if change.dt == min(one.dt for one in found)]
+    shown = next((change for change in finest if change.metric == leading(change.scene)), finest[0])
+    if not shown.metric:
+        reason = shown.now.reason if shown.now.verdict != "measured" else f"before: {shown.was.reason}"
+        return f"{word(shown.was.verdict)} → {word(shown.now.verdict)} ({reason})"
+    old, new = formatted(shown.old), formatted(shown.new)
+    if old == new:  # as many digits as are needed to see the difference
+        old, new = next(pair for n in range(4, 18) if len(set(pair := (f"{shown.old:.{n}g}", f"{shown.new:.{n}g}"))) == 2)
+    step = f"dt = {in_ms(shown.dt)}".replace(" ", "\xa0")  # in one line
+    return f"{shown.metric.replace('_', ' ')} {old} → {new}{_unit(shown.metric)} at {step}"
 
 
 def _unit(metric: str) -> str:
-    unit = METRICS[metric].unit
-    return "" if unit == "1" else f" {unit}"
+    return "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
 
 
 def summary(release: Release, label: str, dt: float) -> list[str]:
     """What an engine gets right and wrong in a release: sentences."""
-    own = {scene: case for (of, scene, step), case in release.cases.items() if of == label and step == dt}
-    found = {scene: digits(relative_error(case, scene)) for scene, case in own.items()}
-    parts = {
-        f"at least {MANY:g} digits": [scene for scene, one in found.items() if one >= MANY],
-        f"{FEW:g} to {MANY:g} digits": [scene for scene, one in found.items() if FEW <= one < MANY],
-        f"fewer than {FEW:g} digits": [scene for scene, one in found.items() if one < FEW],
-    }
-    for scene, case in own.items():
-        if case.verdict != "measured":
-            parts.setdefault(word(case.verdict), []).append(scene)
-    return [f"{words}: {', '.join(scenes)}" for words, scenes in parts.items() if scenes]
+    groups: dict[str, list[str]] = {words: [] for words in GROUPS}
+    for scene, case in release.at(label, dt).items():
+        found = digits(relative_error(case, scene))
+        groups.setdefault(next((words for words, least in GROUPS.items() if found >= least), word(case.verdict)), []).append(scene)
+    return [f"{words}: {', '.join(scenes)}" for words, scenes in groups.items() if scenes]
 
 
 def since(label: str, scene: str, releases: Sequence[Release], changed: Iterable[Change]) -> str:
@@ -134,15 +104,9 @@ def since(label: str, scene: str, releases: Sequence[Release], changed: Iterable
     return moved[-1] if moved else next(one.name for one in releases if any(key[:2] == (label, scene) for key in one.cases))
 
 
-def badge(engine: str, release: Release, label: str, dt: float) -> Mapping[str, Any]:
-    """The badge of an engine as shields.io draws it from a file: https://shields.io/badges/endpoint-badge."""
-    own = {scene: case for (of, scene, step), case in release.cases.items() if of == label and step == dt}
-    found = [one for scene, case in own.items() if not math.isnan(one := digits(relative_error(case, scene)))]
-    middle = float(np.median(found)) if found else 0.0
-    message = f"median {middle:.1f} digits in {len(found)} of {len(own)} scenes"
-    return {
-        "schemaVersion": 1,
-        "label": f"{engine} {release.name}",
-        "message": message,
-        "color": next(colour for most, colour in COLOURS if middle < most),
-    }
+def badge(engine: str, release: Release, label: str, dt: float) -> dict[str, Any]:
+    """The badge of an engine, as shields.io reads it: https://shields.io/badges/endpoint-badge."""
+    errors = [relative_error(case, scene) for scene, case in release.at(label, dt).items()]
+    found = [digits(error) for error in errors if not math.isnan(error)]
+    message = f"median {np.median(found):.1f} digits in {len(found)} of {len(errors)} scenes" if found else "no scene"
+    return {"schemaVersion": 1, "label": f"{engine} {release.name}", "message": message, "color": "blue" if found else "lightgrey"}

@@ -119,7 +119,7 @@ def test_record_is_read_in_the_order_of_releases_for_one_machine_with_the_scenes
         ("1.9", "", [{METRIC: 0.1}]),
         ("1.10", "", [{METRIC: 0.1}]),
     ]
-    assert successive(own) == {"1.9": [], "1.10": ["adapter a", "adapter b", "numpy 1", "numpy 2"]}
+    assert successive([one for one in own if one.cases]) == {"1.9": [], "1.10": ["adapter a", "adapter b", "numpy 1", "numpy 2"]}
 
 
 def test_record_without_a_result_is_refused(tmp_path):

@@ -30,12 +30,12 @@ def cell(engine: str, release: Release, label: str, scene: str, dt: float) -> Ce
     """The digits of a release in a scene."""
     case, metric = release.cases.get((label, scene, dt)), leading(scene)
     if case is None:
-        return Cell("", None, "not measured", "not measured")
+        return Cell("?", None, "not measured", "not measured")
     error, again = relative_error(case, scene), f"{label} {release.name}, dt = {in_ms(dt)}; measure again: {rerun(engine, release.name)}"
     remark = f"{case.reason}; " if case.reason else ""
     if math.isnan(error):  # a motion without this error: the time step is too coarse
         status = "too coarse" if case.verdict == "measured" else word(case.verdict)
-        return Cell(f"{MARKS[case.verdict]} {status}", None, status, remark + again)
+        return Cell(MARKS[case.verdict], None, status, remark + again)
     shown = f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}, "
     status, mark = ("known limitation", "! ") if case.reason else ("measured", "")
     return Cell(f"{mark}{digits(error):.1f}", level(error), status, remark + shown + again)

@@ -17,7 +17,7 @@ test: $(VENV)/.installed-dev          ## set up, run the test suite
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 test-browser: $(VENV)/.installed-browser  ## the report, the replay and the site in a real browser; needs Chromium
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests/browser
+	$(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
 
 test-all: lint test test-browser docs ## everything, and the studies that take minutes
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow

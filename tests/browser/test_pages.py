@@ -39,17 +39,21 @@ COUNT_PAINTED = """canvas => {
 
 
 @pytest.fixture(scope="module")
-def results():
-    """The default run, and a scene with failures and a hostile name."""
-    failing = ds.load("drop-ball").model_dump(exclude_none=True, exclude={"expect"})
-    failing |= {"name": "drop-<b>failing</b>", "expect": [{"metric": "energy_error", "below": 1e-12, "reason": "cannot hold"}]}
-    core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
-    return ds.run([*core, ds.load(failing)], ENGINES)
+def folder(shared):
+    """The folder of a run of the core catalogue, with two studies in the report and a replay of all scenes."""
+    return shared("pages", write_pages) / "run"
 
 
 @pytest.fixture(scope="module")
-def folder(results, tmp_path_factory):
-    """The folder of the run, with two studies in the report and a replay of all scenes."""
+def results(folder):
+    """The run: the default one, and a scene with failures and a hostile name."""
+    return ds.load_results(folder)
+
+
+def write_pages(place):
+    failing = ds.load("drop-ball").model_dump(exclude_none=True, exclude={"expect"})
+    failing |= {"name": "drop-<b>failing</b>", "expect": [{"metric": "energy_error", "below": 1e-12, "reason": "cannot hold"}]}
+    core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
     study = Section("What accuracy costs")
     study.add_heading("A heading")
     study.add_list(["One sentence.", "Another <one>."])
@@ -59,9 +63,8 @@ def folder(results, tmp_path_factory):
     )
     # Two studies of one scene have pictures of the same name.
     sections = [study, Section("Where engines break down", study.parts)]
-    made = ds.write_report(results, tmp_path_factory.mktemp("out") / "run", sections).parent
-    assert dropspin("replay", made, "--no-open", cwd=made.parent).returncode == 0
-    return made
+    made = ds.write_report(ds.run([*core, ds.load(failing)], ENGINES), place / "run", sections).parent
+    assert dropspin("replay", made, "--no-open", cwd=place).returncode == 0
 
 
 LIMITED = "known limitation"

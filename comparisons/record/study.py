@@ -34,7 +34,7 @@ def record(
     time_limit: float,
     on_done: Callable[[Release, int], None],
 ) -> None:
-    """Measure releases that the record does not have, and write each into it as soon as it is measured.
+    """Measure releases that the record does not have, and write each into it when it is measured.
 
     Args:
         record: The record.

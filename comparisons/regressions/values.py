@@ -29,7 +29,7 @@ BETTER: Mapping[str, Literal["smaller", "larger", "neither"]] = {
 
 def verify_comparable(*runs: Results) -> None:
     """Raise `DropspinError` if a run is quick: its means are over fewer starts, and its results have no tolerances."""
-    if any(run.provenance["asked"].get("quick") for run in runs):
+    if any(run.is_quick for run in runs):
         raise DropspinError("a quick run has too few starts to be compared with other runs or accepted; run it again without --quick.")
 
 

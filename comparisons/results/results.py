@@ -170,6 +170,11 @@ class Results:
         verdicts = self.table["verdict"]
         return verdicts.isin(BREAKDOWNS) | ((verdicts == "missing") & self.table["engine"].isin(self.provenance.get("named", [])))
 
+    @property
+    def is_quick(self) -> bool:
+        """Whether the run was made with few starts, so that it cannot be compared with others; run files before the option lack it."""
+        return bool(self.provenance["asked"].get("quick"))
+
     def exit_code(self) -> int:
         """0: nothing failed; 1: a verdict failed; 3: an engine broke down, or is missing though it was named."""
         return 3 if self.breakdowns.any() else int(self.table["verdict"].isin(FAILURES).any())

@@ -59,7 +59,7 @@ class Site:
         self._write(folder / INDEX, "record.html", statuses=sorted(statuses))
         (folder / "badges").mkdir()
         for engine, newest in self.newest.items():
-            about = {"told": view.told(self.changes[engine]), "differing": findings.successive(self.measured[engine])}
+            about = {"changed": view.change_sentences(self.changes[engine]), "differing": findings.successive(self.measured[engine])}
             self._write(folder / f"engine-{engine}.html", "record_engine.html", engine=engine, newest=newest, **about)
             badge = view.badge(engine, newest, self.labels[engine][0], self.dts[-1])
             (folder / "badges" / f"{engine}.json").write_text(json.dumps(badge) + "\n", encoding="utf-8")

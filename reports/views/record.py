@@ -46,7 +46,7 @@ def rerun(engine: str, release: str) -> str:
     return f"dropspin record -e {engine} --release {release} -o again"
 
 
-def told(changed: Sequence[Change]) -> dict[str, list[str]]:
+def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
     """What changed in each release, newest first: a sentence for each scene, the largest change of digits first.
 
     Labels and scenes that changed alike have one sentence.

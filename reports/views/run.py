@@ -51,7 +51,7 @@ def overview(results: Results) -> Overview:
 
 def _quick(results: Results) -> list[str]:
     """A sentence on what a quick run left out, and the number of its checks that are not decided; empty for other runs."""
-    if not results.provenance["asked"].get("quick"):
+    if not results.is_quick:
         return []
     undecided = int(results.table["reason"].str.startswith(UNDECIDED_BY_STARTS).sum())
     return [

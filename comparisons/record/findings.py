@@ -20,23 +20,38 @@ from comparisons.engines.mujoco_versions import numbers_of
 from comparisons.judging.convergence import ARTEFACTS, JUMPING
 from comparisons.measuring.metrics import METRICS, leading_metric
 from comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance
+from comparisons.record.plan import load_plan
 from comparisons.record.store import MACHINE, OWN, Row, stored
 from scenarios import DropspinError, load
 from scenarios.loading import names
 
 MOST_DIGITS = 15.0
 """Digits of an error of 0: double precision has no more."""
-SINGLE = frozenset({"mjx", "newton", "rapier", "sapien"})
-"""The engines of the record in single precision: their adapters say so, but cannot be imported where the engine is not installed."""
 
 
 class Case(NamedTuple):
-    """One simulation: `measured` or why there are no values, in words too, the hash of its motion, and the value of each metric."""
+    """One engine in one scene at one time step.
+
+    Attributes:
+        verdict: `measured`, or why there are no values.
+        reason: That in words.
+        trajectory: The hash of the motion.
+        values: The value of each metric.
+        low, high: The least and the largest size of the leading error over start phases; NaN for a scene without.
+        cost: The least wall time of the steps [s per simulated second].
+        median_cost: The median of the repeated timings of it.
+        relative_cost: The cost over that of a step of `document` in free flight.
+    """
 
     verdict: str
     reason: str
     trajectory: str
     values: Mapping[str, float]
+    low: float = math.nan
+    high: float = math.nan
+    cost: float = math.nan
+    median_cost: float = math.nan
+    relative_cost: float = math.nan
 
 
 class Release(NamedTuple):
@@ -94,23 +109,30 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
 def _of_one_machine(tables: Sequence[list[dict[str, Any]]]) -> list[Release]:
     machines = [tuple(rows[0][name] for name in MACHINE) for rows in tables]
     [(most, _)] = Counter(machines).most_common(1)
-    found = [_release(rows) for rows, machine in zip(tables, machines, strict=True) if machine == most]
+    found = [release_of(rows) for rows, machine in zip(tables, machines, strict=True) if machine == most]
     return sorted(found, key=lambda one: numbers_of(one.name))
 
 
-def _release(rows: Sequence[Row]) -> Release:
+def release_of(rows: Sequence[Row]) -> Release:
+    """A release of which there are rows; those of scenes that the catalogue defines differently today are left out."""
     known = [row for row in rows if row["scene_digest"] == _digests().get(row["scene"])]
     by_case: dict[tuple[str, str, float], list[Row]] = {}
     for row in known:
         by_case.setdefault((row["label"], row["scene"], row["dt"]), []).append(row)
-    cases = {
-        key: Case(own[0]["verdict"], own[0]["reason"], own[0]["trajectory"], {row["metric"]: row["value"] for row in own if row["metric"]})
-        for key, own in by_case.items()
-    }
+    cases = {key: _case(own) for key, own in by_case.items()}
     name = rows[0]["release"]
     versions = (text for text in rows[0]["versions"].split(", ") if text and text.rpartition(" ")[2] != name)
     adapters = {f"adapter {row['adapter']}" for row in known}
     return Release(name, cases, "" if cases else rows[0]["reason"], frozenset([*versions, *adapters]), rows[0])
+
+
+def _case(rows: Sequence[Row]) -> Case:
+    """The rows of one simulation; the range over start phases is in that of the leading error."""
+    first = rows[0]
+    values = {row["metric"]: row["value"] for row in rows if row["metric"]}
+    banded = next((row for row in rows if not math.isnan(row["low"])), first)
+    costs = (first[name] for name in ("cost", "median_cost", "relative_cost"))
+    return Case(first["verdict"], first["reason"], first["trajectory"], values, banded["low"], banded["high"], *costs)
 
 
 problem = cache(load)
@@ -143,7 +165,8 @@ def digits(error: float) -> float:
 
 def changes(engine: str, releases: Iterable[Release]) -> list[Change]:
     """The results that changed between releases, oldest release first; a release without a case is passed over."""
-    precision = np.float32 if engine in SINGLE else np.float64
+    of_plan = load_plan().engines.get(engine)
+    precision = np.float32 if of_plan is not None and of_plan.single_precision else np.float64
     found: list[Change] = []
     last: dict[tuple[str, str, float], tuple[str, Case]] = {}
     for release in releases:

@@ -27,6 +27,7 @@ class Releases(Table):
         oldest: The first release to measure.
         numpy_1_until: The last release that was compiled for NumPy 1, which does not work with NumPy 2; empty if all work.
         labels: The engine with each set of options.
+        single_precision: Whether its states are in single precision; its adapter says so too, but can be asked where it is installed only.
         scenes: Names of scenes, if they are not those of the plan.
     """
 
@@ -36,6 +37,7 @@ class Releases(Table):
     oldest: str
     numpy_1_until: str = ""
     labels: tuple[str, ...]
+    single_precision: bool = False
     scenes: tuple[str, ...] = ()
 
     def requirements(self, release: str) -> list[str]:
@@ -61,6 +63,11 @@ class Plan(Table):
     def scenes_of(self, engine: str) -> tuple[str, ...]:
         """The names of the scenes in which an engine is measured."""
         return self.engines[engine].scenes or self.scenes
+
+    def only(self, engine: str, label: str, scene: str) -> "Plan":
+        """The plan of one engine with one set of options in one scene."""
+        own = self.engines[engine].model_copy(update={"labels": (label,), "scenes": (scene,)})
+        return self.model_copy(update={"engines": {engine: own}})
 
     def digest(self, engine: str) -> str:
         """A short hash of everything that is measured of each release of an engine."""

@@ -6,21 +6,32 @@ from collections.abc import Iterator
 from importlib.metadata import packages_distributions, version
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from comparisons.engines.base import Diverged, Engine
+from comparisons.engines.registry import engine as engine_named
 from comparisons.engines.stand_in import code_of
-from comparisons.measuring.metrics import METRICS
+from comparisons.measuring.comparison import Comparison
+from comparisons.measuring.metrics import METRICS, leading_metric
 from comparisons.results.provenance import STAMPED
 from comparisons.results.stored_files import sha256
 from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import Breakdown, Recording, divergence, try_record
+from comparisons.running.recording import Breakdown, Recording, classify, divergence, record_batch, time_steps, try_record
 from comparisons.running.run import measure
-from scenarios import Scenario, load
+from comparisons.running.start_phases import StartPhase, start_phases
+from scenarios import Scenario, load, truth_for
 
 Row = dict[str, Any]
+TIMING_REPEATS = 5
+LONG_ENOUGH = 1.0
+"""Timings of a simulation end when they have taken this long together [s]."""
+YARDSTICK, YARDSTICK_SCENE, YARDSTICK_STEPS = "document", "spin-asymmetric", 10_000
+"""Steps of Wang's method in free flight, which take the same time whatever the time step is."""
 
 
 def main(request: str, answer: str) -> None:
@@ -52,25 +63,77 @@ def _rows(entry: EngineEntry, scenes: list[Scenario], dts: list[float], processe
 def _measured(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineProcesses) -> Iterator[Row]:
     """A row for each metric of one simulation; one row alone, with the reason, if there is no motion."""
     try:
-        found = processes.call(entry, _recorded, scene, dt)
+        found = processes.call(entry, _simulated, scene, dt)
     except Failed as failure:
         found = Breakdown(failure.verdict, failure.reason)
     if isinstance(found, Breakdown):
         yield {"verdict": found.verdict, "reason": found.reason}
         return
-    motion = found.motion
-    hashed = {"trajectory": sha256(motion.states.astype("<f8").tobytes())}
+    motion = found.recording.motion
+    hashed = {"trajectory": sha256(motion.states.astype("<f8").tobytes())} | found.costs
     if (broken := divergence(motion)) is not None:
         yield hashed | {"verdict": broken.verdict, "reason": broken.reason}
         return
-    met = "; ".join(limitation.message for limitation in found.limitations if not limitation.is_minor)
+    met = "; ".join(limitation.message for limitation in found.recording.limitations if not limitation.is_minor)
     for metric, value in measure(scene, motion).items():
-        yield hashed | {"metric": metric, "unit": METRICS[metric].unit, "value": value, "verdict": "measured", "reason": met}
+        band = found.band if metric == leading_metric(scene) else {}
+        yield hashed | band | {"metric": metric, "unit": METRICS[metric].unit, "value": value, "verdict": "measured", "reason": met}
 
 
-def _recorded(entry: EngineEntry, scene: Scenario, dt: float) -> Recording | Breakdown:
-    assert entry.engine is not None
-    return try_record(entry.engine, scene, dt)
+class Simulated(NamedTuple):
+    """A motion, the range of the leading error over start phases, and the cost of the steps; columns of the record."""
+
+    recording: Recording
+    band: Row
+    costs: Row
+
+
+def _simulated(entry: EngineEntry, scene: Scenario, dt: float) -> Simulated | Breakdown:
+    """Simulate a scene from its own start and from its start phases, and time its steps; runs in the engine's process."""
+    engine = entry.adapter
+    recording = try_record(engine, scene, dt)
+    if isinstance(recording, Breakdown):
+        return recording
+    if divergence(recording.motion) is not None:
+        return Simulated(recording, {}, {})
+    try:
+        return Simulated(recording, range_over_phases(engine, scene, dt), costs(engine, scene, dt))
+    except Exception as error:  # whatever an engine raises costs its own row only
+        return classify(error)
+
+
+def range_over_phases(engine: Engine, scene: Scenario, dt: float) -> Row:
+    """The least and the largest size of the leading error over the scene's start and start phases.
+
+    None for a scene without start phases, and if the engine breaks down from one of them.
+    """
+    truth = truth_for(scene)
+    phases = start_phases(scene, truth, dt, quick=True)
+    if len(phases) == 1:
+        return {}
+    phases.append(StartPhase(scene, truth))
+    try:
+        motions = record_batch(engine, [phase.scene for phase in phases], dt)
+    except Diverged:
+        return {}
+    cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in zip(phases, motions, strict=True)]
+    sizes = [abs(METRICS[leading_metric(scene)].value_or_nan([case])) for case in cases]
+    return {"low": min(sizes), "high": max(sizes)} if np.isfinite(sizes).all() else {}
+
+
+def costs(engine: Engine, scene: Scenario, dt: float) -> Row:
+    """The wall time of the steps per simulated second, and that over the time of `document`'s steps, measured in turn."""
+    steps, yardstick, yardstick_scene = scene.steps(dt), engine_named(YARDSTICK), load(YARDSTICK_SCENE)
+    time_steps(yardstick, yardstick_scene, dt, 1)  # compiles, and so may the engine
+    if engine.compiles:
+        time_steps(engine, scene, dt, steps)
+    own: list[float] = []
+    others: list[float] = []
+    while len(own) < TIMING_REPEATS and sum(own) * scene.duration < LONG_ENOUGH:
+        own.append(time_steps(engine, scene, dt, steps).stepping / (steps * dt))
+        others.append(time_steps(yardstick, yardstick_scene, dt, YARDSTICK_STEPS).stepping / (YARDSTICK_STEPS * dt))
+    ratios = np.divide(own, others)
+    return {"cost": min(own), "median_cost": float(np.median(own)), "relative_cost": float(np.median(ratios))}
 
 
 if __name__ == "__main__":

@@ -35,8 +35,9 @@ TEXTS = (
     *("engine", "release", "label", "profile", "scene", "scene_digest", "metric", "unit", "verdict", "reason", "trajectory"),
     *("adapter", "plan", "versions", "processor", "system", "python", "measured"),
 )
-NUMBERS = ("dt", "value")
+NUMBERS = ("dt", "value", "low", "high", "cost", "median_cost", "relative_cost")
 SCHEMA = pa.schema([*((name, pa.string()) for name in TEXTS), *((name, pa.float64()) for name in NUMBERS)])
+BLANK: Row = dict.fromkeys(TEXTS, "") | dict.fromkeys(NUMBERS, math.nan)
 CONSTANT = ("engine", "release", "plan", "versions", "processor", "system", "python", "measured")
 MACHINE = ("processor", "system", "python")
 SAME = ("plan", "adapter", *MACHINE)
@@ -116,8 +117,8 @@ class Record:
             rows: The rows, some columns of which may be missing.
             common: Columns that are the same in all rows.
         """
-        blank = dict.fromkeys(TEXTS, "") | dict.fromkeys(NUMBERS, math.nan) | {"engine": engine, "release": release}
-        whole = [{**blank, **common, **row, "measured": date.today().isoformat()} for row in rows]
+        named = {"engine": engine, "release": release, "measured": date.today().isoformat()}
+        whole = [{**BLANK, **common, **row, **named} for row in rows]
         for row in whole:
             row["profile"] = "" if not row["label"] else "default" if "profile=default" in row["label"] else "calibrated"
         earlier = [one for one in self.own(engine, release) if all(one[1][0][name] == whole[0][name] for name in MACHINE)]

@@ -27,6 +27,7 @@ COMMANDS = {
     "replay": "Show the motions of a run in 3D.",
     "report": "Write the report of a run again.",
     "reproduce": "Compare published results with what engines give here.",
+    "rerun": "Measure a cell of the record again, bit for bit.",
     "run": "Run scenes with several engines, and write the report.",
     "show": "Show a scene, or the settings of an engine for the scene.",
     "sweep": "Run every job of a grid or random sample.",

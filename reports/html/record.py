@@ -10,7 +10,7 @@ import numpy as np
 from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.tolerances import scale
 from comparisons.record import findings
-from comparisons.record.findings import Change, Release, leading, problem, relative_error
+from comparisons.record.findings import Case, Change, Release, leading, problem, relative_error
 from reports.pages import page
 from reports.plots.chart import Chart, Line
 from reports.plots.chart_data import chart_data
@@ -23,10 +23,9 @@ from scenarios.problems import identifier
 
 GENERATOR = '<meta name="generator" content="dropspin publish">'
 INDEX = "index.html"
-STEP_STYLES = (("#D55E00", "s"), ("#0072B2", "o"), ("#009E73", "D"), ("#CC79A7", "^"))
-"""Colours and markers of time steps, coarsest first."""
 LEAST = 1e-16
 """Relative error at which an exact zero is drawn."""
+NO_CASE = Case("not measured", "", "", {})
 
 
 class Site:
@@ -45,7 +44,7 @@ class Site:
         keys = [key for one in self.newest.values() for key in one.cases]
         self.scenes = {name: problem(name) for name in sorted({key[1] for key in keys}, key=lambda name: identifier(problem(name)))}
         self.dts = sorted({dt for _, _, dt in keys}, reverse=True)
-        self.labels = {engine: list(dict.fromkeys(key[0] for key in one.cases)) for engine, one in self.newest.items()}
+        self.labels = {engine: self.labels_of(one) for engine, one in self.newest.items()}
         self.engines = {label: engine for engine, labels in self.labels.items() for label in labels}
         self.styles = engine_styles(list(self.engines))
         default = [label for label in self.engines if "profile=default" in label]
@@ -61,6 +60,8 @@ class Site:
         for engine, newest in self.newest.items():
             about = {"changed": view.change_sentences(self.changes[engine]), "differing": findings.successive(self.measured[engine])}
             self._write(folder / f"engine-{engine}.html", "record_engine.html", engine=engine, newest=newest, **about)
+            for release in self.measured[engine]:
+                self._write(folder / self.page_of(engine, release), "record_release.html", engine=engine, release=release, **about)
             badge = view.badge(engine, newest, self.labels[engine][0], self.dts[-1])
             (folder / "badges" / f"{engine}.json").write_text(json.dumps(badge) + "\n", encoding="utf-8")
         for name, scene in self.scenes.items():
@@ -70,6 +71,22 @@ class Site:
     def _write(self, file: Path, template: str, **content: Any) -> None:
         file.write_text(page(template, site=self, step=numbers.in_ms(self.dts[-1]), **content), encoding="utf-8")
 
+    def page_of(self, engine: str, release: Release) -> str:
+        """The address of the page of a release."""
+        return f"release-{engine}-{release.name}.html"
+
+    def release(self, engine: str, name: str) -> Release:
+        """A release of an engine, by its name."""
+        return next(one for one in self.measured[engine] if one.name == name)
+
+    def labels_of(self, release: Release) -> list[str]:
+        """The engine with each set of options that a release was measured with."""
+        return list(dict.fromkeys(label for label, _, _ in release.cases))
+
+    def position(self, release: Release, label: str) -> int:
+        """The number of the section of a label on the page of a release, from 1."""
+        return self.labels_of(release).index(label) + 1
+
     def link(self, label: str) -> str:
         """The address of the table of a label."""
         engine = self.engines[label]
@@ -78,12 +95,7 @@ class Site:
     def cell(self, label: str, scene: str, dt: float = 0.0, release: Release | None = None) -> view.Cell:
         """A cell of a table; by default of the newest release at the finest time step."""
         engine = self.engines[label]
-        return view.cell(engine, release or self.newest[engine], label, scene, dt or self.dts[-1])
-
-    def value(self, label: str, scene: str, dt: float) -> float:
-        """The leading error of the newest release; NaN where there is none."""
-        case = self.newest[self.engines[label]].cases.get((label, scene, dt))
-        return float("nan") if case is None else case.values.get(leading(scene), float("nan"))
+        return view.cell(release or self.newest[engine], label, scene, dt or self.dts[-1])
 
     def periods(self, label: str) -> list[list[Release]]:
         """Successive releases between which nothing changed."""
@@ -101,14 +113,30 @@ class Site:
         of = "" if unit in ("1", "rad") else f", scale {scale(problem(scene), unit):.3g} {unit}"
         return f"{metric.replace('_', ' ')}{numbers.unit(unit)}{of}"
 
-    def errors(self, scene: str) -> dict[str, Any]:
-        """The plot of the leading error of all engines, a row for each: markers for the time steps."""
-        shown = [label for label in self.engines if any(np.isfinite(self.value(label, scene, dt)) for dt in self.dts)]
-        least, rows, lines = LEAST * scale(problem(scene), METRICS[leading(scene)].unit), np.arange(len(shown), dtype=float), []
-        for dt, (colour, marker) in zip(self.dts, STEP_STYLES, strict=False):
-            sizes = np.array([np.maximum(abs(self.value(label, scene, dt)), least) for label in shown])
-            lines.append(Line(f"dt = {numbers.in_ms(dt)}", sizes, rows, colour, 0.0, marker=marker))
-        return chart_data(Chart(self.quantity(scene).partition(",")[0], "", lines, x_log=True, rows=shown))
+    def case(self, label: str, scene: str, dt: float) -> Case:
+        """The newest release in a scene."""
+        return self.newest[self.engines[label]].cases.get((label, scene, dt), NO_CASE)
+
+    def has_starts(self, scene: str) -> bool:
+        """Whether some engine was measured from several starts."""
+        return any(self.view.sizes(self.case(label, scene, dt)) for label in self.engines for dt in self.dts)
+
+    def work_precision(self, scene: str) -> dict[str, Any]:
+        """The plot of the leading error of all engines over the cost of their steps, with ranges over starts and over timings."""
+        metric, lines = leading(scene), []
+        least = LEAST * scale(problem(scene), METRICS[metric].unit)
+        for label in self.engines:
+            cases = [case for dt in self.dts if not np.isnan((case := self.case(label, scene, dt)).cost)]
+            if not cases:
+                continue
+            x, median = np.array([(case.cost, case.median_cost) for case in cases]).T
+            y, low, high = np.maximum(np.abs([(case.values.get(metric, np.nan), case.low, case.high) for case in cases]), least).T
+            colour, marker = self.styles[label]
+            gap = np.full(len(x), np.nan)
+            across, along = np.array([x, x, x, x, median, x]).T.ravel(), np.array([low, high, gap, y, y, gap]).T.ravel()
+            lines += [Line(label, x, y, colour, marker=marker), Line(label, across, along, colour, 1.0)]
+        error = self.quantity(scene).partition(",")[0]
+        return chart_data(Chart("wall time per simulated second [s]", error, lines, x_log=True, y_log=True))
 
     def profiles(self, labels: Sequence[str]) -> dict[str, Any]:
         """The plot of performance profiles at the finest time step."""
@@ -127,5 +155,5 @@ def files_of_site(folder: Path) -> set[str]:
     index = folder / INDEX
     if not index.is_file() or GENERATOR not in index.read_text(encoding="utf-8", errors="replace"):
         return set()
-    patterns = (INDEX, "engine-*.html", "scene-*.html", "badges", "badges/*.json")
+    patterns = (INDEX, "engine-*.html", "release-*.html", "scene-*.html", "badges", "badges/*.json")
     return {str(path.relative_to(folder)) for pattern in patterns for path in folder.glob(pattern)}

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from shlex import quote
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,9 +10,9 @@ import numpy as np
 from comparisons.judging.verdicts import MARKS
 from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.tolerances import scale
-from comparisons.record.findings import Change, Release, digits, leading, problem, relative_error
+from comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
 from reports.views.leading_errors import level
-from reports.views.numbers import formatted, in_ms, word
+from reports.views.numbers import duration, formatted, in_ms, word
 
 GROUPS = {"at least 5 digits": 5.0, "2 to 5 digits": 2.0, "fewer than 2 digits": 0.0}
 """What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""
@@ -26,24 +27,49 @@ class Cell(NamedTuple):
     title: str
 
 
-def cell(engine: str, release: Release, label: str, scene: str, dt: float) -> Cell:
+def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
     """The digits of a release in a scene."""
     case, metric = release.cases.get((label, scene, dt)), leading(scene)
     if case is None:
         return Cell("?", None, "not measured", "not measured")
-    error, again = relative_error(case, scene), f"{label} {release.name}, dt = {in_ms(dt)}; measure again: {rerun(engine, release.name)}"
+    error, again = relative_error(case, scene), f"{label} {release.name}, dt = {in_ms(dt)}; measure again: {rerun(label, release, scene)}"
     remark = f"{case.reason}; " if case.reason else ""
     if math.isnan(error):  # a motion without this error: the time step is too coarse
         status = "too coarse" if case.verdict == "measured" else word(case.verdict)
         return Cell(MARKS[case.verdict], None, status, remark + again)
-    shown = f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}, "
+    parts = [f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}"]
+    parts += [f"over starts {sizes(case)}"] if sizes(case) else []
+    parts += [f"{cost(case)} per simulated second, {case.relative_cost:.3g} times that of document"] if cost(case) != "–" else []
+    shown = ", ".join(parts) + ", "
     status, mark = ("known limitation", "! ") if case.reason else ("measured", "")
     return Cell(f"{mark}{digits(error):.1f}", level(error), status, remark + shown + again)
 
 
-def rerun(engine: str, release: str) -> str:
-    """The command that measures a release again."""
-    return f"dropspin record -e {engine} --release {release} -o again"
+def rerun(label: str, release: Release, scene: str) -> str:
+    """The command that measures a cell again."""
+    return f"dropspin rerun {quote(label)} {release.name} {scene}"
+
+
+def cost(case: Case) -> str:
+    """The wall time of the steps per simulated second."""
+    return "–" if math.isnan(case.cost) else duration(case.cost)
+
+
+def sizes(case: Case) -> str:
+    """The range of the size of the leading error over starts; empty for a scene with one."""
+    return "" if math.isnan(case.low) else f"{formatted(case.low)} to {formatted(case.high)}"
+
+
+def error(case: Case, scene: str) -> str:
+    """The leading error from the scene's own start, or why there is none."""
+    return word(case.verdict) if case.verdict != "measured" else formatted(case.values.get(leading(scene), math.nan))
+
+
+def mean_cost(release: Release, label: str, dt: float, *, with_floor: bool) -> str:
+    """The geometric mean of the cost over scenes with or without a floor."""
+    cases = release.at(label, dt).items()
+    costs = [case.cost for scene, case in cases if (problem(scene).floor is not None) == with_floor and not math.isnan(case.cost)]
+    return duration(math.exp(np.mean(np.log(costs)))) if costs else "–"
 
 
 def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:

@@ -40,7 +40,8 @@ class Page(HTMLParser):
 def test_every_link_leads_to_a_page_and_ids_are_unique(site):
     pages = {file.name: Page(file) for file in site.glob("*.html")}
     engines, scenes = ("engine-mujoco.html", "engine-pybullet.html"), tuple(f"scene-{scene}.html" for scene in SCENES)
-    assert sorted(pages) == sorted(["index.html", *engines, *scenes])
+    releases = [f"release-{name}.html" for name in ("mujoco-3.9.0", "mujoco-3.10.0", "mujoco-3.11.0", "pybullet-3.2.7")]
+    assert sorted(pages) == sorted(["index.html", *engines, *scenes, *releases])
     for name, page in pages.items():
         assert len(set(page.ids)) == len(page.ids)
         for link in page.links:
@@ -60,8 +61,25 @@ def test_page_of_an_engine_says_what_changed_in_which_release(site):
     assert "unchanged since" in text
     assert "3.10.0 3.11.0" in text  # the columns of releases
     page = (site / "engine-mujoco.html").read_text(encoding="utf-8")
-    [title] = set(re.findall('title="(orientation error 1.00e-06 rad, mujoco 3.11.0[^"]*)"', page))
-    assert title.endswith("measure again: dropspin record -e mujoco --release 3.11.0 -o again")
+    start = "orientation error 1.00e-06 rad, 2 ms per simulated second, 20 times that of document, mujoco 3.11.0"
+    [title] = set(re.findall(f'title="({start}[^"]*)"', page))
+    assert title.endswith("measure again: dropspin rerun mujoco 3.11.0 spin-asymmetric")
+
+
+def test_page_of_a_release_says_what_changed_in_it_and_has_the_command_of_each_cell(site):
+    text = Page(site / "release-mujoco-3.11.0.html").text
+    assert "What changed after 3.10.0 8 results differ from those of 3.10.0" in text
+    assert "drop-ball with mujoco, mujoco[profile=default]: bounce height error 0.0127 → 1.00e-06 at dt = 1 ms" in text
+    for label in ("mujoco", "'mujoco[profile=default]'"):
+        assert f"Measure a cell again: dropspin rerun {label} 3.11.0 SCENE" in text
+    assert "drop-ball 4.00e-06 2.00e-06 to 8.00e-06 1.00e-06 5.00e-07 to 2.00e-06 6.0 2 ms" in text
+    assert "This is the first release that was measured." in Page(site / "release-mujoco-3.9.0.html").text
+    assert "declined" in Page(site / "release-mujoco-3.9.0.html").text
+
+
+def test_page_of_a_scene_has_error_range_over_starts_and_cost(site):
+    text = Page(site / "scene-drop-ball.html").text
+    assert "mujoco 3.11.0 4.00e-06 2.00e-06 to 8.00e-06 500 µs 1.00e-06 5.00e-07 to 2.00e-06 2 ms" in text
 
 
 def test_index_has_the_digits_of_the_newest_releases(site):

@@ -17,7 +17,15 @@ def rows(label, value, declined=()):
         if scene in declined:
             yield case | {"verdict": "declined", "reason": HOSTILE}
         else:
-            found = {"metric": metric, "unit": unit, "value": value * dt}
+            found = {
+                "metric": metric,
+                "unit": unit,
+                "value": value * dt,
+                "cost": 2e-6 / dt,
+                "median_cost": 3e-6 / dt,
+                "relative_cost": 20.0,
+            }
+            found |= {"low": 0.5 * value * dt, "high": 2.0 * value * dt} if scene == "drop-ball" else {}
             yield case | found | {"verdict": "measured", "reason": "", "trajectory": motion}
 
 

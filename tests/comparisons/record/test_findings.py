@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.record.findings import NEGLIGIBLE, SINGLE, Case, Release, changes, digits, periods, profile, read, successive
+from comparisons.record.findings import NEGLIGIBLE, Case, Release, changes, digits, periods, profile, read, successive
 from comparisons.record.plan import load_plan
 from comparisons.record.store import Record, machine
 from comparisons.running.entries import engine_entry
@@ -55,7 +55,8 @@ def test_engines_in_single_precision_are_those_whose_adapters_say_so():
     """Of those that are installed here."""
     installed = {name: entry.engine for name in load_plan().engines if (entry := engine_entry(name)).engine is not None}
     assert {"mujoco", "rapier"} <= installed.keys()
-    assert {name for name, engine in installed.items() if engine.precision is np.float32} == SINGLE & installed.keys()
+    single = {name for name, own in load_plan().engines.items() if own.single_precision}
+    assert {name for name, engine in installed.items() if engine.precision is np.float32} == single & installed.keys()
 
 
 def test_residuals_of_a_contact_solver_are_no_step():

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from threading import Event
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -13,12 +14,13 @@ from support.cli import assert_refused, dropspin
 
 import dropspin as ds
 from comparisons.engines.registry import BUILT_IN
-from comparisons.record import environments, study
+from comparisons.record import environments, release, study
 from comparisons.record.environments import NotMeasured, measured, without_paths
 from comparisons.record.plan import Plan, load_plan
 from comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, Stored, machine
 from comparisons.results.stored_files import sha256
-from scenarios import DropspinError
+from comparisons.running.recording import TimedSteps
+from scenarios import DropspinError, load
 
 RELEASES = ["1.0", "1.1", "1.2"]
 PLAN = Plan.model_validate(
@@ -57,7 +59,8 @@ def record(folder, plan=PLAN, on_done=lambda one, left: None, **filters):
 
 
 def table(folder):
-    return pd.read_parquet(folder).sort_values(["engine", "release", "processor"], ignore_index=True)
+    rows = pd.read_parquet(folder).sort_values(["engine", "release", "processor"], ignore_index=True)
+    return rows.fillna(-1.0)  # NaN differs from itself
 
 
 def files(folder):
@@ -211,12 +214,37 @@ def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_o
     motion = ds.simulate("spin-principal", "document", 0.01)
     values = ds.measure("spin-principal", motion)
     rows = [row for row in found["rows"] if row["label"] == "document"]
+    assert all(0.0 < row["cost"] <= row["median_cost"] and row["relative_cost"] > 0.0 and "low" not in row for row in rows)
     assert {row["metric"]: row["value"] for row in rows} == pytest.approx(values, rel=0.0, abs=0.0, nan_ok=True)
     assert {row["trajectory"] for row in rows} == {sha256(motion.states.tobytes())}
     assert found["versions"].startswith("dropspin 9.9, numpy ")
     monkeypatch.setattr(environments, "run", pip_writes("another"))
     with pytest.raises(NotMeasured, match=r"^not runnable: exit code 1: version .* is imported instead of 9\.9$"):
         measured(PLAN, "document", "9.9", 60.0, Event())
+
+
+def test_range_of_the_error_is_that_of_the_step_in_which_the_impact_is_found():
+    """Wang's method finds an impact up to a step late: the error of the bounce height is between 0 and the distance fallen in a step."""
+    scene, dt = load("drop-ball"), 4e-3
+    found = release.range_over_phases(ds.engine("document"), scene, dt)
+    fallen = scene.start.position[1] - scene.body.radius
+    speed = np.sqrt(2.0 * 9.8 * fallen)
+    assert 0.0 <= found["low"] < 0.3 * found["high"]
+    assert 0.3 * speed * dt / fallen < found["high"] < speed * dt / fallen
+    assert release.range_over_phases(ds.engine("document"), load("spin-asymmetric"), dt) == {}
+
+
+def test_cost_is_the_least_of_five_timings_and_relative_to_document_timed_in_turn(monkeypatch):
+    """A step takes 3, 1, 2, 5 and 4 µs of a clock, and one of `document` 0.1 µs; with 1,000 steps a simulated second."""
+    micros = iter([3.0, 1.0, 2.0, 5.0, 4.0])
+
+    def timed(engine, scene, dt, steps):
+        per_step = 0.1 if engine.label == "document" else next(micros)
+        return TimedSteps(1.0, 1e-6 * per_step * steps, np.zeros(13))
+
+    monkeypatch.setattr(release, "time_steps", timed)
+    found = release.costs(ds.engine("mujoco"), load("spin-asymmetric"), 1e-3)
+    assert found == {"cost": pytest.approx(1e-3), "median_cost": pytest.approx(3e-3), "relative_cost": pytest.approx(30.0)}
 
 
 def test_pip_that_fails_is_named_with_its_error(monkeypatch, tmp_path):

@@ -1,0 +1,89 @@
+"""Measure one cell of a record again, and compare its motions with those of the record, bit for bit."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from threading import Event
+from typing import NamedTuple
+
+from comparisons.record.environments import NotMeasured, measured
+from comparisons.record.findings import Case, Release, read, release_of
+from comparisons.record.plan import Plan
+from comparisons.record.store import BLANK, MACHINE, machine
+from scenarios import DropspinError, UnknownName
+
+NONE = Case("not measured", "", "", {})
+
+
+class Again(NamedTuple):
+    """A cell that was measured again.
+
+    Attributes:
+        cases: By time step [s]: as recorded, and as measured now.
+        differing: What the motions depend on and is not as in the record, by name: as recorded, and now.
+    """
+
+    cases: Mapping[float, tuple[Case, Case]]
+    differing: Mapping[str, tuple[str, str]]
+
+    @property
+    def moved(self) -> list[float]:
+        """The time steps [s] at which the motion or the verdict differs."""
+        return [dt for dt, (was, now) in self.cases.items() if (was.verdict, was.trajectory) != (now.verdict, now.trajectory)]
+
+
+def rerun(folder: str | Path, plan: Plan, label: str, release: str, scene: str, *, time_limit: float) -> Again:
+    """Install a release into an environment of its own, and simulate a scene at the time steps of the plan.
+
+    Args:
+        folder: The folder of the record.
+        plan: The plan of the record.
+        label: The engine with its options, as in the record.
+        release: The release.
+        scene: The scene.
+        time_limit: Processor time that the engine may use for one simulation [s].
+
+    Raises:
+        DropspinError: The record has no such cell, or the release cannot be installed or run.
+    """
+    engine = label.partition("[")[0]
+    recorded = _recorded(folder, engine, label, release, scene)
+    try:
+        found = measured(plan.only(engine, label, scene), engine, release, time_limit, Event())
+    except NotMeasured as failure:
+        raise DropspinError(f"{engine} {release}: {failure}.") from None
+    common = {"engine": engine, "release": release, "versions": found["versions"]} | machine()
+    now = release_of([{**BLANK, **row, **common} for row in found["rows"]])
+    was, given = _surroundings(recorded), _surroundings(now)
+    differing = {name: (was.get(name, "none"), given.get(name, "none")) for name in was | given if was.get(name) != given.get(name)}
+    cases = {dt: case for (of, name, dt), case in recorded.cases.items() if (of, name) == (label, scene)}
+    return Again({dt: (case, now.cases.get((label, scene, dt), NONE)) for dt, case in cases.items()}, differing)
+
+
+def _recorded(folder: str | Path, engine: str, label: str, release: str, scene: str) -> Release:
+    """The release in the record.
+
+    Raises:
+        DropspinError: The record has no such cell.
+    """
+    engines = read(folder)
+    if engine not in engines:
+        raise UnknownName("engine of the record", engine, engines)
+    releases = {one.name: one for one in engines[engine]}
+    if release not in releases:
+        raise UnknownName(f"release of {engine} in the record", release, releases)
+    cases = releases[release].cases
+    if not cases:
+        raise DropspinError(f"{engine} {release} has no results in the record: {releases[release].reason}.")
+    for what, given, known in (
+        ("engine with options in the record", label, {of for of, _, _ in cases}),
+        (f"scene of {label} in the record", scene, {name for of, name, _ in cases if of == label}),
+    ):
+        if given not in known:
+            raise UnknownName(what, given, sorted(known))
+    return releases[release]
+
+
+def _surroundings(release: Release) -> dict[str, str]:
+    """What motions depend on beside the release, by name: the adapter, the versions of packages, and the machine."""
+    stamps = dict(stamp.split(" ", 1) for stamp in release.stamps)
+    return stamps | {name: release.first[name] for name in MACHINE}

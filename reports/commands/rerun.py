@@ -1,0 +1,38 @@
+"""`dropspin rerun`."""
+
+import json
+
+import click
+
+from reports.commands.options import as_json, time_limit_option
+from reports.terminal.safe import echo
+
+
+@click.command("rerun")
+@click.argument("engine")
+@click.argument("release")
+@click.argument("scene")
+@click.option("-r", "--record", "folder", default="record", show_default=True, metavar="DIR", help="Folder of the record.")
+@time_limit_option(60.0, "the engine may use for one simulation")
+@as_json
+def rerun_command(engine: str, release: str, scene: str, folder: str, time_limit: float, json_output: bool) -> int:
+    """Measure a cell of the record again, and compare it bit for bit.
+
+    ENGINE is an engine with options, RELEASE a release of it and SCENE a scene, as in the record. pip installs the release into a
+    temporary environment. The exit code is 1 if a motion differs from that of the record; then it is said which versions or which
+    processor differ.
+    """
+    from comparisons.record.plan import load_plan
+    from comparisons.record.rerun import rerun
+    from reports.terminal.progress import status
+    from reports.terminal.rows import print_rows, print_sentences
+    from reports.views import rerun as view
+
+    with status(f"installing {engine.partition('[')[0]} {release}, and simulating {scene}"):
+        found = rerun(folder, load_plan(), engine, release, scene, time_limit=time_limit)
+    if json_output:
+        echo(json.dumps(view.as_data(found), indent=1, ensure_ascii=False))
+    else:
+        print_rows(view.table(found, scene), json_output=False)
+        print_sentences(view.sentences(found))
+    return 1 if found.moved else 0

@@ -1,0 +1,51 @@
+"""The output of `dropspin rerun`: a row for each time step, and what is not as in the record."""
+
+import math
+from typing import Any
+
+from comparisons.measuring.metrics import METRICS
+from comparisons.record.findings import Case, leading
+from comparisons.record.rerun import Again
+from reports.views.numbers import in_ms, quantity, unit, word
+
+
+def table(found: Again, scene: str) -> list[dict[str, str]]:
+    """A row for each time step: the leading error of the scene in the record and now, and whether the motion is the same."""
+    metric = leading(scene)
+    error = f"{quantity(metric)} error{unit(METRICS[metric].unit)}"
+    return [
+        {"dt": in_ms(dt), f"{error}, recorded": _value(was, metric), "now": _value(now, metric), "motion": _motion(was, now)}
+        for dt, (was, now) in found.cases.items()
+    ]
+
+
+def _value(case: Case, metric: str) -> str:
+    """All digits of a value, or why there is none."""
+    return word(case.verdict) if case.verdict != "measured" else repr(case.values.get(metric, math.nan))
+
+
+def _motion(was: Case, now: Case) -> str:
+    if not (was.trajectory or now.trajectory):
+        return "none"
+    return "the same bits" if was.trajectory == now.trajectory else "differs"
+
+
+def sentences(found: Again) -> list[str]:
+    """Why there is no motion now, whether the record was reproduced, and what is not as in the record."""
+    reasons = [f"{word(now.verdict)}: {now.reason}" for _, now in found.cases.values() if now.verdict != "measured"]
+    moved, count = len(found.moved), len(found.cases)
+    result = f"{moved} of {count} results differ from the record." if moved else "Every result is that of the record, bit for bit."
+    others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in found.differing.items())
+    surroundings = f"Not as in the record: {others}." if others else "Adapter, versions and machine are those of the record."
+    return [*dict.fromkeys(reasons), result, surroundings]
+
+
+def as_data(found: Again) -> dict[str, Any]:
+    """Everything with all digits, for JSON; numbers that are not finite are None."""
+    cases = [{"dt": dt, "same": dt not in found.moved, "recorded": _case(was), "now": _case(now)} for dt, (was, now) in found.cases.items()]
+    return {"cases": cases, "differing": {name: {"recorded": was, "now": now} for name, (was, now) in found.differing.items()}}
+
+
+def _case(case: Case) -> dict[str, Any]:
+    values = {metric: value if math.isfinite(value) else None for metric, value in case.values.items()}
+    return {"verdict": case.verdict, "reason": case.reason, "trajectory": case.trajectory, "values": values}

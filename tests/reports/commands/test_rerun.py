@@ -1,0 +1,88 @@
+"""`dropspin rerun`: a cell of a record is measured again, and compared bit for bit. pip is replaced: no test needs a network."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+from support.small_record import rows, write_record
+
+from comparisons.record import environments, rerun
+from comparisons.record.environments import NotMeasured
+from comparisons.record.store import machine
+from reports.commands.rerun import rerun_command
+from scenarios import DropspinError
+
+CELL = ("mujoco[profile=default]", "3.10.0", "spin-asymmetric")
+
+
+@pytest.fixture
+def again(tmp_path, monkeypatch):
+    """Measures the cell again; the errors are `value` times the time step."""
+    write_record(tmp_path)
+
+    def run(*options, value=12.7, versions="mujoco 3.10.0, numpy 2.0.0", processor=None, cell=CELL):
+        def measured(plan, engine, release, time_limit, stopping):
+            [label], [scene] = plan.engines[engine].labels, plan.scenes_of(engine)
+            assert (label, release, scene) == CELL
+            return {"rows": [row for row in rows(label, value) if row["scene"] == scene], "versions": versions}
+
+        monkeypatch.setattr(rerun, "measured", measured)
+        monkeypatch.setattr(rerun, "machine", lambda: machine() | ({"processor": processor} if processor else {}))
+        return CliRunner().invoke(rerun_command, [*cell, "-r", str(tmp_path), *options], standalone_mode=False)
+
+    return run
+
+
+def test_same_bits(again):
+    done = again()
+    assert done.return_value == 0
+    assert "1 ms  0.0127" in done.stdout
+    assert done.stdout.count("the same bits") == 2
+    assert done.stdout.endswith(
+        "Every result is that of the record, bit for bit.\nAdapter, versions and machine are those of the record.\n"
+    )
+
+
+def test_other_bits_and_what_differs_from_the_record(again):
+    done = again(value=12.7 + 2e-3, versions="mujoco 3.10.0, numpy 2.1.0, scipy 1.0", processor="another")
+    assert done.return_value == 1
+    assert done.stdout.count("differs\n") == 2
+    assert "2 of 2 results differ from the record.\n" in done.stdout
+    [last] = done.stdout.splitlines()[-1:]
+    assert "numpy 2.1.0 (in the record: 2.0.0)" in last
+    assert "scipy 1.0 (in the record: none)" in last
+    assert f"processor another (in the record: {machine()['processor']})" in last
+
+
+def test_json_has_all_of_it(again):
+    found = json.loads(again("--json", versions="numpy 2.1.0").stdout)
+    assert [case["same"] for case in found["cases"]] == [True, True]
+    assert found["cases"][1]["now"]["values"] == {"orientation_error": 12.7 * 0.001}
+    assert found["differing"] == {"numpy": {"recorded": "2.0.0", "now": "2.1.0"}}
+
+
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        (("drake", "1.0", "drop-ball"), "engine of the record 'drake' is unknown"),
+        (("mujoco", "3.10.1", "drop-ball"), "3.10.1 has no results in the record: not installable"),
+        (("mujoco", "3.12.0", "drop-ball"), "release of mujoco in the record '3.12.0' is unknown"),
+        (("mujoco[integrator=rk4]", "3.10.0", "drop-ball"), "is unknown. Known: mujoco, mujoco[profile=default]."),
+        (("mujoco", "3.10.0", "drop-box"), "Did you mean 'drop-ball'?"),
+    ],
+)
+def test_cell_that_the_record_does_not_have(again, cell, words):
+    with pytest.raises(DropspinError) as error:
+        raise again(cell=cell).exception
+    assert words in str(error.value)
+
+
+def test_release_that_can_no_longer_be_installed(tmp_path, monkeypatch):
+    write_record(tmp_path)
+
+    def measured(*_):
+        raise NotMeasured(f"{environments.NOT_INSTALLABLE}: no wheel")
+
+    monkeypatch.setattr(rerun, "measured", measured)
+    with pytest.raises(DropspinError, match=r"^mujoco 3\.10\.0: not installable: no wheel\.$"):
+        raise CliRunner().invoke(rerun_command, [*CELL, "-r", str(tmp_path)], standalone_mode=False).exception

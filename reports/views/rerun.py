@@ -31,8 +31,13 @@ def _motion(was: Case, now: Case) -> str:
 
 
 def sentences(found: Again) -> list[str]:
-    """Why there is no motion now, whether the record was reproduced, and what is not as in the record."""
-    reasons = [f"{word(now.verdict)}: {now.reason}" for _, now in found.cases.values() if now.verdict != "measured"]
+    """Why there is no motion, whether the record was reproduced, and what is not as in the record."""
+    reasons = []
+    for was, now in found.cases.values():
+        if was.verdict != "measured" and was.reason != now.reason:
+            reasons.append(f"In the record {word(was.verdict)}: {was.reason}.")
+        if now.verdict != "measured":
+            reasons.append(f"{word(now.verdict).capitalize()}: {now.reason}.")
     moved, count = len(found.moved), len(found.cases)
     result = f"{moved} of {count} results differ from the record." if moved else "Every result is that of the record, bit for bit."
     others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in found.differing.items())

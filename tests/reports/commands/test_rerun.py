@@ -4,7 +4,7 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from support.small_record import rows, write_record
+from support.small_record import HOSTILE, rows, write_record
 
 from comparisons.record import environments, rerun
 from comparisons.record.environments import NotMeasured
@@ -23,7 +23,7 @@ def again(tmp_path, monkeypatch):
     def run(*options, value=12.7, versions="mujoco 3.10.0, numpy 2.0.0", processor=None, cell=CELL):
         def measured(plan, engine, release, time_limit, stopping):
             [label], [scene] = plan.engines[engine].labels, plan.scenes_of(engine)
-            assert (label, release, scene) == CELL
+            assert (label, release, scene) == cell
             return {"rows": [row for row in rows(label, value) if row["scene"] == scene], "versions": versions}
 
         monkeypatch.setattr(rerun, "measured", measured)
@@ -52,6 +52,14 @@ def test_other_bits_and_what_differs_from_the_record(again):
     assert "numpy 2.1.0 (in the record: 2.0.0)" in last
     assert "scipy 1.0 (in the record: none)" in last
     assert f"processor another (in the record: {machine()['processor']})" in last
+
+
+def test_reason_why_there_is_no_motion_in_the_record(again):
+    """The small record has drop-ball as declined in 3.9.0."""
+    done = again(cell=("mujoco", "3.9.0", "drop-ball"))
+    assert done.return_value == 1
+    assert f"In the record declined: {HOSTILE}." in done.stdout
+    assert "1 ms  declined" in done.stdout
 
 
 def test_json_has_all_of_it(again):

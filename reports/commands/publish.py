@@ -17,12 +17,12 @@ def publish_command(record: str, output: str) -> None:
     RECORD is the folder that dropspin record wrote. The site needs no server and no network. In a folder of the documentation's site, it
     links to the documentation.
     """
-    from comparisons.record.findings import read
+    from comparisons.record.findings import others, read
     from reports.html.record import INDEX, Site, files_of_site
     from reports.run_folder import replaced_folder
 
     found = read(record)
     docs = "../" if (Path(output).resolve().parent / "problems.html").is_file() else ""
     with replaced_folder(output, files_of_site, "publish") as folder:
-        Site(found, docs).write(folder)
+        Site(found, others(record, found), docs).write(folder)
     echo(f"Site: {os.path.join(output, INDEX)}")

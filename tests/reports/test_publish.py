@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import date
 from html.parser import HTMLParser
 
 import pytest
@@ -90,6 +91,14 @@ def test_index_has_the_digits_of_the_newest_releases(site):
     mujoco, pybullet = ("0", "engine-mujoco.html#options-1", "6.0"), ("2", "engine-pybullet.html#options-1", "15.0")
     assert found == [mujoco, pybullet, mujoco, pybullet]
     assert re.findall(r'data-engine="(\d)" data-status', default) == ["1", "1"]
+
+
+def test_page_of_an_engine_counts_the_results_of_others_that_are_the_same(site):
+    """Of eight, the four with default settings differ, and one of the others was declined here."""
+    text = Page(site / "engine-mujoco.html").text
+    machine = f"another {HOSTILE}"
+    assert f"the same 3.9.0 {date.today()} {machine}" in text
+    assert "mujoco 3.9.0 2 of 8 results" in text
 
 
 def test_badges_are_those_of_shields_io(site):

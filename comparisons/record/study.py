@@ -1,17 +1,19 @@
 """Record releases: those that the record does not have yet, several at a time."""
 
-from collections.abc import Callable, Collection
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Event
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from comparisons.engines.adapter_code import built_in_code
 from comparisons.engines.registry import BUILT_IN
 from comparisons.record.environments import NOT_INSTALLABLE, POLL, NotMeasured, measured, releases
 from comparisons.record.plan import Plan
 from comparisons.record.store import Record, machine
+from comparisons.running.cluster import connected
 from scenarios import UnknownName
 
 
@@ -31,6 +33,7 @@ def record(
     chosen: Collection[str] = (),
     *,
     jobs: int,
+    scheduler: str | None = None,
     time_limit: float,
     on_done: Callable[[Release, int], None],
 ) -> None:
@@ -41,7 +44,8 @@ def record(
         plan: What to measure.
         engines: Names of engines; all by default.
         chosen: Releases; all by default.
-        jobs: How many to measure at a time.
+        jobs: How many to measure at a time on this machine.
+        scheduler: The address of a Dask scheduler, on whose workers to measure instead.
         time_limit: Processor time that an engine may use for one simulation [s].
         on_done: Called after each release with what became of it, and with the number that is left.
 
@@ -56,37 +60,56 @@ def record(
         if release not in (known := [one for names in listed.values() for one in names]):
             raise UnknownName("release", release, known)
     record.write_releases(listed)
-    common = {engine: {"plan": plan.digest(engine), "adapter": _code(engine)} | machine() for engine in listed}
-    pending = [
-        Release(engine, release)
-        for engine, names in listed.items()
-        for release in names
-        if (not chosen or release in chosen) and not record.has(engine, release, common[engine])
-    ]
-    stopping = Event()
-
-    def work(one: Release) -> Release:
-        reason, versions = "", ""
-        try:
-            found = measured(plan, one.engine, one.release, time_limit, stopping)
-            rows, versions = found["rows"], found["versions"]
-        except NotMeasured as failure:
-            reason = str(failure)
-            rows = [{"verdict": "missing" if reason.startswith(NOT_INSTALLABLE) else "broken", "reason": reason}]
-        record.write(one.engine, one.release, rows, common[one.engine] | {"versions": versions})
-        count = sum(bool(row.get("metric")) for row in rows)
-        return one._replace(results=count, reason=reason or ("" if count else rows[0]["reason"]))
-
-    with ThreadPoolExecutor(jobs) as threads:
-        running: set[Future[Release]] = {threads.submit(work, one) for one in pending}
+    common = {engine: {"plan": plan.digest(engine), "adapter": _code(engine)} for engine in listed}
+    with _workers(jobs, scheduler) as (workers, machines):
+        pending = [
+            (engine, release)
+            for engine, names in listed.items()
+            for release in names
+            if (not chosen or release in chosen) and not any(record.has(engine, release, common[engine] | one) for one in machines)
+        ]
+        stopping = None if scheduler else Event()
+        running = {workers.submit(_measured, plan, *one, time_limit, stopping): one for one in pending}
         try:
             while running:
-                finished, running = wait(running, timeout=POLL, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    on_done(future.result(), len(running))
+                for future in wait(running, timeout=POLL, return_when=FIRST_COMPLETED).done:
+                    engine, release = running.pop(future)
+                    found = future.result()
+                    record.write(engine, release, found.rows, common[engine] | found.machine | {"versions": found.versions})
+                    results = sum(bool(row.get("metric")) for row in found.rows)
+                    on_done(Release(engine, release, results, "" if results else found.rows[0]["reason"]), len(running))
         finally:
-            stopping.set()
-            threads.shutdown(cancel_futures=True)
+            if stopping is not None:
+                stopping.set()
+            for future in running:
+                future.cancel()
+
+
+@contextmanager
+def _workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, list[dict[str, str]]]]:
+    """What runs the work, threads of this process or the workers of a Dask scheduler, and the machines on which it runs."""
+    if scheduler is None:
+        with ThreadPoolExecutor(jobs) as threads:
+            yield threads, [machine()]
+        return
+    with connected(scheduler) as client:
+        yield client.get_executor(pure=False), list(client.run(machine).values())
+
+
+class _Measured(NamedTuple):
+    rows: list[dict[str, Any]]
+    versions: str
+    machine: dict[str, str]
+
+
+def _measured(plan: Plan, engine: str, release: str, time_limit: float, stopping: Event | None) -> _Measured:
+    """Measure a release, on a worker; a release that has no results has one row, with the reason."""
+    try:
+        found = measured(plan, engine, release, time_limit, stopping or Event())
+    except NotMeasured as failure:
+        reason = str(failure)
+        return _Measured([{"verdict": "missing" if reason.startswith(NOT_INSTALLABLE) else "broken", "reason": reason}], "", machine())
+    return _Measured(found["rows"], found["versions"], machine())
 
 
 def _code(engine: str) -> str:

@@ -5,13 +5,9 @@ part; the parts that it had written are kept.
 """
 
 import multiprocessing
-import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from importlib.util import find_spec
 from typing import Any
 
-from comparisons.engines.base import EngineMissing
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.sweeps.folder import SweepFolder
 from comparisons.sweeps.work import Part, Work, installed_versions
@@ -21,49 +17,24 @@ PARTS_PER_THREAD = 2
 """Parts submitted for each thread of a worker, so that the next one is there when one is finished."""
 MAX_ATTEMPTS = 20
 """Lost workers after which a part counts as their cause."""
-CONNECT_TIMEOUT, WORKER_TIMEOUT = 30.0, 120.0
-"""How long to wait for a scheduler, and for its first worker [s]."""
 POLL_INTERVAL = 0.5  # s
-
-
-@contextmanager
-def connected(scheduler: str) -> Iterator[Any]:
-    """A client of a scheduler; on leaving, the engine processes of the workers end.
-
-    Raises:
-        EngineMissing: Dask is not installed.
-        DropspinError: The address is not valid, or the scheduler does not answer.
-    """
-    if not re.fullmatch(r"[a-z]+://[^\s:]+:\d+", scheduler):
-        raise DropspinError(
-            f"--scheduler {scheduler}: not a valid address; give the one that dask scheduler prints when it starts, such as tcp://host:8786."
-        )
-    if find_spec("distributed") is None:
-        raise EngineMissing("--scheduler needs Dask, which is not installed: pip install 'dropspin[cluster]'.")
-    from distributed import Client
-
-    try:
-        client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)  # type: ignore[no-untyped-call]  # distributed has no types
-    except (OSError, ValueError) as error:
-        raise DropspinError(f"--scheduler {scheduler}: no scheduler answers ({error}); start one with: dask scheduler.") from None
-    with client, client.as_current():
-        try:
-            client.wait_for_workers(1, timeout=WORKER_TIMEOUT)
-        except TimeoutError:
-            reason = f"no worker has connected for {WORKER_TIMEOUT:g} s; start one with: dask worker {scheduler}"
-            raise DropspinError(f"--scheduler {scheduler}: {reason}.") from None
-        try:
-            yield client
-        finally:
-            client.run(_close_idle_processes, on_error="ignore")
 
 
 def run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
     """Run parts on the workers of a client's scheduler; the other arguments are those of `local.run_locally`.
 
+    At the end, the engine processes of the workers end.
+
     Raises:
         DropspinError: A worker cannot run its part. The text gives the reason and the remedy.
     """
+    try:
+        _run_parts(client, work, parts, folder, on_progress)
+    finally:
+        client.run(_close_idle_processes, on_error="ignore")
+
+
+def _run_parts(client: Any, work: Work, parts: Iterator[Part], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
     from distributed import KilledWorker, wait
 
     running: dict[Any, Part] = {}

@@ -6,9 +6,10 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
+from comparisons.running.cluster import connected
 from comparisons.running.inputs import ignore
 from comparisons.running.processes import ResourceLimits
-from comparisons.sweeps.cluster import connected, run_on_cluster
+from comparisons.sweeps.cluster import run_on_cluster
 from comparisons.sweeps.folder import SweepFolder
 from comparisons.sweeps.jobs import Sweep
 from comparisons.sweeps.local import run_locally

@@ -13,9 +13,16 @@ from reports.terminal.safe import echo
 @click.option("--merge", "sent", multiple=True, metavar="PATH", help="Add a record that somebody sent, a folder or a file; run nothing.")
 @click.option("-o", "--output", default="record", show_default=True, metavar="DIR", help="Folder of the record.")
 @jobs_option("releases")
+@click.option("--scheduler", metavar="ADDRESS", help="Measure on the workers of a Dask cluster, such as tcp://host:8786.")
 @time_limit_option(60.0, "an engine may use for one simulation")
 def record_command(
-    engines: tuple[str, ...], releases: tuple[str, ...], sent: tuple[str, ...], output: str, jobs: int | None, time_limit: float
+    engines: tuple[str, ...],
+    releases: tuple[str, ...],
+    sent: tuple[str, ...],
+    output: str,
+    jobs: int | None,
+    scheduler: str | None,
+    time_limit: float,
 ) -> None:
     """Measure every release of each engine, in an environment of its own, and keep the results.
 
@@ -39,7 +46,7 @@ def record_command(
         echo(f"{one.engine} {one.release}: {one.reason or f'{one.results} results'} ({left} left)", err=True)
 
     try:
-        record(folder, load_plan(), engines, releases, jobs=as_jobs(jobs), time_limit=time_limit, on_done=on_done)
+        record(folder, load_plan(), engines, releases, jobs=as_jobs(jobs), scheduler=scheduler, time_limit=time_limit, on_done=on_done)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("finished releases are kept; the same command continues") from None
     echo(f"Record: {output}")

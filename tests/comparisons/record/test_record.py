@@ -54,8 +54,8 @@ def stub(monkeypatch):
     return replaced
 
 
-def record(folder, plan=PLAN, on_done=lambda one, left: None, **filters):
-    study.record(Record(folder), plan, jobs=1, time_limit=10.0, on_done=on_done, **filters)
+def record(folder, plan=PLAN, on_done=lambda one, left: None, **given):
+    study.record(Record(folder), plan, jobs=1, time_limit=10.0, on_done=on_done, **given)
 
 
 def table(folder):
@@ -93,10 +93,11 @@ def test_an_interrupt_keeps_whole_files_and_the_next_call_continues(stub, tmp_pa
 
     with pytest.raises(KeyboardInterrupt):
         record(tmp_path, on_done=interrupt)
-    assert 1 <= len(table(tmp_path)) < 3
+    kept, before = set(table(tmp_path)["release"]), len(stub.asked)
+    assert kept
     assert not list(tmp_path.rglob(".*"))
     record(tmp_path)
-    assert sorted(stub.asked) == RELEASES
+    assert not kept & set(stub.asked[before:])
     assert table(tmp_path)["release"].tolist() == RELEASES
 
 
@@ -113,6 +114,23 @@ def test_a_release_that_fails_costs_its_own_row(stub, tmp_path):
     stub.failures = {}
     record(tmp_path)
     assert table(tmp_path)["verdict"].tolist() == ["measured", "broken", "measured"]
+
+
+def test_workers_of_a_cluster_measure_with_their_own_machine_in_the_rows(stub, tmp_path, monkeypatch):
+    """Workers are threads of this process, with the stub in place of pip; the record is the one of this machine."""
+    distributed = pytest.importorskip("distributed")
+    record(tmp_path / "here", chosen=["1.0", "1.1"])
+    monkeypatch.setattr(study, "machine", lambda: machine() | {"processor": "of the worker"})
+    there = tmp_path / "there"
+    with distributed.LocalCluster(1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None) as cluster:
+        record(there, scheduler=cluster.scheduler_address)
+        assert sorted(stub.asked) == sorted(["1.0", "1.1", *RELEASES])
+        record(there, scheduler=cluster.scheduler_address)
+    assert len(stub.asked) == 5  # what the workers have measured is not measured again
+    rows = table(there)
+    assert set(rows["processor"]) == {"of the worker"}
+    columns = ["release", "value", "label", "scene", "versions"]
+    assert rows.iloc[:2][columns].equals(table(tmp_path / "here")[columns])
 
 
 def rewrite(path, **changes):

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from comparisons.engines.base import EngineMissing
+from comparisons.running import cluster as connection
 from comparisons.running.processes import ResourceLimits
 from comparisons.sweeps import cluster
 from comparisons.sweeps.running import read_sweep, run_sweep
@@ -82,7 +83,7 @@ def test_table_is_the_same_after_a_worker_is_killed(workers, tmp_path):
 
 @pytest.mark.parametrize("workers", [0], indirect=True)
 def test_scheduler_without_workers_is_reported(workers, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "WORKER_TIMEOUT", 0.5)
+    monkeypatch.setattr(connection, "WORKER_TIMEOUT", 0.5)
     with pytest.raises(DropspinError, match=r"no worker has connected for 0.5 s; start one with: dask worker tcp://"):
         run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler=workers[0])
     assert not (tmp_path / "out").exists()
@@ -97,10 +98,10 @@ def test_worker_that_may_not_start_processes_is_reported(tmp_path, monkeypatch):
 
 
 def test_missing_scheduler_and_missing_dask_are_reported(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr(connection, "CONNECT_TIMEOUT", 0.5)
     with pytest.raises(DropspinError, match=r"--scheduler tcp://127.0.0.1:1: no scheduler answers .*; start one with: dask scheduler"):
         run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler="tcp://127.0.0.1:1")
-    monkeypatch.setattr(cluster, "find_spec", lambda name: None)
+    monkeypatch.setattr(connection, "find_spec", lambda name: None)
     with pytest.raises(EngineMissing, match=r"pip install 'dropspin\[cluster\]'"):
         run_sweep(load_sweep(SPEC), str(tmp_path / "other"), scheduler="tcp://127.0.0.1:1")
 

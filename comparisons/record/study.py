@@ -1,7 +1,7 @@
 """Record releases: those that the record does not have yet, several at a time."""
 
 from collections.abc import Callable, Collection, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,7 +14,7 @@ from comparisons.record.environments import NOT_INSTALLABLE, POLL, NotMeasured, 
 from comparisons.record.plan import Plan
 from comparisons.record.store import Record, machine
 from comparisons.running.cluster import connected
-from scenarios import UnknownName
+from scenarios import DropspinError, UnknownName
 
 
 class Release(NamedTuple):
@@ -50,7 +50,8 @@ def record(
         on_done: Called after each release with what became of it, and with the number that is left.
 
     Raises:
-        DropspinError: There is no such engine or release, pip's index cannot be asked, or the record cannot be written.
+        DropspinError: There is no such engine or release, pip's index cannot be asked, the record cannot be written, or the scheduler does
+            not answer or is lost.
     """
     for engine in engines:
         if engine not in plan.engines:
@@ -78,6 +79,10 @@ def record(
                     record.write(engine, release, found.rows, common[engine] | found.machine | {"versions": found.versions})
                     results = sum(bool(row.get("metric")) for row in found.rows)
                     on_done(Release(engine, release, results, "" if results else found.rows[0]["reason"]), len(running))
+        except CancelledError:
+            raise DropspinError(
+                f"--scheduler {scheduler}: the connection was lost; finished releases are kept, and the same command continues."
+            ) from None
         finally:
             if stopping is not None:
                 stopping.set()

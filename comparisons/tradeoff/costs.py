@@ -1,8 +1,14 @@
-"""The cost of the time steps of an engine, measured in its process: wall time per simulated second, for one world and for a batch."""
+"""The cost of the time steps of an engine, measured in its process: wall time per simulated second, for one world and for a batch.
 
+And the memory that a batch takes.
+"""
+
+import ctypes
 import math
+import re
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +27,8 @@ BATCH_SECONDS = 0.02
 """The smallest wall time of a timing of a batch in free flight [s]."""
 LONGEST_BATCH = 4.0
 """The largest wall time of a timing of a batch on a floor [s]."""
+MEMORY_STEPS = 10
+PROCESS = Path("/proc/self")
 
 
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
@@ -87,3 +95,26 @@ def _timed_batch(engine: Engine, members: Sequence[Scenario], dt: float, steps: 
         states = np.asarray(batch.states())
         taken = time.perf_counter() - start
     return taken if np.isfinite(states).all() else math.nan
+
+
+def memory_per_world(entry: EngineEntry, scene: Scenario, dt: float, worlds: int) -> float:
+    """The largest memory that a batch takes while it steps, per world [bytes]; NaN if the system is not Linux, or without batches.
+
+    The batch is simulated twice. Before the second time, memory that the process has free is given back to the system.
+    """
+    members = [scene] * worlds
+    if not (PROCESS / "clear_refs").exists() or math.isnan(_timed_batch(entry.adapter, members, dt, MEMORY_STEPS)):
+        return math.nan
+    if hasattr(libc := ctypes.CDLL(None), "malloc_trim"):  # of glibc
+        libc.malloc_trim(0)
+    (PROCESS / "clear_refs").write_text("5")  # sets the peak to the present memory
+    before = _process_memory("VmRSS")
+    _timed_batch(entry.adapter, members, dt, MEMORY_STEPS)
+    return (_process_memory("VmHWM") - before) / worlds
+
+
+def _process_memory(key: str) -> int:
+    """A number of this process's status: its present memory, `VmRSS`, or the peak of that, `VmHWM` [bytes]."""
+    found = re.search(rf"^{key}:\s+(\d+) kB$", (PROCESS / "status").read_text(), re.MULTILINE)
+    assert found is not None
+    return 1024 * int(found[1])

@@ -71,6 +71,7 @@ class TradeOff:
         points: The configurations with a measured error and cost.
         ladders: The time steps tried for every requested engine, and the reason why no smaller one was tried.
         worlds: The numbers of worlds in a batch.
+        memory_per_world: By engine, the memory that the largest batch takes per world [bytes]; empty below 1,024 worlds.
     """
 
     scene: Scenario
@@ -78,6 +79,7 @@ class TradeOff:
     points: tuple[CostPoint, ...]
     ladders: tuple[Ladder, ...]
     worlds: tuple[int, ...] = WORLDS
+    memory_per_world: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def left_out(self) -> dict[str, str]:

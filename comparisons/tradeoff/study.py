@@ -18,7 +18,7 @@ from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
 from comparisons.running.parallel import as_jobs, results_in_parallel
 from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world
+from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, memory_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps
 from comparisons.tradeoff.ladder import Ladder
 from comparisons.tradeoff.points import CostPoint, TradeOff
@@ -48,6 +48,8 @@ ON_A_FLOOR = (
 )
 ROUNDS = 9
 MOST_WORLDS = 1 << 20
+LARGE_BATCH = 1024
+"""The smallest batch of which the memory is measured: that of fewer worlds is a few pages."""
 NO_COST = "its cost could not be measured: its time steps fail, or do not give a finite state"
 
 OnProgress = Callable[[str, float], None]
@@ -115,9 +117,10 @@ def tradeoff(
         crews = [processes] * min(as_jobs(jobs), len(entries))
         ladders = results_in_parallel(list(entries.values()), errors, crews, lambda what, share: report(what, 0.5 * share))
         points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, sizes, processes, report)
+        memory = _memory([entries[one.engine] for one in ladders], points, scene, sizes[-1], processes)
     measured = {point.engine for point in points}
     ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
-    found = TradeOff(scene, chosen, points, tuple(ladders), sizes)
+    found = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory)
     if not points:
         raise DropspinError(f"no engine runs {scene.name}: {'; '.join(f'{label}: {why}' for label, why in found.left_out.items())}.")
     return found
@@ -154,6 +157,25 @@ def _with_costs(
         for (entry, dt, error), rounds, batches in zip(steps, costs, per_world, strict=True)
         if np.isfinite(rounds).all()
     )
+
+
+def _memory(
+    entries: Sequence[EngineEntry], points: Sequence[CostPoint], scene: Scenario, worlds: int, processes: EngineProcesses
+) -> dict[str, float]:
+    """The memory per world [bytes] of each engine in a large batch."""
+    found = {}
+    for entry in entries if worlds >= LARGE_BATCH else ():
+        finest = next((point.dt for point in points if point.engine == entry.label and worlds in point.costs_per_world), None)
+        if finest is not None:
+            found[entry.label] = _memory_per_world(entry, scene, finest, worlds, processes)
+    return {label: memory for label, memory in found.items() if np.isfinite(memory)}
+
+
+def _memory_per_world(entry: EngineEntry, scene: Scenario, dt: float, worlds: int, processes: EngineProcesses) -> float:
+    try:
+        return processes.call(entry, memory_per_world, scene, dt, worlds)
+    except Failed:
+        return math.nan
 
 
 def _cost(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineProcesses) -> float:

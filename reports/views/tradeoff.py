@@ -43,6 +43,7 @@ def rows(found: TradeOff) -> list[dict[str, Any]]:
             "dt": _finite(dt),
             "error": _finite(error),
             **_costs(points.get((ladder.engine, dt)), found.worlds),
+            "memory_per_world": found.memory_per_world.get(ladder.engine),
             "on_pareto_front": any(point.engine == ladder.engine and point.dt == dt for point in front),
             "dominated_by": dominated_by.get(ladder.engine),
             "ladder_ended": ladder.ended,
@@ -92,13 +93,14 @@ def _row(found: TradeOff, point: CostPoint, on_front: str) -> dict[str, str]:
 
 
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
-    """Sentences: the cheapest configuration within each tolerance, the end of each ladder with the reason, and engines left out."""
+    """Sentences: the cheapest configuration within each tolerance, memory, the end of each ladder, and engines left out."""
     ended: dict[str, list[str]] = {}
     for ladder in found.ladders:
         if ladder.steps:
             ended.setdefault(_reason(ladder), []).append(f"{ladder.engine} at {_step(ladder.steps[-1][0])}")
     return [
         *(_recommendation(found, tolerance) for tolerance in within),
+        *_memory(found),
         *(f"No smaller time step was tried because {reason}: {', '.join(labels)}." for reason, labels in ended.items()),
         *(f"Left out: {label}, {why}." for label, why in found.left_out.items()),
     ]
@@ -130,6 +132,12 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         if batched is not None:
             sentence += f" In a batch of {size}, {_named(batched)}: {duration(batched.costs_per_world[size])} per world."
     return sentence
+
+
+def _memory(found: TradeOff) -> list[str]:
+    """A sentence with the memory per world of each engine, where it was measured."""
+    memory = ", ".join(f"{label} {value / 1e3:.2g} kB" for label, value in found.memory_per_world.items())
+    return [f"Memory per world in a batch of {found.worlds[-1]}: {memory}."] if memory else []
 
 
 def _reason(ladder: Ladder) -> str:

@@ -8,8 +8,9 @@ import pytest
 from support.accuracy_options import InnerStep
 from support.engines import Exact, ExactSimulation
 
-from comparisons.engines.base import Diverged
+from comparisons.engines.base import BatchSimulation, Diverged
 from comparisons.measuring.metrics import METRICS, leading_metric
+from comparisons.running.inputs import EngineEntry
 from comparisons.running.recording import simulate
 from comparisons.running.run import measure
 from comparisons.tradeoff import costs, errors, study
@@ -316,3 +317,31 @@ def test_accuracy_options_are_walked_beside_the_time_step():
     errors_at_coarsest = {ladder.engine: ladder.steps[0][1] for ladder in found.ladders}
     assert list(errors_at_coarsest) == ["inner-step", *(f"inner-step[inner_step={1 / n!r}]" for n in (240, 480))]
     assert errors_at_coarsest["inner-step"] < 0.5 * errors_at_coarsest[f"inner-step[inner_step={1 / 240!r}]"]
+
+
+class Hoarding(BatchSimulation):
+    """Worlds that do not move, each with 20 kB, and twice as much in every step."""
+
+    def __init__(self, members):
+        self._states = np.array([member.initial_state for member in members])
+        self._kept = np.ones((len(members), 2500))
+
+    def advance(self, steps):
+        for _ in range(steps):
+            self._kept.copy()
+
+    def states(self):
+        return self._states
+
+
+@pytest.mark.parametrize("worlds", [1024, 4096])
+def test_memory_per_world_is_the_peak_of_a_batch(worlds):
+    """Known: 40 kB, and the states; unknown where the system is not Linux."""
+    made = type("Hoarder", (Exact,), {"name": "hoarder", "prepare_batch": lambda self, members, dt: Hoarding(members)})()
+    entry = EngineEntry("hoarder", made)
+    memory = [costs.memory_per_world(entry, SPIN, 1e-3, worlds) for _ in range(2)]
+    assert memory == pytest.approx([40_100.0 if costs.PROCESS.exists() else np.nan] * 2, rel=0.03, nan_ok=True)
+
+
+def test_memory_of_an_engine_without_batches_is_unknown():
+    assert np.isnan(costs.memory_per_world(EngineEntry("exact", Exact()), SPIN, 1e-3, 1024))

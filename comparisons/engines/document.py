@@ -12,6 +12,7 @@ from comparisons.measuring.predictions import bounce_error, flight_error
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Body, Box, Sphere, Vertices
+from scenarios.model import initial_states
 
 
 class Document(Engine):
@@ -111,7 +112,7 @@ class DocumentBatch(BatchSimulation):
         self.velocity_lag = 0.5 * dt
         scene = members[0]
         self._simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene), dt, methods)
-        self._states = np.array([member.initial_state for member in members])
+        self._states = initial_states(members)
 
     def advance(self, steps: int) -> None:
         self._states = self._simulator.run(self._states, steps, max(steps, 1))[:, -1]

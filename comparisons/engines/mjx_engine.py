@@ -20,6 +20,7 @@ from comparisons.engines.mujoco_ports import Port, built, ported_model
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
 from scenarios import Scenario
+from scenarios.model import initial_states
 
 with redirect_stdout(StringIO()):  # it prints that Warp is not installed, which it does not need
     from mujoco import mjx
@@ -108,7 +109,7 @@ class MJXBatch(BatchSimulation):
 
     def __init__(self, first: MJXSimulation, members: Sequence[Scenario]) -> None:
         self.velocity_lag, self._model = first.velocity_lag, first.model
-        rows = jax.device_put(from_world(np.array([member.initial_state for member in members])), jax.devices()[0])
+        rows = jax.device_put(from_world(initial_states(members)), jax.devices()[0])
         self._data = jax.vmap(lambda row: first.data.replace(qpos=row[:7], qvel=row[7:]))(rows)
 
     def advance(self, steps: int) -> None:

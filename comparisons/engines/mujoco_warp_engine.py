@@ -15,6 +15,7 @@ from comparisons.engines.mujoco_limitations import limitations_met
 from comparisons.engines.mujoco_ports import Port, built, ported_model
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from scenarios import Scenario
+from scenarios.model import initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
 import mujoco_warp as mjw  # noqa: E402
@@ -42,7 +43,7 @@ class Worlds(BatchSimulation):
         device = wp.get_device()
         self.settings = {"version": version("mujoco-warp"), "warp": wp.config.version, "device": f"{device} ({device.name})"} | settings
         self.model, self._data = mjw.put_model(model), mjw.make_data(model, nworld=len(members))
-        rows = from_world(np.array([member.initial_state for member in members])).astype(np.float32)
+        rows = from_world(initial_states(members)).astype(np.float32)
         mjw.step(self.model, self._data)  # compiles; nothing may be loaded while a graph is captured
         with wp.ScopedCapture() as capture:
             mjw.step(self.model, self._data)

@@ -14,6 +14,7 @@ from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Si
 from comparisons.engines.newton_rounding import rounding_met
 from scenarios import Scenario
 from scenarios.body import Box, Sphere
+from scenarios.model import initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
 import newton  # noqa: E402
@@ -87,7 +88,7 @@ class Worlds(BatchSimulation):
         with wp.ScopedCapture() as capture:
             self._step(dt)
         self._graph = capture.graph
-        rows = np.array([member.initial_state for member in members]).astype(np.float32)
+        rows = initial_states(members).astype(np.float32)
         self._now.assign(self.model.state())
         self._now.body_q.assign(rows[:, :7])
         self._now.body_qd.assign(rows[:, 7:])

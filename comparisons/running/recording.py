@@ -27,6 +27,7 @@ from comparisons.running.verification import (
     verify_starts,
 )
 from scenarios import DropspinError, Scenario, Trajectory
+from scenarios.state import PARTS
 
 Array = NDArray[np.float64]
 
@@ -148,9 +149,10 @@ def record_batch(
         lag = verified_lag(batch.velocity_lag, dt)
         states = verified_batch(batch.record(steps), len(starts), steps + 1)
     times = dt * np.arange(steps + 1, dtype=float)
-    verify_starts(engine, starts, np.array([rows[0] for rows in states]))
+    verify_starts(engine, starts, states[:, 0])
     on_simulations(len(starts), len(starts))
-    return [Trajectory.from_states(times, rows, lag) for rows in states]
+    positions, orientations, velocities, spins = (states[..., part] for part in PARTS.values())
+    return [Trajectory(times, *motion, velocity_lag=lag) for motion in zip(positions, orientations, velocities, spins, strict=True)]
 
 
 def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0) -> Recording | Breakdown:

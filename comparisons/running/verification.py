@@ -13,6 +13,7 @@ from comparisons.engines.base import Engine, KnownLimitation, Simulation
 from comparisons.engines.exceptions import LONGEST, described, short
 from reference_impl.threads import share_out
 from scenarios import Scenario
+from scenarios.model import initial_states
 from scenarios.rotations import length
 from scenarios.state import ORIENTATION, PARTS, SPIN
 from scenarios.validation import shown
@@ -64,7 +65,7 @@ def verify_start(engine: Engine, scene: Scenario, state: NDArray[np.float64], ul
 
 def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: NDArray[np.float64], ulps: int = BATCH_ULPS) -> None:
     """As `verify_start`, for each scene and its state, states of shape (size, 13)."""
-    starts = np.array([scene.initial_state for scene in scenes])
+    starts = initial_states(scenes)
     opposite = np.einsum("ij,ij->i", states[:, ORIENTATION], starts[:, ORIENTATION]) < 0.0
     starts[opposite, ORIENTATION] *= -1.0
     for name, part in PARTS.items():
@@ -93,8 +94,8 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
     return record
 
 
-def verified_batch(states: Any, size: int, rows: int) -> list[NDArray[np.float64]]:
-    """An engine's record of a batch as float64, each of its motions as in `verified_record`.
+def verified_batch(states: Any, size: int, rows: int) -> NDArray[np.float64]:
+    """An engine's record of a batch as float64, shape (size, rows, 13), each of its motions as in `verified_record`.
 
     Raises:
         BuildMismatch: It is not such a record.
@@ -103,8 +104,10 @@ def verified_batch(states: Any, size: int, rows: int) -> list[NDArray[np.float64
     if batch.ndim == 0 or len(batch) != size:
         raise BuildMismatch(f"the record of a batch has shape {batch.shape}; {size} motions were asked for, shape ({size}, {rows}, 13)")
     if batch.shape == (size, rows, 13) and batch.dtype == float and not share_out(partial(_doubtful, batch), size, rows, None):
-        return list(batch)
-    return [verified_record(motion, rows) for motion in batch]
+        return batch
+    for motion in batch:
+        verified_record(motion, rows)
+    return np.asarray(batch, dtype=float)
 
 
 def _doubtful(batch: NDArray[np.float64], first: int, last: int) -> int:

@@ -6,6 +6,7 @@ from support import engines as made
 
 from comparisons.running.verification import BuildMismatch, verified_batch, verify_start, verify_starts
 from scenarios import load
+from scenarios.model import initial_states
 from scenarios.rotations import rotate, unrotate
 from scenarios.state import ORIENTATION, SPIN
 
@@ -47,6 +48,26 @@ def test_one_wrong_quaternion_in_a_batch_is_found(length):
         verified_batch(states, 40, 3)
     states[39, 2, 7] = np.nan  # a divergence, which has a verdict of its own
     assert np.isnan(verified_batch(states, 40, 3)[39]).any()
+
+
+def test_record_of_single_precision_and_of_a_divergence_are_converted_and_kept():
+    states = motions_of_a_batch().astype(np.float32)
+    states[7, 2, 3:7] = 0.5, -0.5, 0.5, -0.5
+    states[9, 2, 0] = np.inf
+    found = verified_batch(states, 40, 3)
+    assert found.dtype == np.float64
+    np.testing.assert_array_equal(found, states)
+    with pytest.raises(BuildMismatch, match="complex numbers"):
+        verified_batch(states.astype(complex), 40, 3)
+    with pytest.raises(BuildMismatch, match="40 motions were asked for"):
+        verified_batch(states[:39], 40, 3)
+
+
+def test_starts_of_many_scenes_are_those_of_each():
+    ball = load({"duration": 1.0, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}})
+    random = np.random.default_rng(0).normal(size=(5, 13))
+    scenes = [ball.starting_at(state) for state in random]
+    np.testing.assert_array_equal(initial_states(scenes), [scene.initial_state for scene in scenes])
 
 
 def test_one_wrong_start_in_a_batch_is_named():

@@ -8,7 +8,7 @@ in one of the two engines.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from comparisons.measuring.motions import Motions
 from comparisons.running.engine_process import Failed
 from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from comparisons.running.parallel import results_in_parallel, started_crews
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 from comparisons.running.recording import Breakdown
 from comparisons.symmetries.findings import Effects, Finding, Status, judged
@@ -69,6 +70,7 @@ def twins(
     dt: float = DT,
     on_progress: Callable[[str, float], None] | None = None,
     resources: ResourceLimits = RESOURCES,
+    jobs: int | None = None,
 ) -> list[TwinFinding]:
     """Run scenes with engines that should give the same motions, and compare these pair by pair.
 
@@ -76,8 +78,10 @@ def twins(
         scenes: One scene or several: scenes, catalogue names, paths of files, or mappings.
         engines: Two engines or more: engines, or names with options.
         dt: Time step [s].
-        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1.
+        on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1, in any
+            thread, but in one at a time.
         resources: The processor time [s] and memory [bytes] that an engine may use for one scene.
+        jobs: Number of scenes to run at a time; by default, the number of processors that this process may use. It changes no result.
 
     Returns:
         One finding for each scene and pair of engines.
@@ -91,12 +95,13 @@ def twins(
         raise DropspinError(f"twins: got {len(entries)} engine{'s' * (len(entries) != 1)}; name at least two, such as mujoco and mjx.")
     for scene in chosen:
         verify_time_step(scene, dt)
-    found: list[TwinFinding] = []
-    with EngineProcesses(resources) as processes:
-        for number, scene in enumerate(chosen):
-            (on_progress or ignore)(scene.name, number / len(chosen))
-            found += _of_scene(processes, entries, scene, dt)
-    return found
+
+    def of_scene(scene: Scenario, processes: EngineProcesses, report: Callable[[str], None]) -> list[TwinFinding]:
+        report(scene.name)
+        return _of_scene(processes, entries, scene, dt)
+
+    with started_crews(jobs, len(chosen), entries, resources) as crews:
+        return list(chain.from_iterable(results_in_parallel(chosen, of_scene, crews, on_progress or ignore)))
 
 
 def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene: Scenario, dt: float) -> list[TwinFinding]:

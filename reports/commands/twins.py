@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, time_limit_option
+from reports.commands.options import as_json, jobs_option, time_limit_option
 from reports.terminal.safe import echo
 
 if TYPE_CHECKING:
@@ -18,8 +18,11 @@ if TYPE_CHECKING:
 @click.option("-e", "--engine", "engines", multiple=True, required=True, metavar="ENGINE", help="An engine, with options; two or more.")
 @click.option("--dt", default=1e-3, show_default=True, type=float, metavar="SECONDS", help="The time step.")
 @time_limit_option(60.0, "an engine may use for one scene")
+@jobs_option("scenes to run")
 @as_json
-def twins_command(scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float, json_output: bool) -> None:
+def twins_command(
+    scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float, jobs: int | None, json_output: bool
+) -> None:
     """Find the time step from which engines of the same algorithm differ, such as MuJoCo and its port to a GPU.
 
     The motions of each pair of engines are compared at every time step: from which step on they differ at all, by how much before and
@@ -28,7 +31,7 @@ def twins_command(scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, 
     from reports.terminal.rows import print_rows, print_sentences
     from reports.views import twins as view
 
-    found = _with_progress(scenes, engines, dt, time_limit)
+    found = _with_progress(scenes, engines, dt, time_limit, jobs)
     if json_output:
         echo(json.dumps(view.as_data(found), indent=1))
         return
@@ -36,7 +39,9 @@ def twins_command(scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, 
     print_sentences(view.sentences(found))
 
 
-def _with_progress(scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float) -> "list[TwinFinding]":
+def _with_progress(
+    scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float, jobs: int | None
+) -> "list[TwinFinding]":
     """The findings of the study, which shows its progress and stops at an interrupt."""
     from comparisons.running.processes import ResourceLimits
     from comparisons.symmetries.twins import twins
@@ -48,4 +53,4 @@ def _with_progress(scenes: tuple[str, ...], engines: tuple[str, ...], dt: float,
             stop_if_interrupted()
             progress(what, share)
 
-        return twins(scenes, engines, dt=dt, on_progress=on_progress, resources=ResourceLimits(processor_time=time_limit))
+        return twins(scenes, engines, dt=dt, on_progress=on_progress, resources=ResourceLimits(processor_time=time_limit), jobs=jobs)

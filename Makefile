@@ -6,7 +6,9 @@ IS_NEW := -c 'import sys; sys.exit(sys.version_info < (3, 11))'
 PYTHON ?= $(shell for python in python3.11 python3; do "$$python" $(IS_NEW) 2> /dev/null && echo "$$python" && break; done)
 
 # Extras that are too large for the environment of `make test`, or exclude one another: each is tested in its own environment.
-HEAVY_ENGINES := mjx mujoco-warp newton sapien exudyn jsbsim
+HEAVY_ENGINES := mjx mujoco-warp newton sapien exudyn jsbsim rapier-js
+# A package of npm, which takes the place of an extra.
+NPM_rapier-js := @dimforge/rapier3d-compat
 
 .PHONY: report test test-browser test-engines test-all fuzz faults coverage bench examples docs site lint clean
 
@@ -85,7 +87,8 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 .venvs/%/.installed: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m venv .venvs/$*
 	.venvs/$*/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	.venvs/$*/bin/python -m pip install --quiet --disable-pip-version-check --group test --editable '.[$*]'
+	.venvs/$*/bin/python -m pip install --quiet --disable-pip-version-check --group test --editable '.$(if $(NPM_$*),,[$*])'
+	$(if $(NPM_$*),npm install --no-save --ignore-scripts --no-audit --loglevel=error --prefix .venvs/$* $(NPM_$*))
 	touch $@
 
 .PRECIOUS: .venvs/%/.installed

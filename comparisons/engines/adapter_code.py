@@ -43,7 +43,7 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
 
 def built_in_code(file: Path) -> str:
     """The short hash of a built-in adapter, by its file: all of its files, whose names begin alike; none is imported."""
-    return _hashed(file.parent.glob(f"{file.stem.partition('_')[0]}*.py"))
+    return _hashed(file.parent.glob(f"{file.stem.partition('_')[0]}*.*"))
 
 
 def _hashed(files: Iterable[Path]) -> str:

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.engines.npm_packages import is_npm, npm_version
 from comparisons.measuring.symmetries import REPRESENTED
 from scenarios import Scenario, Truth
 from scenarios.body import Box, Sphere
@@ -23,10 +24,13 @@ from scenarios.validation import shown
 Array = NDArray[np.float64]
 
 
-@cache
+_distribution_version = cache(metadata.version)
+"""Cached, because each query parses its metadata."""
+
+
 def version(package: str) -> str:
-    """The installed version of a distribution; cached, because each query parses its metadata."""
-    return metadata.version(package)
+    """The installed version of a distribution, or of a package of npm."""
+    return npm_version(package) if is_npm(package) else _distribution_version(package)
 
 
 class EngineMissing(DropspinError):

@@ -16,15 +16,14 @@ from scipy.spatial.transform import Rotation
 
 from comparisons.engines import base
 from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, version
+from comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
 from comparisons.measuring.predictions import spins_steadily
-from scenarios import Scenario, truth_for
+from scenarios import Scenario
 from scenarios.body import Sphere
 from scenarios.mechanics import principal_axes
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, PARTS
+from scenarios.state import PARTS
 from scenarios.transformations import heavy_neighbour
 
-FRICTION = {"none": 0.0, "infinite": 1e6}
 LARGEST = float(np.finfo(np.float32).max)
 FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapier's threads, which all worlds share
 PARAMETERS = {
@@ -40,8 +39,8 @@ REASONS = {name: why for name, (_, why) in PARAMETERS.items()} | {
     "normalized_prediction_distance": "a step's fall; at 0 turning on a rough floor errs by 0.19 rad, not 5e-3; at 2 cm landings by 1.5%",
     "gyroscopic_forces": "off in steady flight, where they are 0; rounding in L = I ω and back would add 1.2e-4 of L in 1000 steps",
     "allow_fast_rotation": "no clamp of the angular velocity, at π/4 a step by default",
-    "linear_damping": "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives the scene's decay; angular_damping is the same",
-    "friction": f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution, because Rapier takes the average",
+    "linear_damping": f"{WHY_DAMPING}; angular_damping is the same",
+    "friction": WHY_FRICTION,
 }
 """Effects were measured at 1 ms without the one setting."""
 
@@ -54,21 +53,7 @@ class Rapier(Engine):
     representations: ClassVar = ("floor", "beside")
 
     def declines(self, scene: Scenario) -> str | None:
-        body, floor = scene.body, scene.floor
-        if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, self.option("floor"))) is not None or floor is None:
-            return unfit
-        if floor.rest_speed > 0.0:
-            return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
-        if floor.restitution == 0.0:
-            return None
-        if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):
-            return "Rapier's friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
-        truth = truth_for(scene)
-        heights = [rotate(hit.before[ORIENTATION], body.vertices)[:, 1] for hit in truth.events] if truth else []
-        landings = np.reshape(heights, (-1, len(body.vertices)))
-        if np.any(np.sum(landings <= landings.min(axis=1, keepdims=True) + 1e-6 * body.size, axis=1) > 1):
-            return "Rapier applies restitution to one contact after another, each undoes those before; here several corners land at once"
-        return None
+        return refusal(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return RapierSimulation(scene, dt, self.option("floor"), self.option("beside"))
@@ -88,11 +73,8 @@ class RapierSimulation(Simulation):
             setattr(self._world.integration_parameters, name, rapier3d.SpringCoefficients(*value) if isinstance(value, tuple) else value)
         gyroscopic = base.may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
         dynamics: dict[str, Any] = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic}
-        for motion, rate in scene.damping.model_dump().items() if scene.damping else ():
-            dynamics[f"{motion}_damping"] = float(np.expm1(rate * dt)) / dt
-        surface = {}
-        if scene.floor is not None:
-            surface = {"restitution": scene.floor.restitution, "friction": FRICTION.get(str(scene.floor.friction), scene.floor.friction)}
+        dynamics |= {f"{motion}_damping": rate for motion, rate in damping_of(scene, dt).items()}
+        surface = surface_of(scene)
         self._body = self._add_body(scene, dynamics, surface)
         if surface:
             self._world.add_collider(_floor(floor, surface))

@@ -3,14 +3,16 @@
 import re
 import sys
 from collections.abc import Mapping
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points
 from importlib.util import find_spec
+from shutil import which
 from typing import NamedTuple, cast
 
 from comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from comparisons.engines.exceptions import described
+from comparisons.engines.npm_packages import is_npm, npm_package
 from scenarios.errors import DropspinError, UnknownName
 from scenarios.validation import shown
 
@@ -37,6 +39,12 @@ BUILT_IN = {
         "pip install pybullet (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)",
     ),
     "rapier": _Home("comparisons.engines.rapier_engine", "Rapier", "rapier3d", "pip install 'dropspin[rapier]'"),
+    "rapier-js": _Home(
+        "comparisons.engines.rapier_js_engine",
+        "RapierJS",
+        "@dimforge/rapier3d-compat",
+        "npm install @dimforge/rapier3d-compat, in the working folder or a folder above it",
+    ),
     "dart": _Home("comparisons.engines.dart_engine", "Dart", "dartpy", "pip install 'dropspin[dart]'"),
     "drake": _Home("comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
     "sapien": _Home("comparisons.engines.sapien_engine", "Sapien", "sapien", "pip install 'dropspin[sapien]'"),
@@ -116,8 +124,8 @@ def _adapter(base: str) -> type[Engine]:
     if base in BUILT_IN:
         home = BUILT_IN[base]
         # Checked before the import of the adapter, which imports its engine.
-        if home.package and find_spec(home.package) is None:
-            raise EngineMissing(f"{base} is not installed: {home.how_to_install}.")
+        if home.package and (absence := _absence(home)):
+            raise EngineMissing(f"{base} is not installed: {absence}.")
         try:
             adapter: type[Engine] = getattr(import_module(home.module), home.adapter)
         except (Exception, SystemExit) as error:
@@ -132,6 +140,18 @@ def _adapter(base: str) -> type[Engine]:
     if base not in brought:
         raise DropspinError(f"{UnknownName('engine', base, engine_names())} Name an engine of your own as my_module:MyEngine.")
     return _imported(base, brought[base].module, brought[base].attr)
+
+
+def _absence(home: _Home) -> str:
+    """What an engine lacks, or how to install it; empty if it is installed."""
+    if not is_npm(home.package):
+        return home.how_to_install if find_spec(home.package) is None else ""
+    if which("node") is None:
+        return "it runs in Node.js, and there is no node on PATH"
+    with suppress(PackageNotFoundError):
+        npm_package(home.package)
+        return ""
+    return home.how_to_install
 
 
 def _entry_points() -> dict[str, EntryPoint]:

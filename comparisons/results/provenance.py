@@ -7,15 +7,16 @@ import platform
 import subprocess
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, distribution, version
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
+from comparisons.engines.base import version
 from scenarios.text import printable
 
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 ENGINES = (
-    *("mujoco", "pybullet", "rapier3d", "dartpy", "drake"),
+    *("mujoco", "pybullet", "rapier3d", "@dimforge/rapier3d-compat", "dartpy", "drake"),
     *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien", "exudyn", "jsbsim"),
 )
 STAMPED = (*MEASURING, *ENGINES)

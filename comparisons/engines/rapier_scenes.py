@@ -1,0 +1,45 @@
+"""What the adapters of Rapier's Python and JavaScript packages share: the scenes that Rapier cannot reproduce, surfaces and damping."""
+
+import numpy as np
+
+from comparisons.engines import base
+from scenarios import Scenario, truth_for
+from scenarios.body import Sphere
+from scenarios.rotations import rotate
+from scenarios.state import ORIENTATION
+
+FRICTION = {"none": 0.0, "infinite": 1e6}
+WHY_FRICTION = f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution, because Rapier takes the average"
+WHY_DAMPING = "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives the scene's decay"
+
+
+def refusal(scene: Scenario, kind: str) -> str | None:
+    """Why Rapier cannot reproduce a scene on a floor of a kind, `plane`, `box` or `mesh`; None if it can."""
+    body, floor = scene.body, scene.floor
+    if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, kind)) is not None or floor is None:
+        return unfit
+    if floor.rest_speed > 0.0:
+        return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
+    if floor.restitution == 0.0:
+        return None
+    if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):
+        return "Rapier's friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
+    truth = truth_for(scene)
+    heights = [rotate(hit.before[ORIENTATION], body.vertices)[:, 1] for hit in truth.events] if truth else []
+    landings = np.reshape(heights, (-1, len(body.vertices)))
+    if np.any(np.sum(landings <= landings.min(axis=1, keepdims=True) + 1e-6 * body.size, axis=1) > 1):
+        return "Rapier applies restitution to one contact after another, each undoes those before; here several corners land at once"
+    return None
+
+
+def damping_of(scene: Scenario, dt: float) -> dict[str, float]:
+    """Rapier's coefficients of the damping of `linear` and `angular` velocities [1/s]; empty without damping."""
+    return {motion: float(np.expm1(rate * dt)) / dt for motion, rate in scene.damping.model_dump().items()} if scene.damping else {}
+
+
+def surface_of(scene: Scenario) -> dict[str, float]:
+    """Restitution and coefficient of friction of body and floor; empty without a floor."""
+    if scene.floor is None:
+        return {}
+    friction = scene.floor.friction
+    return {"restitution": scene.floor.restitution, "friction": FRICTION[friction] if isinstance(friction, str) else friction}

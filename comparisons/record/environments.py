@@ -1,7 +1,7 @@
 """Environments of releases: which releases there are, and a virtual environment that has one of them and all that dropspin runs with.
 
 The environment has the packages of the running one on its path, after its own: only the engine is installed, and its release is the one
-that is imported. pip chooses wheels only, so that no code of a source distribution runs.
+that is imported. pip chooses wheels only, and npm runs no scripts, so that no code of a package runs while it is installed.
 """
 
 import json
@@ -10,11 +10,13 @@ import sys
 import venv
 from collections.abc import Sequence
 from pathlib import Path
+from shutil import which
 from subprocess import PIPE, STDOUT, Popen, TimeoutExpired
 from tempfile import TemporaryDirectory
 from threading import Event
 from typing import Any
 
+from comparisons.engines.npm_packages import is_npm
 from comparisons.record.plan import Plan
 from comparisons.running.processes import Closed
 from scenarios import DropspinError, UnknownName
@@ -22,7 +24,7 @@ from scenarios import DropspinError, UnknownName
 POLL = 0.5  # s
 LONGEST_REASON = 300
 NOT_INSTALLABLE = "not installable"
-"""The beginning of the reason why pip did not install a release; another day it may."""
+"""The beginning of the reason why a release was not installed; another day it may be."""
 HOME = Path(__file__).parents[2]
 
 
@@ -31,19 +33,39 @@ class NotMeasured(Exception):
 
 
 def releases(package: str, oldest: str) -> list[str]:
-    """The releases of a package in pip's index from a release on, oldest first.
+    """The releases of a package in the index of pip, or of npm, from a release on, oldest first.
 
     Raises:
-        DropspinError: pip is not installed, cannot ask its index, or the index lacks the package or the oldest release.
+        DropspinError: pip or npm is not installed, cannot ask its index, or the index lacks the package or the oldest release.
     """
+    listed = _npm_releases(package) if is_npm(package) else _pip_releases(package)
+    if oldest not in listed:
+        raise UnknownName(f"{package}'s oldest release", oldest, listed)
+    return listed[listed.index(oldest) :]
+
+
+def _pip_releases(package: str) -> list[str]:
     code, output = run([sys.executable, "-m", "pip", "index", "versions", package], Event())
     found = re.search(r"^Available versions: (.+)$", output, re.MULTILINE)
     if code or found is None:
         raise DropspinError(f"pip cannot list the releases of {package}: {last_line(output)}; record needs pip, and access to its index.")
-    listed = found[1].split(", ")
-    if oldest not in listed:
-        raise UnknownName(f"{package}'s oldest release", oldest, listed)
-    return listed[: listed.index(oldest) + 1][::-1]
+    return found[1].split(", ")[::-1]
+
+
+def _npm_releases(package: str) -> list[str]:
+    """Without prereleases."""
+    code, output = run([_npm(package), "view", package, "versions", "--json", "--loglevel=error"], Event())
+    if code:
+        raise DropspinError(f"npm cannot list the releases of {package}: {last_line(output)}; its releases need access to npm's index.")
+    return [one for one in json.loads(output) if re.fullmatch(r"\d+(\.\d+)*", one)]
+
+
+def _npm(package: str) -> str:
+    """The path of npm."""
+    found = which("npm")
+    if found is None:
+        raise DropspinError(f"record needs npm for {package}, and there is none on PATH; install Node.js, or name other engines with -e.")
+    return found
 
 
 def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping: Event) -> dict[str, Any]:
@@ -66,8 +88,11 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
     own = plan.engines[engine]
     with TemporaryDirectory(prefix="dropspin-record-") as folder:
         python = _environment(Path(folder))
-        pip = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-input", "--only-binary", ":all:"]
-        code, output = run([*pip, *own.requirements(release)], stopping)
+        if is_npm(own.package):
+            install = [_npm(own.package), "install", "--prefix", folder, "--no-save", "--ignore-scripts", "--no-audit", "--loglevel=error"]
+        else:
+            install = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-input", "--only-binary", ":all:"]
+        code, output = run([*install, *own.requirements(release)], stopping)
         if code:
             raise NotMeasured(f"{NOT_INSTALLABLE}: {without_paths(last_line(output))}")
         request, answer = Path(folder, "request.json"), Path(folder, "answer.json")
@@ -114,7 +139,9 @@ def run(command: Sequence[str], stopping: Event) -> tuple[int, str]:
 
 
 def last_line(output: str) -> str:
-    """The last line of an output that says what went wrong: pip's first error, else the last line."""
+    """The line of an output that says what went wrong: npm's first error after its code, pip's last error, else the last line."""
+    if (found := re.search(r"^npm error (?!code)\S+ (.+)$", output, re.MULTILINE)) is not None:
+        return found[1]
     lines = output.strip().splitlines() or ["no output"]
     errors = [line for line in lines if line.startswith("ERROR: ")]
     return (errors or lines)[-1].removeprefix("ERROR: ")

@@ -7,6 +7,7 @@ from pathlib import Path
 from pydantic import Field
 
 from comparisons.engines.mujoco_versions import numbers_of
+from comparisons.engines.npm_packages import is_npm
 from comparisons.results.stored_files import sha256
 from scenarios import load
 from scenarios.body import Table
@@ -21,7 +22,7 @@ class Releases(Table):
     """The releases of one engine.
 
     Attributes:
-        package: The name on PyPI.
+        package: The name on PyPI, or on npm with its scope.
         together: Another package, of which the same release is installed; empty if there is none.
         extra: The extra with which the package is installed; empty for none.
         oldest: The first release to measure.
@@ -41,7 +42,9 @@ class Releases(Table):
     scenes: tuple[str, ...] = ()
 
     def requirements(self, release: str) -> list[str]:
-        """What pip installs for a release."""
+        """What pip or npm installs for a release."""
+        if is_npm(self.package):
+            return [f"{self.package}@{release}"]
         extra = f"[{self.extra}]" if self.extra else ""
         chosen = [f"{self.package}{extra}=={release}", *([f"{self.together}=={release}"] if self.together else [])]
         return chosen + (NUMPY_1 if self.numpy_1_until and numbers_of(release) <= numbers_of(self.numpy_1_until) else [])

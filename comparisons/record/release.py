@@ -3,14 +3,14 @@
 import json
 import sys
 from collections.abc import Iterator
-from importlib.metadata import packages_distributions, version
+from importlib.metadata import packages_distributions
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.engines.base import Diverged, Engine
+from comparisons.engines.base import Diverged, Engine, version
 from comparisons.engines.registry import engine as engine_named
 from comparisons.engines.stand_in import code_of
 from comparisons.measuring.comparison import Comparison

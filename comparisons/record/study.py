@@ -50,7 +50,7 @@ def record(
         on_done: Called after each release with what became of it, and with the number that is left.
 
     Raises:
-        DropspinError: There is no such engine or release, pip's index cannot be asked, the record cannot be written, or the scheduler does
+        DropspinError: There is no such engine or release, an index cannot be asked, the record cannot be written, or the scheduler does
             not answer or is lost.
     """
     for engine in engines:

@@ -9,7 +9,7 @@ from reports.terminal.safe import echo
 
 @click.command("record")
 @click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine of the record; repeat for more.")
-@click.option("--release", "releases", multiple=True, metavar="VERSION", help="A release; repeat for more. [default: all that pip finds]")
+@click.option("--release", "releases", multiple=True, metavar="VERSION", help="A release; repeat for more. [default: all on the index]")
 @click.option("--merge", "sent", multiple=True, metavar="PATH", help="Add a record that somebody sent, a folder or a file; run nothing.")
 @click.option("-o", "--output", default="record", show_default=True, metavar="DIR", help="Folder of the record.")
 @jobs_option("releases")
@@ -26,8 +26,8 @@ def record_command(
 ) -> None:
     """Measure every release of each engine, in an environment of its own, and keep the results.
 
-    pip lists the releases and installs each into a temporary environment, in which the same scenes are run with the same settings. A
-    release that the record has already is not run again.
+    pip, or npm, lists the releases and installs each into a temporary environment, in which the same scenes are run with the same
+    settings. A release that the record has already is not run again.
     """
     from comparisons.record.plan import load_plan
     from comparisons.record.store import Record

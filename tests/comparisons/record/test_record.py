@@ -1,4 +1,7 @@
-"""The record of releases: measured once, resumed, merged, and refused if changed. pip is replaced: no test needs a network."""
+"""The record of releases: measured once, resumed, merged, and refused if changed. pip and npm are replaced: no test needs a network.
+
+The file is longer than 300 lines because it tests every way in which a release, a file or an index can fail.
+"""
 
 import re
 import sys
@@ -309,6 +312,7 @@ def test_the_plan_names_engines_with_canonical_labels():
     assert plan.engines["newton"].requirements("1.0.0") == ["newton[sim]==1.0.0"]
     assert plan.engines["pybullet"].requirements("3.2.6") == ["pybullet==3.2.6", "numpy<2", "pandas<3"]
     assert plan.engines["pybullet"].requirements("3.2.7") == ["pybullet==3.2.7"]
+    assert plan.engines["rapier-js"].requirements("0.20.0") == ["@dimforge/rapier3d-compat@0.20.0"]
     assert plan.scenes_of("mjx") == ("drop-ball", "spin-dzhanibekov")
     assert plan.scenes_of("dart") == plan.scenes
     assert len({plan.digest(name) for name in plan.engines}) == len(plan.engines)  # each loads its scenes

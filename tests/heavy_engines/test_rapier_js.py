@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -77,7 +78,7 @@ def is_running(process):
 
 def wait_for_its_end(process):
     while is_running(process):
-        pass
+        time.sleep(0.01)
 
 
 def test_node_ends_with_its_engine_process():

@@ -3,8 +3,7 @@
 import math
 from dataclasses import dataclass
 
-import pandas as pd
-from scipy.stats import gmean
+import numpy as np
 
 from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.tolerances import scale
@@ -64,7 +63,7 @@ def step_times(results: Results) -> dict[str, float]:
     """
     timed = results.table[results.table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
     times = timed.pivot(index=["scene", "dt"], columns="engine", values="time_per_step")
-    means = times.dropna().agg(gmean) if len(times.dropna()) else pd.Series(dtype=float)
+    means = np.exp(np.log(times.dropna()).mean())
     return {engine: float(means.get(engine, math.nan)) for engine in results.engines}
 
 

@@ -87,13 +87,13 @@ def test_error_of_the_defaults_alone_is_a_setting_error():
     """It does not vanish as dt → 0 and the calibrated profile does not have it; without that profile in the run it is a model error."""
     ball = load("drop-ball").model_copy(update={"duration": 0.8})
     steps = [5e-4, 2.5e-4, 1.25e-4]  # by default no ball bounces at such steps; at coarser ones some do
-    both = run(ball, ["pybullet", "pybullet[profile=default]"], steps)
+    both = run(ball, ["pybullet", "pybullet[profile=default]"], steps, quick=True)
     lasting = both.asymptotic_errors("setting")
     assert set(lasting["engine"]) == {"pybullet[profile=default]"}
     assert {"energy_error", "bounce_height_error"} <= set(lasting["metric"])
     assert both.asymptotic_errors("model").empty
     assert lasting["reason"].str.contains("it is a setting").all()
-    alone = run(ball, ["pybullet[profile=default]"], steps)
+    alone = run(ball, ["pybullet[profile=default]"], steps, quick=True)
     assert not alone.asymptotic_errors("model").empty
     assert alone.asymptotic_errors("setting").empty
 

@@ -7,7 +7,11 @@ from support import engines as made
 import dropspin as ds
 from comparisons.running import start_phases
 
-SCENES = ds.draw(20, 1)
+
+@pytest.fixture(scope="module")
+def drawn():
+    """Scenes of every family."""
+    return ds.draw(20, 1)
 
 
 class Changed(made.Exact):
@@ -60,12 +64,12 @@ def _few_start_phases(monkeypatch):
     monkeypatch.setattr(start_phases, "START_PHASES", 4)
 
 
-def test_an_exact_engine_raises_no_alarm():
-    results = ds.run(SCENES, made.Exact())
+def test_an_exact_engine_raises_no_alarm(drawn):
+    results = ds.run(drawn, made.Exact())
     assert results.exit_code() == 0, results.table[~results.table["verdict"].isin(["passed", "measured"])].to_string()
     assert set(results.table["verdict"]) <= {"passed", "measured"}
     judged = results.table[results.table["kind"] == "asymptotic_error"]
-    assert judged.groupby("scene").size().reindex([scene.name for scene in SCENES]).min() >= 3
+    assert judged.groupby("scene").size().reindex([scene.name for scene in drawn]).min() >= 3
 
 
 @pytest.mark.parametrize(
@@ -78,9 +82,9 @@ def test_an_exact_engine_raises_no_alarm():
     ],
     ids=lambda case: case.__name__ if callable(case) else "",
 )
-def test_an_engine_fitted_to_a_table_is_caught(change, families):
+def test_an_engine_fitted_to_a_table_is_caught(drawn, change, families):
     """In a scene of each of these families."""
-    scenes = [scene for scene in SCENES if scene.tags[1] in families]
+    scenes = [scene for scene in drawn if scene.tags[1] in families]
     results = ds.run(scenes, changed(change))
     failed = set(results.table.loc[results.table["verdict"] == "failed", "scene"])
     assert {scene.tags[1] for scene in scenes if scene.name in failed} == families

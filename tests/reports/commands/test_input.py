@@ -3,7 +3,7 @@
 import os
 
 import pytest
-from support.cli import spawn
+from support.cli import dropspin, spawn
 
 import dropspin as ds
 
@@ -83,11 +83,12 @@ CASES = [
 
 @pytest.mark.parametrize(("arguments", "message"), CASES, ids=range(len(CASES)))
 def test_input_that_nobody_means_is_refused_in_one_message(arguments, message, tmp_path):
+    """Who reads a pipe or a device waits forever, which ends a process of its own."""
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
     os.mkfifo(tmp_path / "pipe")
     before = sorted(tmp_path.rglob("*"))
-    done = spawn(*arguments, cwd=tmp_path, timeout=60.0)
+    done = spawn(*arguments, cwd=tmp_path, timeout=60.0) if message == NOT_A_FILE else dropspin(*arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert message in done.stderr
     assert "Traceback" not in done.stderr

@@ -116,7 +116,7 @@ def constructed(base: str, options: Mapping[str, str]) -> Engine:
 
 def is_foreign(base: str) -> bool:
     """Whether the code of an engine is not dropspin's: a class, or an engine of another package."""
-    return ":" in base or base in _entry_points()
+    return ":" in base or (base not in BUILT_IN and base in _entry_points())  # which takes 7 ms to read
 
 
 def _adapter(base: str) -> type[Engine]:

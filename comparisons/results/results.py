@@ -101,8 +101,22 @@ class Results:
         Returns:
             By scene and engine: the worst verdict, and the status in words, such as `converges`.
         """
-        by_pair = {(str(scene), str(engine)): rows for (scene, engine), rows in self.table.groupby(["scene", "engine"])}
-        return {scene: {engine: _status(by_pair.get((scene, engine))) for engine in self.engines} for scene in self.scenes}
+        table, verdicts = self.table, self.table["verdict"]
+        is_small = (verdicts == "known") & ~(table["value"].abs() > NEGLIGIBLE)
+        explains_nothing = (verdicts == "limited") & (table["metric"] == "")
+        of_rows = {
+            "severity": verdicts.map(SEVERITY.index).where(~(is_small | explains_nothing)),
+            "of_model": (verdicts == "known") & (table["cause"] == "model"),
+            "studied": table["kind"] == "asymptotic_error",
+            "undecided": is_undecided(table) & ~table["metric"].isin(JUMPING),
+        }
+        by_pair = table[["scene", "engine"]].assign(**of_rows).groupby(["scene", "engine"])
+        found = {
+            (str(scene), str(engine)): _status(SEVERITY[int(severity)], *flags)
+            for (scene, engine), severity, *flags in by_pair.agg({"severity": "min"} | dict.fromkeys(list(of_rows)[1:], "any")).itertuples()
+        }
+        absent = Status("missing", "missing")
+        return {scene: {engine: found.get((scene, engine), absent) for engine in self.engines} for scene in self.scenes}
 
     def leading_errors(self, scene: str) -> pd.DataFrame:
         """The errors of all engines in one metric of a scene, at the finest time step.
@@ -192,18 +206,20 @@ def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > NEGLIGIBLE)
 
 
-def _status(rows: pd.DataFrame | None) -> Status:
-    if rows is None:
-        return Status("missing", "missing")
-    is_small = (rows["verdict"] == "known") & ~(rows["value"].abs() > NEGLIGIBLE)
-    explains_nothing = (rows["verdict"] == "limited") & (rows["metric"] == "")
-    mentioned = rows[~(is_small | explains_nothing)]
-    worst = min(mentioned["verdict"], key=SEVERITY.index)
-    of_model = bool((rows.loc[rows["verdict"] == "known", "cause"] == "model").any())
-    studied = worst in ("passed", "measured") and bool((rows["kind"] == "asymptotic_error").any())
-    converges = UNDECIDED if (is_undecided(rows) & ~rows["metric"].isin(JUMPING)).any() else "converges"
-    words = "known model error" if of_model and worst == "known" else converges if studied else STATUS_WORDS.get(worst, worst)
-    return Status(worst, words)
+def _status(worst: str, of_model: bool, studied: bool, undecided: bool) -> Status:
+    """The status of an engine in a scene.
+
+    Args:
+        worst: Its worst verdict.
+        of_model: Whether a known error is a model error.
+        studied: Whether the time steps give asymptotic errors.
+        undecided: Whether they leave one undecided.
+    """
+    if worst == "known" and of_model:
+        return Status(worst, "known model error")
+    if worst in ("passed", "measured") and studied:
+        return Status(worst, UNDECIDED if undecided else "converges")
+    return Status(worst, STATUS_WORDS.get(worst, worst))
 
 
 def _counted(verdicts: "pd.Series[str]") -> str:

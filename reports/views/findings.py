@@ -87,10 +87,8 @@ def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
     """For each engine, the scenes in which an error with this cause does not vanish as dt → 0; negligible errors are left out."""
     rows = results.asymptotic_errors(cause)
     worth = rows[rows["value"].abs() > NEGLIGIBLE]
-    return {
-        engine: [scene for scene in results.scenes if ((worth["engine"] == engine) & (worth["scene"] == scene)).any()]
-        for engine in results.engines
-    }
+    pairs = set(zip(worth["engine"], worth["scene"], strict=True))
+    return {engine: [scene for scene in results.scenes if (engine, scene) in pairs] for engine in results.engines}
 
 
 @dataclass(frozen=True)

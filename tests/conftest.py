@@ -32,6 +32,20 @@ def uses_pybullet(item: pytest.Item) -> bool:
     return bool(WITH_PYBULLET & names) or "pybullet" in item.path.read_text(encoding="utf-8").lower()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _timed_once():
+    """Time the steps of engines once, not three times: no test asserts on a clock. Their processes are forked, and inherit it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("comparisons.running.engine_run.TIMING_REPEATS", 1)
+        yield
+
+
+@pytest.fixture
+def few_start_phases(monkeypatch):
+    """Four start phases instead of 32, for engines made for tests: they solve each start anew, and are as exact from each."""
+    monkeypatch.setattr("comparisons.running.start_phases.START_PHASES", 4)
+
+
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], None]], Path]:
     """Call it with a name and a function that fills a folder: the folder is filled once a session, for all workers of pytest-xdist."""
@@ -59,10 +73,11 @@ def core_run(shared) -> Path:
 
     def make(folder: Path) -> None:
         from support.engines import QUICK
+        from support.scenes import with_few_members
 
         from comparisons.results.store import save
         from comparisons.running.run import run
 
-        save(run(QUICK, ["document", "mujoco", "pybullet"]), folder)
+        save(run(map(with_few_members, QUICK), ["document", "mujoco", "pybullet"]), folder)
 
     return shared("core-run", make)

@@ -40,6 +40,7 @@ FRICTION = {
 }
 
 
+@pytest.mark.usefixtures("few_start_phases")
 @pytest.mark.parametrize(("title", "scene"), (SUBTLE | HARD_CODED | OTHER_KINDS | FRICTION).items())
 def test_planted_fault_is_detected_in_one_scene(title, scene):
     """At the default time steps: a changed scene, changed states, changes at impacts and a wrong claim."""

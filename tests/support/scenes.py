@@ -11,6 +11,13 @@ UP, AXIS = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 G = 9.8
 
 
+def with_few_members(name):
+    """A scene of the catalogue; an ensemble has 20 members, because a hundred take a quarter of the time of a run of the core catalogue."""
+    scene = load(name)
+    few = {"ensemble": scene.ensemble and scene.ensemble.model_copy(update={"size": 20})}
+    return scene.model_copy(update=few)
+
+
 def standing(half=(0.2, 0.5), lean=-0.2, speed=0.0, friction="infinite", heading=0.3, axes=(0, 1, 2), sideways=(0.0, 0.0), **more):
     """A box on an edge, ψ = |lean| from the vertical; a positive lean falls back on the face below it, a negative one over the edge.
 

@@ -5,7 +5,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from comparisons.running import start_phases
+
+pytestmark = pytest.mark.usefixtures("few_start_phases")
 
 
 @pytest.fixture(scope="module")
@@ -56,12 +57,6 @@ def with_more_restitution(scene):
 
 def content(scene):
     return scene.model_dump(exclude_none=True, exclude={"origin"})
-
-
-@pytest.fixture(autouse=True)
-def _few_start_phases(monkeypatch):
-    """The made engines solve each start anew, and are exact from each."""
-    monkeypatch.setattr(start_phases, "START_PHASES", 4)
 
 
 def test_an_exact_engine_raises_no_alarm(drawn):

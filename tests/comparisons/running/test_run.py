@@ -158,6 +158,7 @@ def test_each_pair_of_engines_is_compared_once(core):
     assert alike["value"].abs().max() < 1e-5
 
 
+@pytest.mark.usefixtures("few_start_phases")
 def test_exact_engine_passes_everywhere():
     """An engine without any error fails no expectation."""
     # The means over an ensemble have no exact value to compare with, and its exact motions take most of the time.

@@ -21,7 +21,7 @@ def test_the_adapter_of_the_documentation_conforms_and_runs(tmp_path):
     done = dropspin("conform", "my_module:Flyer", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert {row["outcome"] for row in json.loads(done.stdout)} == {"passed", "declined"}
-    done = dropspin("run", "spin-asymmetric", "-e", "my_module:Flyer", "--dt", "0.002", "--json", cwd=tmp_path)
+    done = dropspin("run", "fall-spin", "-e", "my_module:Flyer", "--dt", "0.004", "--json", cwd=tmp_path)
     assert {row["engine"] for row in json.loads(done.stdout)} == {"flyer"}
     assert {path.name for path in tmp_path.iterdir()} - {"__pycache__"} == {"my_module.py", "out"}
 

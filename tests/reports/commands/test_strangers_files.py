@@ -25,8 +25,8 @@ DEEP = "[" * 5000 + "]" * 5000
 def test_history_writes_only_into_its_folder(name, small, tmp_path):
     """A scene's name is no path; every picture has its place, and the page names it."""
     spin = load("spin-principal").model_dump(exclude_none=True, exclude={"expect"}) | {"duration": 0.2, "name": name}
-    for copy in ("one", "two"):
-        write_report(run(spin, "mujoco", 1e-2), tmp_path / "runs" / copy)
+    write_report(run(spin, "mujoco", 1e-2), tmp_path / "runs" / "one")
+    shutil.copytree(tmp_path / "runs" / "one", tmp_path / "runs" / "two")
     before = contents(tmp_path)
     assert dropspin("history", "runs", "-o", "deep/er/out", cwd=tmp_path).returncode == 0
     written = contents(tmp_path).keys() - before.keys()

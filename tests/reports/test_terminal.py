@@ -17,7 +17,7 @@ from reports.views.run import overview
 @pytest.fixture(scope="module")
 def core(core_run):
     """The default run: the scenes of the core catalogue of a stored run."""
-    results = ds.load_results(core_run)
+    results = ds.load_results(core_run, arrays=False)
     scenes = {name: scene for name, scene in results.scenes.items() if "core" in scene.tags}
     return replace(results, scenes=scenes, table=results.table[results.table["scene"].isin(scenes)])
 

@@ -22,9 +22,9 @@ def flat():
 
 
 @pytest.fixture(scope="module")
-def rows(core_run, flat):
+def rows(core_run):
     """The measurements and predictions of all scenes that have predictions, with all engines."""
-    runs = ds.load_results(core_run, arrays=False), ds.run(FREE + flat, "document[rotation=exact]", [4e-3, 2e-3, 1e-3])
+    runs = ds.load_results(core_run, arrays=False), ds.run(FREE, "document[rotation=exact]", [4e-3, 1e-3])
     return tuple(pd.concat([getattr(one, kind) for one in runs], ignore_index=True) for kind in ("measurements", "predictions"))
 
 

@@ -10,7 +10,7 @@ from reports.views.run import overview
 
 @pytest.fixture(scope="module")
 def core(core_run):
-    return ds.load_results(core_run)
+    return ds.load_results(core_run, arrays=False)
 
 
 @pytest.mark.parametrize(

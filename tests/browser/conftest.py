@@ -29,9 +29,11 @@ class Page:
         self.tab.on("request", lambda request: self.requests.append(request.url))
         self.tab.goto(file.as_uri())
 
-    def start_replays(self):
-        """Open every scene and its viewer, the last first, since a button disappears when it is pressed."""
-        self.tab.locator("#scenes > details").evaluate_all("all => { for (const one of all) one.open = true; }")
+    def start_replays(self, *scenes):
+        """Open some scenes and their viewers, by default all, the last first, since a button disappears when it is pressed."""
+        self.tab.locator("#scenes > details").evaluate_all(
+            "(all, names) => { for (const one of all) one.open = !names.length || names.includes(one.dataset.scene); }", list(scenes)
+        )
         for button in reversed(self.tab.get_by_role("button", name="Replay in 3D").all()):
             button.click()
         return self.tab.locator("[data-replay]").count()

@@ -40,6 +40,14 @@ def _timed_once():
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _shared_functions():
+    """Compile what all kernels of Wang's method share, 5 s where numba's cache is empty: engine processes, which are forked, have it then."""
+    from comparisons.running.recording import simulate
+
+    simulate("drop-box-corner", "document", 1e-2)
+
+
 @pytest.fixture
 def few_start_phases(monkeypatch):
     """Four start phases instead of 32, for engines made for tests: they solve each start anew, and are as exact from each."""

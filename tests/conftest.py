@@ -42,7 +42,7 @@ def _timed_once():
 
 @pytest.fixture(scope="session", autouse=True)
 def _shared_functions():
-    """Compile what all kernels of Wang's method share, 5 s where numba's cache is empty: engine processes, which are forked, have it then."""
+    """Compile what all kernels of Wang's method share, 5 s without numba's cache: engine processes, which are forked, have it then."""
     from comparisons.running.recording import simulate
 
     simulate("drop-box-corner", "document", 1e-2)

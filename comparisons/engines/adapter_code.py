@@ -10,6 +10,7 @@ from contextlib import suppress
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
+PACKAGE, PROTOCOL = "comparisons.engines", "base"
 HOME = Path(__file__).parents[2]
 OWN = tuple(HOME / name for name in ("comparisons", "reference_impl", "reports", "scenarios", "dropspin.py"))
 INSTALLED = frozenset({"site-packages", "dist-packages"})
@@ -42,8 +43,18 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
 
 
 def built_in_code(file: Path) -> str:
-    """The short hash of a built-in adapter, by its file: all of its files, whose names begin alike; none is imported."""
-    return _hashed(file.parent.glob(f"{file.stem.partition('_')[0]}*.*"))
+    """The short hash of a built-in adapter: its file and those of its folder that the file imports, and others of the same names.
+
+    The engine protocol, which all adapters have in common, is left out. No file is imported.
+    """
+    files: set[Path] = set()
+    left = {file}
+    while left:
+        files |= left
+        imported = {name.removeprefix(f"{PACKAGE}.") for one in left for name in _imported(one, PACKAGE)}
+        named = {file.with_name(f"{name}.py") for name in imported - {PROTOCOL}}
+        left = {one for one in named - files if one.is_file()}
+    return _hashed(same for one in files for same in file.parent.glob(f"{one.stem}.*"))
 
 
 def _hashed(files: Iterable[Path]) -> str:

@@ -19,7 +19,7 @@ from comparisons.engines.base import Array
 from comparisons.engines.npm_packages import npm_package
 
 PACKAGE = "@dimforge/rapier3d-compat"
-DRIVER = Path(__file__).with_name("rapier_js_driver.cjs")
+DRIVER = Path(__file__).with_suffix(".cjs")
 
 
 class Node:

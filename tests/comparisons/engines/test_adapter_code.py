@@ -1,14 +1,42 @@
-"""The hash of a built-in adapter: every file whose name begins as the adapter's does, in any language."""
+"""The hash of a built-in adapter: its file, those of its folder that it imports, directly or not, and others of the same names."""
 
+from pathlib import Path
+
+import pytest
+
+from comparisons.engines import base
 from comparisons.engines.adapter_code import built_in_code
 
+HERE = Path(base.__file__).parent
 
-def test_a_changed_file_of_an_adapter_is_another_engine(tmp_path):
-    adapter, driver, other = (tmp_path / name for name in ("rapier_js_engine.py", "rapier_js_driver.cjs", "registry.py"))
-    for file in (adapter, driver, other):
-        file.write_text("a")
-    before = built_in_code(adapter)
-    other.write_text("b")
-    assert built_in_code(adapter) == before
-    driver.write_text("b")
-    assert built_in_code(adapter) != before
+
+def _copied(folder):
+    for file in HERE.glob("*.*"):
+        (folder / file.name).write_bytes(file.read_bytes())
+
+
+@pytest.mark.parametrize(
+    ("adapter", "changed"),
+    [
+        ("rapier_js_engine.py", "rapier_js_node.cjs"),
+        ("rapier_js_engine.py", "rapier_scenes.py"),
+        ("mujoco_engine.py", "mujoco_engine.py"),
+        ("mjx_engine.py", "mujoco_contact.py"),
+    ],
+)
+def test_a_changed_file_of_an_adapter_is_another_engine(tmp_path, adapter, changed):
+    _copied(tmp_path)
+    before = built_in_code(tmp_path / adapter)
+    (tmp_path / changed).write_bytes(b"# changed\n" + (tmp_path / changed).read_bytes())
+    assert built_in_code(tmp_path / adapter) != before
+
+
+@pytest.mark.parametrize(
+    ("adapter", "changed"),
+    [("rapier_engine.py", "rapier_js_engine.py"), ("mujoco_engine.py", "mujoco_warp_engine.py"), ("mujoco_engine.py", "base.py")],
+)
+def test_a_changed_file_of_another_engine_is_the_same(tmp_path, adapter, changed):
+    _copied(tmp_path)
+    before = built_in_code(tmp_path / adapter)
+    (tmp_path / changed).write_bytes(b"# changed\n" + (tmp_path / changed).read_bytes())
+    assert built_in_code(tmp_path / adapter) == before

@@ -33,6 +33,12 @@ def version(package: str) -> str:
     return npm_version(package) if is_npm(package) else _distribution_version(package)
 
 
+def numpy_array(given: Any) -> NDArray[Any]:
+    """What an engine returned, as NumPy reads it, or by DLPack if it cannot."""
+    only_dlpack = hasattr(given, "__dlpack__") and not hasattr(given, "__array__")
+    return np.from_dlpack(given) if only_dlpack else np.asarray(given)
+
+
 class EngineMissing(DropspinError):
     """An engine whose package is not installed; the text says how to get it."""
 
@@ -142,14 +148,14 @@ class BatchSimulation(ABC):
 
     @abstractmethod
     def states(self) -> Array:
-        """The state of each, as `Simulation.state` gives it, shape (size, 13); NumPy must be able to read the array."""
+        """The state of each, as `Simulation.state` gives it, shape (size, 13); an array that NumPy or DLPack can read."""
 
     def record(self, steps: int, every: int = 1) -> Array:
         """States now and after each `every` of `steps` steps, shape (size, 1 + steps // every, 13)."""
-        rows = [np.array(self.states(), dtype=float)]
+        rows = [numpy_array(self.states()).astype(float)]
         for _ in range(steps // every):
             self.advance(every)
-            rows.append(np.array(self.states(), dtype=float))
+            rows.append(numpy_array(self.states()).astype(float))
         return np.stack(rows, axis=1)
 
     def close(self) -> None:  # noqa: B027 - optional

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Engine, KnownLimitation, Simulation
+from comparisons.engines.base import Engine, KnownLimitation, Simulation, numpy_array
 from comparisons.engines.exceptions import LONGEST, described, short
 from reference_impl.threads import share_out
 from scenarios import Scenario
@@ -81,7 +81,7 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
     """
     if np.iscomplexobj(states):
         raise BuildMismatch("the record has complex numbers")
-    record = np.asarray(states, dtype=float)
+    record = np.asarray(numpy_array(states), dtype=float)
     if record.shape != (rows, 13):
         raise BuildMismatch(f"the record has shape {record.shape}; {rows} states of 13 numbers were asked for, shape ({rows}, 13)")
     if not np.isfinite(record).all():
@@ -100,7 +100,7 @@ def verified_batch(states: Any, size: int, rows: int) -> NDArray[np.float64]:
     Raises:
         BuildMismatch: It is not such a record.
     """
-    batch = np.asarray(states)
+    batch = numpy_array(states)
     if batch.ndim == 0 or len(batch) != size:
         raise BuildMismatch(f"the record of a batch has shape {batch.shape}; {size} motions were asked for, shape ({size}, {rows}, 13)")
     if batch.shape == (size, rows, 13) and batch.dtype == float and not share_out(partial(_doubtful, batch), size, rows, None):

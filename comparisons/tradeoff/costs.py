@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.engines.base import Diverged, Engine
+from comparisons.engines.base import Diverged, Engine, numpy_array
 from comparisons.running.inputs import MOST_STEPS, EngineEntry
 from comparisons.running.recording import time_steps
 from scenarios import Scenario
@@ -92,7 +92,7 @@ def _timed_batch(engine: Engine, members: Sequence[Scenario], dt: float, steps: 
     with batch:
         start = time.perf_counter()
         batch.advance(steps)
-        states = np.asarray(batch.states())
+        states = numpy_array(batch.states())
         taken = time.perf_counter() - start
     return taken if np.isfinite(states).all() else math.nan
 

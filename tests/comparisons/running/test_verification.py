@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support import engines as made
 
+from comparisons.engines.base import BatchSimulation
 from comparisons.running.verification import BuildMismatch, verified_batch, verify_start, verify_starts
 from scenarios import load
 from scenarios.model import initial_states
@@ -80,3 +81,32 @@ def test_one_wrong_start_in_a_batch_is_named():
     starts[37, 0] = 38.0
     with pytest.raises(BuildMismatch, match=r"position at the start is \[38\. .* the scene has \[37\. "):
         verify_starts(made.Exact(), scenes, starts)
+
+
+class OfAnotherLibrary:
+    """An array that offers one way of reading it."""
+
+    def __init__(self, values, way):
+        self._values, self.way = values, way
+
+    def __getattr__(self, name):
+        if name not in {self.way, "__dlpack_device__"}:
+            raise AttributeError(name)
+        return getattr(self._values, name)
+
+
+@pytest.mark.parametrize("way", ["__array__", "__array_interface__", "__dlpack__"])
+@pytest.mark.parametrize("number", [np.float32, np.float64])
+def test_states_of_another_library_are_read_in_the_way_that_it_offers(way, number):
+    class Elsewhere(made.Together):
+        def states(self):
+            return OfAnotherLibrary(super().states().astype(number), way)
+
+    scene = load("spin-principal")
+    starts = [scene, scene.model_copy(update={"duration": 1.0})]
+    found = Elsewhere([made.Exact().prepare(start, 1e-2) for start in starts], None)
+    recorded = BatchSimulation.record(found, 4)
+    again = made.Exact().prepare(scene, 1e-2)
+    expected = again.record(4).astype(number)
+    np.testing.assert_array_equal(recorded, [expected, expected])
+    np.testing.assert_array_equal(verified_batch(OfAnotherLibrary(recorded, way), 2, 5), recorded)

@@ -1,6 +1,7 @@
 """The programs in docs/by_hand, which repeat findings with an engine alone."""
 
 import ast
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 PACKAGES = {
     "check_sapien.py": {"sapien"},
     "check_exudyn.py": {"exudyn"},
+    "check_jsbsim.py": {"jsbsim"},
     "check_newton.py": {"newton", "warp"},
     "check_mjx.py": {"mujoco", "jax"},
     "check_mujoco_warp.py": {"mujoco", "mujoco_warp", "warp"},
@@ -26,7 +28,7 @@ def imported(program):
 
 @pytest.mark.parametrize("program", PACKAGES)
 def test_program_imports_its_engine_without_dropspin(program):
-    assert imported(program) - {"numpy", "scipy", "itertools"} == PACKAGES[program]
+    assert imported(program) - {"numpy", "scipy", *sys.stdlib_module_names} == PACKAGES[program]
 
 
 def test_page_on_engines_links_every_program():

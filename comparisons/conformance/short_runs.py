@@ -9,7 +9,7 @@ from comparisons.conformance.outcomes import Declined
 from comparisons.conformance.probes import DT, PROBES
 from comparisons.engines.base import Engine
 from comparisons.running.recording import record
-from scenarios import Scenario, truth_for
+from scenarios import Scenario, Trajectory, truth_for
 
 Array = NDArray[np.float64]
 
@@ -42,10 +42,15 @@ def _shortly_before_contact(scene: Scenario) -> Scenario:
     return scene.starting_at(truth(truth.events[0].time - 5.5 * DT).states[0])
 
 
+def few_steps(engine: Engine, scene: Scenario, dt: float) -> Trajectory:
+    """The motion of a few recorded steps."""
+    few = scene.model_copy(update={"duration": (A_FEW_STEPS + 0.5) * dt})
+    return record(engine, few, dt, verify=False).motion
+
+
 def recorded(engine: Engine, scene: Scenario, dt: float = DT) -> Array:
     """The states of a few recorded steps, shape (1 + A_FEW_STEPS, 13)."""
-    few = scene.model_copy(update={"duration": (A_FEW_STEPS + 0.5) * dt})
-    return record(engine, few, dt, verify=False).motion.states
+    return few_steps(engine, scene, dt).states
 
 
 def advanced(engine: Engine, scene: Scenario, between: Callable[[], None] = lambda: None) -> Array:

@@ -84,6 +84,14 @@ class Site:
         """The engine with each set of options that a release was measured with."""
         return list(dict.fromkeys(label for label, _, _ in release.cases))
 
+    def with_results(self, engine: str) -> int:
+        """The number of releases of an engine that have a result."""
+        return sum(any(case.verdict == "measured" for case in one.cases.values()) for one in self.measured[engine])
+
+    def remarks(self, scene: str) -> list[str]:
+        """The known limitations in a scene, and why engines have no result, at the finest time step."""
+        return view.remarks({label: self.case(label, scene, self.dts[-1]) for label in self.engines})
+
     def position(self, release: Release, label: str) -> int:
         """The number of the section of a label on the page of a release, from 1."""
         return self.labels_of(release).index(label) + 1

@@ -1,7 +1,7 @@
 """The pages of a record in words: the digits in a cell, what changed in a release, and what an engine gets right and wrong."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from shlex import quote
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from comparisons.record.findings import Case, Change, Release, digits, leading, 
 from reports.views.leading_errors import level
 from reports.views.numbers import duration, formatted, in_ms, word
 
-GROUPS = {"at least 5 digits": 5.0, "2 to 5 digits": 2.0, "fewer than 2 digits": 0.0}
+GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}
 """What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""
 
 
@@ -32,17 +32,17 @@ def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
     case, metric = release.cases.get((label, scene, dt)), leading(scene)
     if case is None:
         return Cell("?", None, "not measured", "not measured")
-    error, again = relative_error(case, scene), f"{label} {release.name}, dt = {in_ms(dt)}; measure again: {rerun(label, release, scene)}"
+    error, again = relative_error(case, scene), f"{label} {release.name}, dt = {in_ms(dt)}; to repeat it: {rerun(label, release, scene)}"
     remark = f"{case.reason}; " if case.reason else ""
     if math.isnan(error):  # a motion without this error: the time step is too coarse
         status = "too coarse" if case.verdict == "measured" else word(case.verdict)
         return Cell(MARKS[case.verdict], None, status, remark + again)
     parts = [f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}"]
     parts += [f"over starts {sizes(case)}"] if sizes(case) else []
-    parts += [f"{cost(case)} per simulated second, {case.relative_cost:.3g} times that of document"] if cost(case) != "–" else []
+    parts += [f"{cost(case)} per simulated second, {case.relative_cost:.3g} times that of Wang's method"] if cost(case) != "–" else []
     shown = ", ".join(parts) + ", "
     status, mark = ("known limitation", "! ") if case.reason else ("measured", "")
-    return Cell(f"{mark}{digits(error):.1f}", level(error), status, remark + shown + again)
+    return Cell(f"{mark}{math.floor(10.0 * digits(error)) / 10.0:.1f}", level(error), status, remark + shown + again)
 
 
 def rerun(label: str, release: Release, scene: str) -> str:
@@ -72,17 +72,28 @@ def mean_cost(release: Release, label: str, dt: float, *, with_floor: bool) -> s
     return duration(math.exp(np.mean(np.log(costs)))) if costs else "–"
 
 
+def remarks(cases: Mapping[str, Case]) -> list[str]:
+    """Why there is no result, or which limitation is known: a sentence for all names, of scenes or labels, that have the same."""
+    found: dict[str, list[str]] = {}
+    for name, case in cases.items():
+        if case.reason:
+            words = "known limitation" if case.verdict == "measured" else word(case.verdict)
+            found.setdefault(f"{words}: {case.reason}", []).append(name)
+    return [f"{', '.join(names)}: {words}" for words, names in found.items()]
+
+
 def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
     """What changed in each release, newest first: a sentence for each scene, the largest change of digits first.
 
-    Labels and scenes that changed alike have one sentence.
+    Labels and scenes that changed alike have one sentence; scenes with values in one of the releases only come last.
     """
     groups: dict[tuple[str, str, str], list[Change]] = {}
     for change in changed:
         groups.setdefault((change.release, change.label, change.scene), []).append(change)
     scenes: dict[tuple[str, str, str], list[str]] = {}
-    for (release, label, scene), found in sorted(groups.items(), key=lambda item: -max(map(_gained, item[1]))):
-        scenes.setdefault((release, label, _words(found)), []).append(scene)
+    shown = {key: _shown(found) for key, found in groups.items()}
+    for (release, label, scene), change in sorted(shown.items(), key=lambda item: -_gained(item[1])):
+        scenes.setdefault((release, label, _words(change)), []).append(scene)
     labels: dict[str, dict[tuple[str, str], list[str]]] = {change.release: {} for change in reversed(changed)}
     for (release, label, words), names in scenes.items():
         labels[release].setdefault((", ".join(names), words), []).append(label)
@@ -91,24 +102,29 @@ def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
     }
 
 
-def _gained(change: Change) -> float:
-    """The size of the change of digits; infinite where there is a value in one of the releases only."""
-    of = scale(problem(change.scene), METRICS[change.metric].unit) if change.metric else math.nan
-    return abs(digits(abs(change.new) / of) - digits(abs(change.old) / of)) if change.metric else math.inf
-
-
-def _words(found: Sequence[Change]) -> str:
+def _shown(found: Sequence[Change]) -> Change:
     """The change of a scene at the finest time step: of its leading error, else of the metric that changed most."""
     finest = [change for change in found if change.dt == min(one.dt for one in found)]
-    shown = next((change for change in finest if change.metric == leading(change.scene)), finest[0])
-    if not shown.metric:
-        reason = shown.now.reason if shown.now.verdict != "measured" else f"before: {shown.was.reason}"
-        return f"{word(shown.was.verdict)} → {word(shown.now.verdict)} ({reason})"
-    old, new = formatted(shown.old), formatted(shown.new)
+    return next((change for change in finest if change.metric == leading(change.scene)), finest[0])
+
+
+def _gained(change: Change) -> float:
+    """The size of the change of digits; -1 where there is a value in one of the releases only."""
+    if not change.metric:
+        return -1.0
+    of = scale(problem(change.scene), METRICS[change.metric].unit)
+    return abs(digits(abs(change.new) / of) - digits(abs(change.old) / of))
+
+
+def _words(change: Change) -> str:
+    if not change.metric:
+        reason = change.now.reason if change.now.verdict != "measured" else f"before: {change.was.reason}"
+        return f"{word(change.was.verdict)} → {word(change.now.verdict)} ({reason})"
+    old, new = formatted(change.old), formatted(change.new)
     if old == new:  # as many digits as are needed to see the difference
-        old, new = next(pair for n in range(4, 18) if len(set(pair := (f"{shown.old:.{n}g}", f"{shown.new:.{n}g}"))) == 2)
-    step = f"dt = {in_ms(shown.dt)}".replace(" ", "\xa0")  # in one line
-    return f"{shown.metric.replace('_', ' ')} {old} → {new}{_unit(shown.metric)} at {step}"
+        old, new = next(pair for n in range(4, 18) if len(set(pair := (f"{change.old:.{n}g}", f"{change.new:.{n}g}"))) == 2)
+    step = f"dt = {in_ms(change.dt)}".replace(" ", "\xa0")  # in one line
+    return f"{change.metric.replace('_', ' ')} {old} → {new}{_unit(change.metric)} at {step}"
 
 
 def _unit(metric: str) -> str:
@@ -125,9 +141,18 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
 
 
 def since(label: str, scene: str, releases: Sequence[Release], changed: Iterable[Change]) -> str:
-    """The release since which nothing changed in a scene, or the first that was measured."""
+    """The release since which nothing changed in a scene."""
     moved = [change.release for change in changed if (change.label, change.scene) == (label, scene)]
-    return moved[-1] if moved else next(one.name for one in releases if any(key[:2] == (label, scene) for key in one.cases))
+    first = next(one.name for one in releases if any(key[:2] == (label, scene) for key in one.cases))
+    return moved[-1] if moved else f"{first}, the oldest"
+
+
+def changes_in_words(changed: Sequence[Change]) -> str:
+    """In which releases results changed, and in which of the others scenes have a result that had none, or the reverse."""
+    numbers = list(dict.fromkeys(change.release for change in changed if change.metric))
+    others = [release for release in dict.fromkeys(change.release for change in changed) if release not in numbers]
+    parts = [f"results changed in {', '.join(numbers)}" if numbers else "no result changed"]
+    return "; ".join(parts + ([f"which scenes have results changed in {', '.join(others)}"] if others else []))
 
 
 def badge(engine: str, release: Release, label: str, dt: float) -> dict[str, Any]:

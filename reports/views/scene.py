@@ -1,19 +1,22 @@
 """The description of a scene: the effects that it models and those that it leaves out."""
 
+import numpy as np
+
 from scenarios.model import Scenario
 
 
 def modelled(scene: Scenario) -> list[str]:
     """The parts of a scene that are simulated."""
-    parts = [f"a {scene.body.shape} of {scene.body.mass:g} kg" if scene.body.shape != "vertices" else "a set of vertices"]
+    shape = "body with given vertices" if scene.body.shape == "vertices" else scene.body.shape
+    parts = [f"a {shape} of {scene.body.mass:g} kg"]
     if scene.gravity is not None:
-        parts.append("gravity")
+        parts.append(f"gravity of {np.linalg.norm(scene.acceleration):g} m/s²")
     if scene.floor is not None:
         friction = scene.floor.friction
         grip = {"none": "no friction", "infinite": "infinite friction"}.get(str(friction), f"friction {friction}")
         parts.append(f"a floor of restitution {scene.floor.restitution:g} and {grip}")
     if scene.damping is not None:
-        parts.append(f"damping of {scene.damping.linear:g} and {scene.damping.angular:g} per second")
+        parts.append(f"linear damping of {scene.damping.linear:g} and angular damping of {scene.damping.angular:g} per second")
     if scene.ensemble is not None:
         parts.append(f"{scene.ensemble.size} starts drawn around the scene's own")
     return parts

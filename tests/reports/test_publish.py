@@ -55,25 +55,25 @@ def test_page_of_an_engine_says_what_changed_in_which_release(site):
     """12.7 dt before and 0.001 dt from 3.11.0 on; 3.10.1 could not be installed and is passed over."""
     text = Page(site / "engine-mujoco.html").text
     both = "with mujoco, mujoco[profile=default]"
-    newest, older = text[text.index("3.11.0 after 3.10.0; 8 results changed") :].split("3.10.0 after 3.9.0; 4 results changed")
+    newest, older = text[text.index("3.11.0 after 3.10.0; 8 values changed") :].split("3.10.0 after 3.9.0; 4 values changed")
     assert f"spin-asymmetric {both}: orientation error 0.0127 → 1.00e-06 rad at dt = 1 ms" in newest
     assert f"drop-ball {both}: declined → measured (before: {HOSTILE})" in older
     assert f"3.10.1 could not be measured: not installable: {HOSTILE}" in older
     assert "unchanged since" in text
     assert "3.10.0 3.11.0" in text  # the columns of releases
     page = (site / "engine-mujoco.html").read_text(encoding="utf-8")
-    start = "orientation error 1.00e-06 rad, 2 ms per simulated second, 20 times that of document, mujoco 3.11.0"
+    start = "orientation error 1.00e-06 rad, 2 ms per simulated second, 20 times that of Wang&#39;s method, mujoco 3.11.0"
     [title] = set(re.findall(f'title="({start}[^"]*)"', page))
-    assert title.endswith("measure again: dropspin rerun mujoco 3.11.0 spin-asymmetric")
+    assert title.endswith("to repeat it: dropspin rerun mujoco 3.11.0 spin-asymmetric")
 
 
 def test_page_of_a_release_says_what_changed_in_it_and_has_the_command_of_each_cell(site):
     text = Page(site / "release-mujoco-3.11.0.html").text
-    assert "What changed after 3.10.0 8 results differ from those of 3.10.0" in text
+    assert "What changed after 3.10.0 8 values, over all metrics and time steps, differ from those of 3.10.0" in text
     assert "drop-ball with mujoco, mujoco[profile=default]: bounce height error 0.0127 → 1.00e-06 at dt = 1 ms" in text
     for label in ("mujoco", "'mujoco[profile=default]'"):
-        assert f"Measure a cell again: dropspin rerun {label} 3.11.0 SCENE" in text
-    assert "drop-ball 4.00e-06 2.00e-06 to 8.00e-06 1.00e-06 5.00e-07 to 2.00e-06 6.0 2 ms" in text
+        assert f"To repeat a result: dropspin rerun {label} 3.11.0 SCENE" in text
+    assert "drop-ball bounce height error 4.00e-06 2.00e-06 to 8.00e-06 1.00e-06 5.00e-07 to 2.00e-06 6.0 2 ms" in text
     assert "This is the first release that was measured." in Page(site / "release-mujoco-3.9.0.html").text
     assert "declined" in Page(site / "release-mujoco-3.9.0.html").text
 
@@ -91,6 +91,11 @@ def test_index_has_the_digits_of_the_newest_releases(site):
     mujoco, pybullet = ("0", "engine-mujoco.html#options-1", "6.0"), ("2", "engine-pybullet.html#options-1", "15.0")
     assert found == [mujoco, pybullet, mujoco, pybullet]
     assert re.findall(r'data-engine="(\d)" data-status', default) == ["1", "1"]
+
+
+def test_index_counts_releases_with_results_and_tells_results_from_scenes_that_were_declined_before(site):
+    text = Page(site / "index.html").text
+    assert "mujoco : 3 of 4 releases have results; results changed in 3.11.0; which scenes have results changed in 3.10.0 ( badge" in text
 
 
 def test_page_of_an_engine_counts_the_results_of_others_that_are_the_same(site):

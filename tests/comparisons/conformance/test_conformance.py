@@ -7,13 +7,16 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support import engines as made
 
 from comparisons.conformance import motion, waiting
 from comparisons.conformance.checks import CHECKS, conform, run_check
+from comparisons.conformance.clock import check_velocity_lag
+from comparisons.conformance.outcomes import CheckFailed
 from comparisons.conformance.probes import PROBES
-from comparisons.engines.base import KnownLimitation
+from comparisons.engines.base import KnownLimitation, Simulation
 from comparisons.engines.pybullet_engine import PyBullet
 from comparisons.engines.registry import engine
 from comparisons.running import recording
@@ -490,3 +493,31 @@ def test_compilation_is_measured_and_stated(monkeypatch, compiles, first, again,
     found = run_check(EngineEntry(engine_.label, engine_), "compilation")
     assert found.outcome == outcome
     assert message in found.message
+
+
+class SinglePrecision(Simulation):
+    """Semi-implicit Euler in four sub-steps, whose rounding errors in single precision add up."""
+
+    def __init__(self, scene, dt, lag):
+        self.velocity_lag, self._dt, self._g = lag * dt, np.float32(dt / 4), scene.acceleration.astype(np.float32)
+        self._state = scene.initial_state.astype(np.float32)
+
+    def advance(self, steps):
+        for _ in range(4 * steps):
+            self._state[7:10] += self._dt * self._g
+            self._state[:3] += self._dt * self._state[7:10]
+
+    def state(self):
+        return self._state.astype(float)
+
+
+def lag_of(stated):
+    """The check of the lag of four sub-steps in single precision, with a lag stated in steps."""
+    prepare = {"prepare": lambda self, scene, dt: SinglePrecision(scene, dt, stated)}
+    return check_velocity_lag(type("Single", (made.Exact,), prepare)(), "velocity lag")
+
+
+def test_rounding_of_single_precision_does_not_change_the_velocity_lag():
+    assert lag_of(1 / 8).outcome == "passed"
+    with pytest.raises(CheckFailed, match=r"velocity lags position by 0\.125 steps.*; set self.velocity_lag = 0.5 \* dt / 4"):
+        lag_of(1 / 16)

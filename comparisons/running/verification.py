@@ -79,9 +79,10 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
     Raises:
         BuildMismatch: It is not such a record.
     """
-    if np.iscomplexobj(states):
+    record = numpy_array(states)
+    if np.iscomplexobj(record):
         raise BuildMismatch("the record has complex numbers")
-    record = np.asarray(numpy_array(states), dtype=float)
+    record = np.asarray(record, dtype=float)
     if record.shape != (rows, 13):
         raise BuildMismatch(f"the record has shape {record.shape}; {rows} states of 13 numbers were asked for, shape ({rows}, 13)")
     if not np.isfinite(record).all():

@@ -143,8 +143,9 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
 def since(label: str, scene: str, releases: Sequence[Release], changed: Iterable[Change]) -> str:
     """The release since which nothing changed in a scene."""
     moved = [change.release for change in changed if (change.label, change.scene) == (label, scene)]
-    first = next(one.name for one in releases if any(key[:2] == (label, scene) for key in one.cases))
-    return moved[-1] if moved else f"{first}, the oldest"
+    if moved:
+        return moved[-1]
+    return f"{next(one.name for one in releases if any(key[:2] == (label, scene) for key in one.cases))}, the oldest"
 
 
 def changes_in_words(changed: Sequence[Change]) -> str:

@@ -202,6 +202,16 @@ class Scenario(Table):
         physics = self.model_dump_json(exclude={"name", "summary", "source", "tags", "expect"}, exclude_defaults=True)
         return hashlib.sha256(physics.encode()).hexdigest()[:12]
 
+    @property
+    def structure(self) -> tuple[str | int | bool, ...]:
+        """What is not a number of the scene: the kind of body, how many vertices, which tables there are, and the kind of friction."""
+        friction = "" if self.floor is None else self.floor.friction if isinstance(self.floor.friction, str) else "coefficient"
+        return self.body.shape, len(self.body.vertices), self.gravity is None, self.damping is None, friction
+
+    def differs_in_start_alone(self, other: "Scenario") -> bool:
+        """Whether the rest of the physics of another scene is the same."""
+        return all(getattr(self, name) == getattr(other, name) for name in ("duration", "body", "gravity", "floor", "damping"))
+
     def steps(self, dt: float) -> int:
         """Number of whole steps of dt [s] that fit into the duration."""
         return math.floor(self.duration / dt + 1e-9)

@@ -52,6 +52,23 @@ def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: floa
     return changed(scene, time * scene.duration, **tables)
 
 
+def with_other_numbers(scene: Scenario, share: float) -> Scenario:
+    """A scene of the same structure: a smaller body, and the other numbers of all tables but the start multiplied by a factor above 1."""
+    tables: dict[str, Mapping[str, Any]] = {"body": body_times(scene, 1.0 / share, share)}
+    if scene.gravity is not None:
+        tables["gravity"] = {"acceleration": _times(share, scene.gravity.acceleration)}
+    if scene.floor is not None:
+        friction = scene.floor.friction
+        tables["floor"] = {
+            "restitution": scene.floor.restitution / share,
+            "friction": friction if isinstance(friction, str) else share * friction,
+            "rest_speed": share * scene.floor.rest_speed,
+        }
+    if scene.damping is not None:
+        tables["damping"] = {"linear": share * scene.damping.linear, "angular": share * scene.damping.angular}
+    return changed(scene, scene.duration, **tables)
+
+
 def units_of_states(length: float = 1.0, time: float = 1.0) -> Array:
     """The numbers of a state with 1 for each, in other units, shape (13,): states in these units over it are in SI units."""
     units = np.ones(13)

@@ -134,7 +134,7 @@ class Simulation(ABC):
 
 
 class BatchSimulation(ABC):
-    """One scene from many starts at one time step, stepped together by the engine; a context manager.
+    """Many scenes at one time step, stepped together by the engine; a context manager.
 
     Attributes:
         velocity_lag: As that of a `Simulation` [s].
@@ -157,6 +157,10 @@ class BatchSimulation(ABC):
             self.advance(every)
             rows.append(numpy_array(self.states()).astype(float))
         return np.stack(rows, axis=1)
+
+    def limitations_of(self, scene: Scenario, states: Array) -> Sequence[str | KnownLimitation]:
+        """The known limitations that one of the scenes met, as those of a `Simulation`, from its states after each step, shape (n, 13)."""
+        return ()
 
     def close(self) -> None:  # noqa: B027 - optional
         """Release what the simulation holds."""
@@ -279,6 +283,8 @@ class Engine(ABC):
 
     A batch may then differ from single simulations by rounding.
     """
+    mixes_scenes: ClassVar[bool] = False
+    """Whether the scenes of a batch may differ in all numbers (masses, sizes, gravity, floors), not only in their starts."""
     reasons: ClassVar[Mapping[str, str]] = {}
     """The reason for the value of each setting of a calibrated simulation, by the names in `Simulation.settings`."""
 
@@ -385,5 +391,13 @@ class Engine(ABC):
         return {}
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
-        """Build one scene from many starts; None if the engine cannot step them together, and single simulations take their place."""
+        """Build scenes that differ in their starts, or in other numbers if the engine `mixes_scenes`, and have as many steps.
+
+        None if the engine cannot step them together; single simulations then take the place of the batch.
+        """
         return None
+
+    @property
+    def steps_batches(self) -> bool:
+        """Whether the engine has batches at all."""
+        return type(self).prepare_batch is not Engine.prepare_batch

@@ -1,7 +1,7 @@
 """The engine `document`: the reference implementation of Wang's lecture note, and of the methods beside it."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +19,7 @@ class Document(Engine):
     """Algorithms 1 and 2 of Wang's lecture note; each option replaces one of their parts by another method."""
 
     name = "document"
+    mixes_scenes = True
     choices: ClassVar = {
         "rotation": tuple(ROTATIONS),
         "law": tuple(LAWS),
@@ -106,12 +107,16 @@ class DocumentSimulation(Simulation):
 
 
 class DocumentBatch(BatchSimulation):
-    """A simulation from many starts by the reference implementation, in lanes and threads."""
+    """Simulations of many scenes by the reference implementation, in lanes and threads."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt
         scene = members[0]
-        self._simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene), dt, methods)
+        if all(map(scene.differs_in_start_alone, members)):
+            body, world = reference_body(scene.body), reference_world(scene)
+        else:
+            body, world = _side_by_side(members)
+        self._simulator = reference_impl.Simulator(body, world, dt, methods)
         self._states = initial_states(members)
 
     def advance(self, steps: int) -> None:
@@ -126,9 +131,27 @@ class DocumentBatch(BatchSimulation):
         return rows
 
 
+def _side_by_side(members: Sequence[Scenario]) -> tuple[reference_impl.Body, reference_impl.World]:
+    """The bodies and worlds of scenes of one structure, with a row for each scene."""
+    worlds = [reference_world(member) for member in members]
+    gravity, floor, damping = ([getattr(world, name) for world in worlds] for name in ("gravity", "floor", "damping"))
+    world = reference_impl.World(
+        gravity=None if gravity[0] is None else np.array(gravity),
+        floor=None if floor[0] is None else reference_impl.Floor(*np.transpose(floor)),
+        damping=None if damping[0] is None else (np.transpose(damping)[0], np.transpose(damping)[1]),
+    )
+    return reference_bodies([member.body for member in members]), world
+
+
 def reference_body(body: Body) -> reference_impl.Body:
     """A scene's body in the form that the reference implementation takes."""
     return reference_impl.Body(body.mass, _inertia(body), body.vertices, body.rounding)
+
+
+def reference_bodies(bodies: Sequence[Body]) -> reference_impl.Body:
+    """The bodies of an ensemble in the form that the reference implementation takes."""
+    found = [reference_body(body) for body in bodies]
+    return reference_impl.Body(*(np.array([getattr(body, part.name) for body in found]) for part in fields(reference_impl.Body)))
 
 
 def _inertia(body: Body) -> Array:

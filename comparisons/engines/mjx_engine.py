@@ -13,7 +13,7 @@ import jax
 import numpy as np
 from jax import numpy as jnp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Simulation, version
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
 from comparisons.engines.mujoco_engine import MuJoCo
 from comparisons.engines.mujoco_limitations import limitations_met
 from comparisons.engines.mujoco_ports import Port, built, ported_model
@@ -32,7 +32,7 @@ CHUNK = 1000
 class MJX(Port):
     """MJX's free body and, where the scene has a floor, one contact pair."""
 
-    name = "mjx"
+    name, mixes_scenes = "mjx", True
     choices: ClassVar = {"precision": ("float32", "float64"), "integrator": ("euler", "implicitfast", "rk4")}
 
     @property
@@ -59,7 +59,8 @@ class MJX(Port):
         return MJXSimulation(scene, dt, self.option("integrator"), self.precision)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
-        return MJXBatch(MJXSimulation(members[0], dt, self.option("integrator"), self.precision), members)
+        models = members[:1] if all(map(members[0].differs_in_start_alone, members)) else members
+        return MJXBatch([MJXSimulation(member, dt, self.option("integrator"), self.precision) for member in models], members)
 
 
 class MJXSimulation(Simulation):
@@ -98,8 +99,12 @@ class MJXSimulation(Simulation):
             found.append(to_world(np.asarray(rows[: min(left, CHUNK)], dtype=float)))
             left -= min(left, CHUNK)
         states = np.concatenate(found)
-        self.known_limitations = list(limitations_met(self._scene, states, self._dt, estimated=True)) if every == 1 else []
+        self.known_limitations = self.limitations_of(self._scene, states) if every == 1 else []
         return states
+
+    def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
+        """The limitations that a motion met, given its states after each step, shape (n, 13)."""
+        return list(limitations_met(scene, states, self._dt, estimated=True))
 
     def as_built(self) -> AsBuilt:
         model = self.model
@@ -107,16 +112,22 @@ class MJXSimulation(Simulation):
 
 
 class MJXBatch(BatchSimulation):
-    """Starts that one vectorised program steps together."""
+    """Worlds that one vectorised program steps together."""
 
-    def __init__(self, first: MJXSimulation, members: Sequence[Scenario]) -> None:
-        self.velocity_lag, self._model = first.velocity_lag, first.model
+    def __init__(self, alone: Sequence[MJXSimulation], members: Sequence[Scenario]) -> None:
+        """Worlds with one model, or with as many models as there are members."""
+        self._first = first = alone[0]
+        self.velocity_lag, self._is_mixed = first.velocity_lag, len(alone) > 1
+        self._model = jax.tree.map(lambda *rows: jnp.stack(rows), *(one.model for one in alone)) if self._is_mixed else first.model
         rows = jax.device_put(from_world(initial_states(members)), jax.devices()[0])
         self._data = jax.vmap(lambda row: first.data.replace(qpos=row[:7], qvel=row[7:]))(rows)
 
     def advance(self, steps: int) -> None:
-        self._data = _advanced_together(self._model, self._data, steps)
+        self._data = (_advanced_mixed if self._is_mixed else _advanced_together)(self._model, self._data, steps)
         self._data.qpos.block_until_ready()
+
+    def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
+        return self._first.limitations_of(scene, states)
 
     def states(self) -> Array:
         return to_world(np.concatenate([self._data.qpos, self._data.qvel], axis=1, dtype=float))
@@ -126,7 +137,7 @@ def _advanced(model: Any, data: Any, steps: Any) -> Any:
     return jax.lax.fori_loop(0, steps, lambda _, now: mjx.step(model, now), data)
 
 
-_advanced_together = jax.jit(jax.vmap(_advanced, in_axes=(None, 0, None)))
+_advanced_together, _advanced_mixed = (jax.jit(jax.vmap(_advanced, in_axes=(axis, 0, None))) for axis in (None, 0))
 
 
 def _recording(model: Any, data: Any, count: Any, every: Any) -> tuple[Any, Any]:

@@ -63,6 +63,7 @@ class MuJoCo(Engine):
         "beside": ("none", "heavy"),
     }
     representations: ClassVar = ("body", "floor", "beside")
+    mixes_scenes = True
     numbers: ClassVar = {"kappa": NumericOption(0.0, 0.0, 1.0), "spring_steps": NumericOption(0.0, 0.0, 1e4)}
 
     def __post_init__(self) -> None:
@@ -168,7 +169,14 @@ class MuJoCo(Engine):
         return self._prepare(scene, dt)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
-        return MuJoCoBatch(self._prepare(members[0], dt), members) if VERSION >= BATCHES else None
+        if VERSION < BATCHES:
+            return None
+        first = self._prepare(members[0], dt)
+        model, _ = first.built
+        if all(map(members[0].differs_in_start_alone, members)):
+            return MuJoCoBatch(first, [model] * len(members), members)
+        models = [model, *(self._prepare(member, dt).built[0] for member in members[1:])]
+        return MuJoCoBatch(first, models, members) if len({one.signature for one in models}) == 1 else None
 
     def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
         form = Form(self.option("integrator"), **{name: self.option(name) for name in self.representations})

@@ -10,11 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Simulation, version
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
 from comparisons.engines.mujoco_limitations import limitations_met
 from comparisons.engines.mujoco_ports import Port, built, ported_model
 from comparisons.engines.mujoco_simulation import from_world, to_world
+from comparisons.engines.one_world import OneWorld
 from scenarios import Scenario
+from scenarios.body import Vertices
 from scenarios.model import initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
@@ -24,18 +26,21 @@ import mujoco_warp as mjw  # noqa: E402
 class MuJoCoWarp(Port):
     """MuJoCo Warp's free body and, where the scene has a floor, one contact pair."""
 
-    name, precision = "mujoco-warp", np.float32
+    name, precision, mixes_scenes = "mujoco-warp", np.float32, True
     choices: ClassVar = {"integrator": ("euler", "implicit", "implicitfast", "rk4")}
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return MuJoCoWarpSimulation(scene, Worlds([scene], dt, self.option("integrator")))
+        worlds = Worlds([scene], dt, self.option("integrator"))
+        return OneWorld(scene, worlds, worlds.settings, worlds.as_built())
 
-    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
+        if len({member.body.vertices.tobytes() for member in members if isinstance(member.body, Vertices)}) > 1:
+            return None  # a model has one mesh
         return Worlds(members, dt, self.option("integrator"))
 
 
 class Worlds(BatchSimulation):
-    """Worlds of one model on Warp's default device, with their step as a graph."""
+    """Worlds on Warp's default device, with their step as a graph."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, integrator: str) -> None:
         self.dt, self.velocity_lag = dt, 0.0 if integrator == "rk4" else 0.5 * dt
@@ -43,6 +48,8 @@ class Worlds(BatchSimulation):
         device = wp.get_device()
         self.settings = {"version": version("mujoco-warp"), "warp": wp.config.version, "device": f"{device} ({device.name})"} | settings
         self.model, self._data = mjw.put_model(model), mjw.make_data(model, nworld=len(members))
+        if not all(map(members[0].differs_in_start_alone, members)):
+            self._give_each_its_own([ported_model(member, dt, integrator, np.float32)[0] for member in members])
         rows = from_world(initial_states(members)).astype(np.float32)
         mjw.step(self.model, self._data)  # compiles; nothing may be loaded while a graph is captured
         with wp.ScopedCapture() as capture:
@@ -51,6 +58,15 @@ class Worlds(BatchSimulation):
         mjw.reset_data(self.model, self._data)
         self._data.qpos.assign(rows[:, :7])
         self._data.qvel.assign(rows[:, 7:])
+
+    def _give_each_its_own(self, models: Sequence[Any]) -> None:
+        """Replace arrays of the model whose numbers differ among models by arrays with a row for each world."""
+        ported = [mjw.put_model(model) for model in models]
+        for owner, parts in ((self.model, ported), (self.model.opt, [model.opt for model in ported])):
+            for name, array in vars(owner).items():
+                rows = [getattr(part, name).numpy() for part in parts] if isinstance(array, wp.array) else []
+                if any(not np.array_equal(rows[0], row) for row in rows):
+                    setattr(owner, name, wp.array(np.concatenate(rows), dtype=array.dtype))
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):
@@ -71,26 +87,11 @@ class Worlds(BatchSimulation):
             rows.append(self.coordinates())
         return to_world(np.concatenate(rows)).reshape(len(rows), -1, 13).swapaxes(0, 1)
 
-
-class MuJoCoWarpSimulation(Simulation):
-    """One world."""
-
-    def __init__(self, scene: Scenario, worlds: Worlds) -> None:
-        self.velocity_lag, self.settings = worlds.velocity_lag, worlds.settings
-        self._scene, self._worlds = scene, worlds
-
-    def advance(self, steps: int) -> None:
-        self._worlds.advance(steps)
-
-    def state(self) -> Array:
-        return self._worlds.states()[0]
-
-    def record(self, steps: int, every: int = 1) -> Array:
-        [states] = self._worlds.record(steps, every)
-        self.known_limitations = list(limitations_met(self._scene, states, self._worlds.dt, estimated=True)) if every == 1 else []
-        return states
+    def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
+        return list(limitations_met(scene, states, self.dt, estimated=True))
 
     def as_built(self) -> AsBuilt:
-        model: Any = self._worlds.model
+        """The first world."""
+        model = self.model
         mass, moments, axes = (part.numpy()[0, 1] for part in (model.body_mass, model.body_inertia, model.body_iquat))
         return built(mass, moments, axes, model.opt.gravity.numpy()[0])

@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, refusal_of_shape, version
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, Simulation, refusal_of_shape, version
 from comparisons.engines.newton_rounding import rounding_met
+from comparisons.engines.one_world import OneWorld
 from scenarios import Scenario
 from scenarios.body import Box, Sphere
 from scenarios.model import initial_states
@@ -38,7 +39,7 @@ REASONS = {
 class Newton(Engine):
     """Newton's rigid body."""
 
-    name, order, compiles, precision, reasons = "newton", 1.0, True, np.float32, REASONS
+    name, order, compiles, precision, reasons, mixes_scenes = "newton", 1.0, True, np.float32, REASONS, True
     choices: ClassVar = {"solver": tuple(SOLVERS)}
 
     def declines(self, scene: Scenario) -> str | None:
@@ -62,24 +63,29 @@ class Newton(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return NewtonSimulation(Worlds([scene], dt, self.option("solver")), scene, self.option("solver"))
+        worlds = Worlds([scene], dt, self.option("solver"))
+        return OneWorld(scene, worlds, worlds.settings, worlds.as_built())
 
-    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
-        return Worlds(members, dt, self.option("solver"))
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
+        """None for floors of which some have a restitution and others not, as XPBD's restitution is on or off for all."""
+        restitutions = {member.floor is not None and member.floor.restitution > 0.0 for member in members}
+        return Worlds(members, dt, self.option("solver")) if len(restitutions) == 1 else None
 
 
 class Worlds(BatchSimulation):
     """Worlds with a body each on Warp's default device, with their step as a graph."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, solver: str) -> None:
-        scene, self.velocity_lag = members[0], 0.5 * dt
+        self.velocity_lag, scene = 0.5 * dt, members[0]
         (name, options), surface = SOLVERS[solver], self._surface(scene)
         if solver == "xpbd":
             options = options | {"enable_restitution": surface.get("restitution", 0.0) > 0.0}
         builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration))
-        builder.replicate(self._world(scene, surface), len(members))
-        if scene.floor is not None:
-            builder.add_ground_plane(cfg=newton.ModelBuilder.ShapeConfig(density=0.0, **surface))
+        if all(map(scene.differs_in_start_alone, members)):
+            builder.replicate(self._world(scene), len(members))
+        else:
+            for member in members:
+                builder.add_world(self._world(member))
         self.model: Any = builder.finalize()
         self._solver = getattr(newton.solvers, name)(self.model, **options)
         self._now, self._next, self._control = self.model.state(), self.model.state(), self.model.control()
@@ -103,14 +109,17 @@ class Worlds(BatchSimulation):
         friction = {"none": 0.0, "infinite": STICKING}.get(str(scene.floor.friction), scene.floor.friction)
         return {"restitution": scene.floor.restitution, "mu": float(friction), "mu_torsional": 0.0, "mu_rolling": 0.0}
 
-    def _world(self, scene: Scenario, surface: dict[str, float]) -> Any:
+    def _world(self, scene: Scenario) -> Any:
         world, body = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration)), scene.body
         inertia = wp.mat33(*body.inertia_tensor.ravel().tolist())
         moving = world.add_body(mass=body.mass, inertia=inertia, lock_inertia=True)
-        config = newton.ModelBuilder.ShapeConfig(density=0.0, **surface)
-        if scene.floor is not None and isinstance(body, Sphere):
+        if scene.floor is None:
+            return world
+        config = newton.ModelBuilder.ShapeConfig(density=0.0, **self._surface(scene))
+        world.add_ground_plane(cfg=config)
+        if isinstance(body, Sphere):
             world.add_shape_sphere(moving, radius=body.radius, cfg=config)
-        elif scene.floor is not None and isinstance(body, Box):
+        elif isinstance(body, Box):
             world.add_shape_box(moving, cfg=config, **dict(zip(("hx", "hy", "hz"), body.half_extents, strict=True)))
         return world
 
@@ -129,26 +138,11 @@ class Worlds(BatchSimulation):
     def states(self) -> Array:
         return np.concatenate([self._now.body_q.numpy(), self._now.body_qd.numpy()], axis=1, dtype=float)
 
-
-class NewtonSimulation(Simulation):
-    """One world."""
-
-    def __init__(self, worlds: Worlds, scene: Scenario, solver: str) -> None:
-        self.velocity_lag, self.settings, self._worlds = worlds.velocity_lag, worlds.settings, worlds
-        self._scene, self._solver = scene, solver
-
-    def advance(self, steps: int) -> None:
-        self._worlds.advance(steps)
-
-    def state(self) -> Array:
-        return self._worlds.states()[0]
-
-    def record(self, steps: int, every: int = 1) -> Array:
-        states = super().record(steps, every)
-        self.known_limitations = list(rounding_met(self._solver, self._scene, states, 2.0 * self.velocity_lag * steps, steps))
-        return states
+    def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
+        steps = len(states) - 1
+        return list(rounding_met(self.settings["solver"], scene, states, 2.0 * self.velocity_lag * steps, steps))
 
     def as_built(self) -> AsBuilt:
-        model = self._worlds.model
-        inertia, gravity = (np.array(part.numpy()[0], dtype=float) for part in (model.body_inertia, model.gravity))
-        return AsBuilt(float(model.body_mass.numpy()[0]), inertia, gravity)
+        """The first world."""
+        mass, inertia, gravity = (part.numpy()[0] for part in (self.model.body_mass, self.model.body_inertia, self.model.gravity))
+        return AsBuilt(float(mass), np.array(inertia, dtype=float), np.array(gravity, dtype=float))

@@ -113,10 +113,11 @@ def range_over_phases(engine: Engine, scene: Scenario, dt: float) -> Row:
         return {}
     phases.append(StartPhase(scene, truth))
     try:
-        motions = record_batch(engine, [phase.scene for phase in phases], dt)
+        recordings = record_batch(engine, [phase.scene for phase in phases], dt)
     except Diverged:
         return {}
-    cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in zip(phases, motions, strict=True)]
+    runs = zip(phases, recordings, strict=True)
+    cases = [Comparison.with_truth(phase.scene, recording.motion, phase.truth) for phase, recording in runs]
     sizes = [abs(METRICS[leading_metric(scene)].value_or_nan([case])) for case in cases]
     return {"low": min(sizes), "high": max(sizes)} if np.isfinite(sizes).all() else {}
 

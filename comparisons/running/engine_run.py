@@ -92,7 +92,8 @@ def run_engine(
         own = record(engine, scene, dt)
         on_simulations(1, total)
         found.motion, found.limitations, found.settings = own.motion, own.limitations, own.settings
-        motions = iter(record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else [])
+        recorded = record_batch(engine, others, dt, lambda done, _: on_simulations(1 + done, total)) if others else []
+        motions = (one.motion for one in recorded)
         found.phases = [own.motion] if len(starts) == 1 else [next(motions) for _ in starts]
         found.perturbed = [[next(motions) for _ in moved] for moved in sets]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)
@@ -134,7 +135,7 @@ def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
     except Exception as error:  # whatever an engine raises costs its own row only
         return Timing(breakdown=classify(error))
     compilation = 0.0 if first is None else max(first.building + first.stepping - least, 0.0)
-    return Timing(least / steps, compilation, in_batches=type(engine).prepare_batch is not Engine.prepare_batch)
+    return Timing(least / steps, compilation, in_batches=engine.steps_batches)
 
 
 def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:

@@ -37,7 +37,8 @@ def run_ensemble(engine: Engine, scene: Scenario, dt: float, most: int | None = 
     starts = members(scene)[:most]
     for first in range(0, len(starts), BATCH_SIZE):
         batch = starts[first : first + BATCH_SIZE]
-        for member, motion in zip(batch, record_batch(engine, batch, dt), strict=True):
+        for member, recording in zip(batch, record_batch(engine, batch, dt), strict=True):
+            motion = recording.motion
             if motion.first_bad_row is not None:
                 raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
             case = Comparison(member, motion)

@@ -48,8 +48,8 @@ class Recording:
         motion: The states, the start first, `every` so many steps.
         continuation: The states after each of the extra steps that were asked for, at later times; usually empty.
         limitations: The engine's known limitations that it met on the way.
-        settings: The settings that the engine reported.
-        seconds: Wall time of recording the motion [s].
+        settings: The settings that the engine reported; a batch is not asked for them.
+        seconds: Wall time of recording the motion [s]; in a batch, the mean over its motions.
     """
 
     motion: Trajectory
@@ -123,36 +123,49 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
 
 
 def record_batch(
-    engine: Engine, starts: Sequence[Scenario], dt: float, on_simulations: OnSimulations = lambda done, total: None
-) -> list[Trajectory]:
-    """Drive an engine through one scene from many starts: together if it can, else one after another.
+    engine: Engine,
+    members: Sequence[Scenario],
+    dt: float,
+    on_simulations: OnSimulations = lambda done, total: None,
+    *,
+    limitations: bool = False,
+) -> list[Recording]:
+    """Drive an engine through scenes of the same number of steps: together if it can, else one after another.
 
     Args:
         engine: The engine.
-        starts: The scene from each of its starts.
+        members: The scenes; they differ in their starts alone, unless the engine `mixes_scenes`.
         dt: Time step [s].
         on_simulations: Called after each simulation, or once after a batch.
+        limitations: Whether to ask a batch for the known limitations that it met, which takes time.
 
     Raises:
         BuildMismatch: A motion does not begin at its start, or a record is not one.
         Diverged: The simulation broke down.
     """
-    batch = engine.prepare_batch(starts, dt)
+    batch = engine.prepare_batch(members, dt)
     if batch is None:
-        motions = []
-        for number, start in enumerate(starts, 1):
-            motions.append(record(engine, start, dt).motion)
-            on_simulations(number, len(starts))
-        return motions
-    steps = starts[0].steps(dt)
+        recordings = []
+        for number, member in enumerate(members, 1):
+            recordings.append(record(engine, member, dt))
+            on_simulations(number, len(members))
+        return recordings
+    steps, size = members[0].steps(dt), len(members)
     with batch:
+        start = time.perf_counter()
+        states = verified_batch(batch.record(steps), size, steps + 1)
+        seconds = (time.perf_counter() - start) / size
         lag = verified_lag(batch.velocity_lag, dt)
-        states = verified_batch(batch.record(steps), len(starts), steps + 1)
+        met = [batch.limitations_of(*of_one) if limitations else () for of_one in zip(members, states, strict=True)]
     times = dt * np.arange(steps + 1, dtype=float)
-    verify_starts(engine, starts, states[:, 0])
-    on_simulations(len(starts), len(starts))
+    verify_starts(engine, members, states[:, 0])
+    on_simulations(size, size)
     positions, orientations, velocities, spins = (states[..., part] for part in PARTS.values())
-    return [Trajectory(times, *motion, velocity_lag=lag) for motion in zip(positions, orientations, velocities, spins, strict=True)]
+    parts = zip(positions, orientations, velocities, spins, strict=True)
+    motions = [Trajectory(times, *of_one, velocity_lag=lag) for of_one in parts]
+    return [
+        Recording(motion, motion[:0], verified_limitations(of_one), seconds=seconds) for motion, of_one in zip(motions, met, strict=True)
+    ]
 
 
 def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0) -> Recording | Breakdown:

@@ -23,7 +23,7 @@ from comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError, Scenario
 from scenarios.state import POSITION, RATES
-from scenarios.transformations import AWAY, whole_steps
+from scenarios.transformations import AWAY, whole_steps, with_other_numbers
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,10 @@ ENGINES = ("document", "mujoco", "pybullet")
 DT = 1e-3  # s
 RESOURCES = ResourceLimits(processor_time=60.0)
 FASTER = (1.001, 1.002)
-"""Factors on the initial velocities of the other simulations of a batch, which also start as many thousandths of the body's size away."""
+"""Factors on the initial velocities of the other simulations of a batch, which also start as many thousandths of the body's size away.
+
+If the engine mixes scenes, the other numbers differ by as much.
+"""
 
 
 def symmetries(
@@ -162,8 +165,8 @@ def _batched(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> Pair
         start = scene.initial_state
         start[POSITION] += (share - 1.0) * scene.body.size * AWAY
         start[RATES] *= share
-        others.append(scene.starting_at(start))
-    together = record_batch(entry.adapter, [scene, *others], dt)
+        others.append((with_other_numbers(scene, share) if entry.adapter.mixes_scenes else scene).starting_at(start))
+    together = [recording.motion for recording in record_batch(entry.adapter, [scene, *others], dt)]
     for motion in together:
         if (broken := divergence(motion)) is not None:
             raise _NotComparable(broken)

@@ -15,9 +15,9 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import METRICS, last_time_in_motion
 from comparisons.measuring.motions import Setup
 from comparisons.running.verification import UNIT_TOLERANCE
+from comparisons.sweeps.any_engine import run_single
 from comparisons.sweeps.dispatch import run_jobs
 from comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, standard_metrics
-from comparisons.sweeps.single import run_single
 from comparisons.sweeps.spec import load_sweep
 from scenarios import load, names
 

@@ -1,7 +1,8 @@
 """Jobs of the reference implementation side by side: arrays of parameters go to its kernels, without building a scene for each job.
 
-Some jobs are left to `single.run_single`: those that are not ordinary (a body below the floor, a time step that does not fit, a friction
-that the impact law does not support) and those that the kernels refuse. The result of a job has the same bits as when it is run by itself.
+Some jobs are left to `any_engine.run_single`: those that are not ordinary (a body below the floor, a time step that does not fit, a
+friction that the impact law does not support) and those that the kernels refuse. The result of a job has the same bits as when it is run
+by itself.
 """
 
 import time
@@ -14,15 +15,15 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 import reference_impl
-from comparisons.engines.document import Document, reference_body, reference_world
+from comparisons.engines.document import Document, reference_bodies, reference_world
 from comparisons.measuring.batch import motions_side_by_side
 from comparisons.measuring.motions import Setup
 from comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
 from comparisons.running.verification import UNIT_TOLERANCE
+from comparisons.sweeps.any_engine import scene_of
 from comparisons.sweeps.fields import Path, path_of, set_field, with_fields
 from comparisons.sweeps.jobs import OPTION, Jobs
 from comparisons.sweeps.outcomes import Outcomes, requested_metrics
-from comparisons.sweeps.single import scene_of
 from scenarios import Scenario, SceneError, Trajectory
 from scenarios.body import Body
 from scenarios.ensemble import clearances, spread_starts
@@ -205,9 +206,7 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[_Parameters, NDArray[np.bo
     if scene.floor is not None:
         is_ordinary &= setup.clearance >= -0.5 * TOUCHING * setup.size  # a start nearer to the limit is left to the scene's own check
     steps = np.where(is_ordinary, np.floor(np.where(is_ordinary, ratio, 0.0) + 1e-9), 0).astype(np.int64)
-    reference = [reference_body(body) for body in bodies]
-    body = reference_impl.Body(*(np.array([getattr(one, field.name) for one in reference]) for field in fields(reference_impl.Body)))
-    return _Parameters(body, world, starts, jobs.dts, steps, setup), is_ordinary
+    return _Parameters(reference_bodies(bodies), world, starts, jobs.dts, steps, setup), is_ordinary
 
 
 def _world(jobs: Jobs, scene: Scenario, columns: dict[Path, Array]) -> reference_impl.World:

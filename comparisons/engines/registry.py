@@ -53,6 +53,7 @@ BUILT_IN = {
     "mjx": _Home("comparisons.engines.mjx_engine", "MJX", "jax", "pip install 'dropspin[mjx]'"),
     "mujoco-warp": _Home("comparisons.engines.mujoco_warp_engine", "MuJoCoWarp", "mujoco_warp", "pip install 'dropspin[mujoco-warp]'"),
     "newton": _Home("comparisons.engines.newton_engine", "Newton", "newton", "pip install 'dropspin[newton]'"),
+    "genesis": _Home("comparisons.engines.genesis_engine", "Genesis", "genesis", "pip install 'dropspin[genesis]'"),
 }
 
 CURES = {

@@ -17,7 +17,7 @@ from scenarios.text import printable
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 ENGINES = (
     *("mujoco", "pybullet", "rapier3d", "@dimforge/rapier3d-compat", "dartpy", "drake"),
-    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien", "exudyn", "jsbsim"),
+    *("mujoco-mjx", "jax", "mujoco-warp", "newton", "warp-lang", "sapien", "exudyn", "jsbsim", "genesis-world", "quadrants", "torch"),
 )
 STAMPED = (*MEASURING, *ENGINES)
 PACKAGES = tuple(Path(__file__).parents[2] / package for package in ("scenarios", "reference_impl", "comparisons"))

@@ -1,0 +1,178 @@
+"""The engine `genesis`: Genesis's rigid body on the processor, in single or double precision.
+
+A free body turns by the implicit midpoint rule under `approximate_implicitfast`, and with an explicit gyroscopic term under `euler`.
+"""
+
+import logging
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import genesis
+import numpy as np
+
+from comparisons.engines.base import (
+    EXPLICIT_GYROSCOPIC,
+    MIDPOINT_GYROSCOPIC,
+    SEMI_IMPLICIT_EULER,
+    Array,
+    AsBuilt,
+    BatchSimulation,
+    Engine,
+    Simulation,
+    may_tumble,
+    refusal_of_shape,
+    version,
+)
+from comparisons.engines.mujoco_simulation import from_world, to_world
+from scenarios import Scenario
+from scenarios.body import Sphere
+from scenarios.model import initial_states
+
+INTEGRATORS = {"approximate_implicitfast": MIDPOINT_GYROSCOPIC, "euler": EXPLICIT_GYROSCOPIC}
+PRECISIONS = {"float32": "32", "float64": "64"}
+IMPEDANCE = 0.9999  # the largest that Genesis allows
+NO_SPRING = 1e6  # Genesis's dampratio divides the stiffness by its square
+STICKING = 1e4
+REASONS = {
+    "sol_params": "the damper stops the normal velocity in one step: its time constant is the least, 2 dt, and its stiffness vanishes",
+    "friction_cone": "elliptic: the same friction in every direction",
+    "contact_resolution": "signorini: the friction is limited by the normal force alone",
+}
+
+
+class Genesis(Engine):
+    """Genesis's rigid body."""
+
+    name, order, compiles, reasons = "genesis", 1.0, True, REASONS
+    choices: ClassVar = {"precision": tuple(PRECISIONS), "integrator": tuple(INTEGRATORS)}
+
+    @property
+    def precision(self) -> type:  # type: ignore[override]  # it depends on the option
+        """Genesis's default is single precision."""
+        return {"float32": np.float32, "float64": np.float64}[self.option("precision")]
+
+    def discretisation(self, scene: Scenario) -> str | None:
+        if scene.floor is not None:
+            return None
+        midpoint = self.option("integrator") != "euler" and scene.damping is not None  # rotates by the mean of two angular velocities
+        return INTEGRATORS[self.option("integrator")] if may_tumble(scene) or midpoint else SEMI_IMPLICIT_EULER
+
+    def declines(self, scene: Scenario) -> str | None:
+        floor = scene.floor
+        if scene.damping is not None and np.count_nonzero(scene.body.inertia_tensor) > 3:
+            return "Genesis damps along the body's own axes; these are not principal axes"
+        if (unfit := refusal_of_shape(scene)) is not None or floor is None:
+            return unfit
+        if floor.friction == "none":
+            return "Genesis has no contacts without friction: the coefficient of a contact is 0.01 at least"
+        if floor.restitution > 0.0:
+            return "Genesis has no restitution: the time constant of a contact is 2 dt at least, with which a damper stops a body at most"
+        if floor.rest_speed > 0.0:
+            return "Genesis has no speed below which restitution is 0 (floor.rest_speed)"
+        return None
+
+    def prepare(self, scene: Scenario, dt: float) -> Simulation:
+        return GenesisSimulation(self._worlds([scene], dt))
+
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
+        return self._worlds(members, dt)
+
+    def _worlds(self, members: Sequence[Scenario], dt: float) -> "Worlds":
+        start(self.option("precision"))
+        return Worlds(members, dt, self.option("integrator"), self.precision)
+
+
+def start(precision: str) -> None:
+    """Start Genesis in a precision, which is that of the whole process."""
+    if genesis.backend is not None and genesis.np_float is not np.dtype(precision).type:
+        genesis.destroy()
+    if not genesis._initialized:
+        genesis.init(backend=genesis.cpu, precision=PRECISIONS[precision], logging_level=logging.CRITICAL)
+
+
+class Worlds(BatchSimulation):
+    """Worlds of one scene with a body each."""
+
+    def __init__(self, members: Sequence[Scenario], dt: float, integrator: str, precision: type) -> None:
+        scene, self.velocity_lag = members[0], 0.5 * dt
+        body, floor, morphs = scene.body, scene.floor, genesis.morphs
+        contacts: dict[str, Any] = {} if floor is None else {"friction_cone": "elliptic", "contact_resolution": "signorini"}
+        chosen = {name: getattr(getattr(genesis, name), value) for name, value in contacts.items()}
+        scheme = genesis.integrator.Euler if integrator == "euler" else getattr(genesis.integrator, integrator)
+        self._scene = genesis.Scene(
+            sim_options=genesis.options.SimOptions(dt=dt, gravity=tuple(scene.acceleration)),
+            rigid_options=genesis.options.RigidOptions(
+                integrator=scheme, enable_collision=floor is not None, disable_constraint=floor is None, **chosen
+            ),
+            show_viewer=False,
+        )
+        self._body: Any = self._scene.add_entity(morphs.MJCF(file=description(scene), align=False))
+        ground = None if floor is None else self._scene.add_entity(morphs.Plane(normal=(0.0, 1.0, 0.0)))
+        self._scene.build(n_envs=len(members))
+        [link] = self._body.links
+        link.set_mass(body.mass)
+        link.set_inertia(body.inertia_tensor)
+        if floor is not None and ground is not None:
+            friction = {"infinite": STICKING}.get(str(floor.friction), floor.friction)
+            contacts["friction"], contacts["sol_params"] = friction, [2.0 * dt, NO_SPRING, IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0]
+            for geom in (*self._body.geoms, *ground.geoms):
+                geom.set_friction(friction)
+                geom.set_sol_params(np.array(contacts["sol_params"]))
+        if scene.damping is not None:
+            rates = np.repeat([scene.damping.linear, scene.damping.angular], 3)
+            damping = rates * [*np.full(3, body.mass), *np.diag(body.inertia_tensor)]
+            self._body.set_dofs_damping(damping)
+            contacts["damping"] = damping.tolist()
+        rows = from_world(initial_states(members))  # Genesis's coordinates are MuJoCo's
+        self._body.set_qpos(rows[:, :7].astype(precision))
+        self._body.set_dofs_velocity(rows[:, 7:].astype(precision))
+        made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants"), "device": "cpu"}
+        self.settings = made | {"precision": np.dtype(precision).name, "integrator": integrator} | contacts
+
+    def advance(self, steps: int) -> None:
+        for _ in range(steps):
+            self._scene.step()
+
+    def states(self) -> Array:
+        rows = np.concatenate([self._body.get_qpos().numpy(), self._body.get_dofs_velocity().numpy()], axis=1, dtype=float)
+        return to_world(rows)
+
+    def as_built(self) -> AsBuilt:
+        """Mass, inertia and gravity as the solver has them."""
+        [link] = self._body.links
+        mass, inertia, gravity = link.get_mass(), self._body.get_links_inertia(), self._scene.rigid_solver.get_gravity()
+        return AsBuilt(float(mass), inertia.numpy().reshape(3, 3).astype(float), gravity.numpy().reshape(-1, 3)[0].astype(float))
+
+    def close(self) -> None:
+        self._scene.destroy()
+
+
+def description(scene: Scenario) -> str:
+    """A body as MJCF; Genesis's own shapes refuse a moment of inertia that is not that of the shape."""
+    body, size = scene.body, "1"  # of a shape that touches nothing
+    if scene.floor is not None:
+        size = repr(body.radius) if isinstance(body, Sphere) else " ".join(map(repr, body.vertices.max(0).tolist()))
+    shape = "sphere" if " " not in size else "box"
+    return (
+        '<mujoco><worldbody><body name="body"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+        f'<geom type="{shape}" size="{size}"/></body></worldbody></mujoco>'
+    )
+
+
+class GenesisSimulation(Simulation):
+    """One world."""
+
+    def __init__(self, worlds: Worlds) -> None:
+        self.velocity_lag, self.settings, self._worlds = worlds.velocity_lag, worlds.settings, worlds
+
+    def advance(self, steps: int) -> None:
+        self._worlds.advance(steps)
+
+    def state(self) -> Array:
+        return self._worlds.states()[0]
+
+    def as_built(self) -> AsBuilt:
+        return self._worlds.as_built()
+
+    def close(self) -> None:
+        self._worlds.close()

@@ -11,6 +11,7 @@ PACKAGES = {
     "check_sapien.py": {"sapien"},
     "check_exudyn.py": {"exudyn"},
     "check_jsbsim.py": {"jsbsim"},
+    "check_genesis.py": {"genesis"},
     "check_newton.py": {"newton", "warp"},
     "check_mjx.py": {"mujoco", "jax"},
     "check_mujoco_warp.py": {"mujoco", "mujoco_warp", "warp"},

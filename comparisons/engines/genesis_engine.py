@@ -1,6 +1,6 @@
 """The engine `genesis`: Genesis's rigid body on the processor, in single or double precision.
 
-A free body turns by the implicit midpoint rule under `approximate_implicitfast`, and with an explicit gyroscopic term under `euler`.
+A free body turns by the implicit midpoint rule under `approximate_implicitfast`. Genesis's coordinates are MuJoCo's.
 """
 
 import logging
@@ -10,29 +10,17 @@ from typing import Any, ClassVar
 import genesis
 import numpy as np
 
-from comparisons.engines.base import (
-    EXPLICIT_GYROSCOPIC,
-    MIDPOINT_GYROSCOPIC,
-    SEMI_IMPLICIT_EULER,
-    Array,
-    AsBuilt,
-    BatchSimulation,
-    Engine,
-    Simulation,
-    may_tumble,
-    refusal_of_shape,
-    version,
-)
+from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, refusal_of_shape, version
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from scenarios import Scenario
 from scenarios.body import Sphere
 from scenarios.model import initial_states
 
-INTEGRATORS = {"approximate_implicitfast": MIDPOINT_GYROSCOPIC, "euler": EXPLICIT_GYROSCOPIC}
+INTEGRATORS = {"approximate_implicitfast": "approximate_implicitfast", "euler": "Euler"}
 PRECISIONS = {"float32": "32", "float64": "64"}
 IMPEDANCE = 0.9999  # the largest that Genesis allows
 NO_SPRING = 1e6  # Genesis's dampratio divides the stiffness by its square
-STICKING = 1e4
+LEAST_FRICTION, STICKING = 0.01, 1e4
 REASONS = {
     "sol_params": "the damper stops the normal velocity in one step: its time constant is the least, 2 dt, and its stiffness vanishes",
     "friction_cone": "elliptic: the same friction in every direction",
@@ -49,13 +37,7 @@ class Genesis(Engine):
     @property
     def precision(self) -> type:  # type: ignore[override]  # it depends on the option
         """Genesis's default is single precision."""
-        return {"float32": np.float32, "float64": np.float64}[self.option("precision")]
-
-    def discretisation(self, scene: Scenario) -> str | None:
-        if scene.floor is not None:
-            return None
-        midpoint = self.option("integrator") != "euler" and scene.damping is not None  # rotates by the mean of two angular velocities
-        return INTEGRATORS[self.option("integrator")] if may_tumble(scene) or midpoint else SEMI_IMPLICIT_EULER
+        return np.float64 if self.option("precision") == "float64" else np.float32
 
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor
@@ -63,23 +45,25 @@ class Genesis(Engine):
             return "Genesis damps along the body's own axes; these are not principal axes"
         if (unfit := refusal_of_shape(scene)) is not None or floor is None:
             return unfit
-        if floor.friction == "none":
-            return "Genesis has no contacts without friction: the coefficient of a contact is 0.01 at least"
+        if floor.coefficient < LEAST_FRICTION:
+            return (
+                "a contact's coefficient of friction is 0.01 at least: a body that slides at 1 m/s without friction loses 0.098 m/s in 1 s"
+            )
         if floor.restitution > 0.0:
-            return "Genesis has no restitution: the time constant of a contact is 2 dt at least, with which a damper stops a body at most"
+            return (
+                "a contact's time constant is 2 dt at least, with which its damper only stops a body: with any smaller one set, a ball "
+                "that falls 0.5 m does not rebound"
+            )
         if floor.rest_speed > 0.0:
             return "Genesis has no speed below which restitution is 0 (floor.rest_speed)"
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return GenesisSimulation(self._worlds([scene], dt))
+        return GenesisSimulation(self.prepare_batch([scene], dt))
 
-    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
-        return self._worlds(members, dt)
-
-    def _worlds(self, members: Sequence[Scenario], dt: float) -> "Worlds":
+    def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "Worlds":
         start(self.option("precision"))
-        return Worlds(members, dt, self.option("integrator"), self.precision)
+        return Worlds(members, dt, INTEGRATORS[self.option("integrator")], self.precision)
 
 
 def start(precision: str) -> None:
@@ -95,17 +79,13 @@ class Worlds(BatchSimulation):
 
     def __init__(self, members: Sequence[Scenario], dt: float, integrator: str, precision: type) -> None:
         scene, self.velocity_lag = members[0], 0.5 * dt
-        body, floor, morphs = scene.body, scene.floor, genesis.morphs
+        body, floor, morphs, options = scene.body, scene.floor, genesis.morphs, genesis.options
         contacts: dict[str, Any] = {} if floor is None else {"friction_cone": "elliptic", "contact_resolution": "signorini"}
         chosen = {name: getattr(getattr(genesis, name), value) for name, value in contacts.items()}
-        scheme = genesis.integrator.Euler if integrator == "euler" else getattr(genesis.integrator, integrator)
-        self._scene = genesis.Scene(
-            sim_options=genesis.options.SimOptions(dt=dt, gravity=tuple(scene.acceleration)),
-            rigid_options=genesis.options.RigidOptions(
-                integrator=scheme, enable_collision=floor is not None, disable_constraint=floor is None, **chosen
-            ),
-            show_viewer=False,
-        )
+        chosen |= {"integrator": getattr(genesis.integrator, integrator), "disable_constraint": floor is None}
+        rigid = options.RigidOptions(enable_collision=floor is not None, **chosen)
+        world = options.SimOptions(dt=dt, gravity=tuple(scene.acceleration))
+        self._scene = genesis.Scene(sim_options=world, rigid_options=rigid, show_viewer=False)
         self._body: Any = self._scene.add_entity(morphs.MJCF(file=description(scene), align=False))
         ground = None if floor is None else self._scene.add_entity(morphs.Plane(normal=(0.0, 1.0, 0.0)))
         self._scene.build(n_envs=len(members))
@@ -113,17 +93,18 @@ class Worlds(BatchSimulation):
         link.set_mass(body.mass)
         link.set_inertia(body.inertia_tensor)
         if floor is not None and ground is not None:
-            friction = {"infinite": STICKING}.get(str(floor.friction), floor.friction)
-            contacts["friction"], contacts["sol_params"] = friction, [2.0 * dt, NO_SPRING, IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0]
+            contacts["friction"], contacts["sol_params"] = (
+                min(floor.coefficient, STICKING),
+                [2.0 * dt, NO_SPRING, IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+            )
             for geom in (*self._body.geoms, *ground.geoms):
-                geom.set_friction(friction)
+                geom.set_friction(contacts["friction"])
                 geom.set_sol_params(np.array(contacts["sol_params"]))
         if scene.damping is not None:
             rates = np.repeat([scene.damping.linear, scene.damping.angular], 3)
-            damping = rates * [*np.full(3, body.mass), *np.diag(body.inertia_tensor)]
-            self._body.set_dofs_damping(damping)
-            contacts["damping"] = damping.tolist()
-        rows = from_world(initial_states(members))  # Genesis's coordinates are MuJoCo's
+            contacts["damping"] = (rates * [*np.full(3, body.mass), *np.diag(body.inertia_tensor)]).tolist()
+            self._body.set_dofs_damping(np.array(contacts["damping"]))
+        rows = from_world(initial_states(members))
         self._body.set_qpos(rows[:, :7].astype(precision))
         self._body.set_dofs_velocity(rows[:, 7:].astype(precision))
         made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants"), "device": "cpu"}
@@ -134,11 +115,9 @@ class Worlds(BatchSimulation):
             self._scene.step()
 
     def states(self) -> Array:
-        rows = np.concatenate([self._body.get_qpos().numpy(), self._body.get_dofs_velocity().numpy()], axis=1, dtype=float)
-        return to_world(rows)
+        return to_world(np.concatenate([self._body.get_qpos().numpy(), self._body.get_dofs_velocity().numpy()], axis=1, dtype=float))
 
     def as_built(self) -> AsBuilt:
-        """Mass, inertia and gravity as the solver has them."""
         [link] = self._body.links
         mass, inertia, gravity = link.get_mass(), self._body.get_links_inertia(), self._scene.rigid_solver.get_gravity()
         return AsBuilt(float(mass), inertia.numpy().reshape(3, 3).astype(float), gravity.numpy().reshape(-1, 3)[0].astype(float))
@@ -153,10 +132,8 @@ def description(scene: Scenario) -> str:
     if scene.floor is not None:
         size = repr(body.radius) if isinstance(body, Sphere) else " ".join(map(repr, body.vertices.max(0).tolist()))
     shape = "sphere" if " " not in size else "box"
-    return (
-        '<mujoco><worldbody><body name="body"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-        f'<geom type="{shape}" size="{size}"/></body></worldbody></mujoco>'
-    )
+    parts = f'<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="{shape}" size="{size}"/>'  # mass and inertia are set later
+    return f'<mujoco><worldbody><body name="body"><freejoint/>{parts}</body></worldbody></mujoco>'
 
 
 class GenesisSimulation(Simulation):

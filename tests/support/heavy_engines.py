@@ -40,6 +40,7 @@ CASES = {
         Case("jsbsim[integrator=adams-bashforth-5]", 7.3e-7, None, batch=None),
         Case("jsbsim[integrator=local-linearization]", 3.5e-7, None, batch=None),
     ],
+    "genesis": [Case("genesis[precision=float64]", 8.35e-8, None)],
     "rapier-js": [Case("rapier-js", 2.8e-4, 1e-6, batch=None)],
     "sapien": [Case("sapien", 2.8e-4, 2.5e-3, batch=None)],
 }

@@ -18,8 +18,7 @@ from scenarios.model import initial_states
 
 INTEGRATORS = {"approximate_implicitfast": "approximate_implicitfast", "euler": "Euler"}
 PRECISIONS = {"float32": "32", "float64": "64"}
-IMPEDANCE = 0.9999  # the largest that Genesis allows
-NO_SPRING = 1e6  # Genesis's dampratio divides the stiffness by its square
+DAMPER = [1e6, 0.9999, 0.9999, 0.001, 0.5, 2.0]  # a dampratio without a spring, and the largest impedance that Genesis allows
 LEAST_FRICTION, STICKING = 0.01, 1e4
 REASONS = {
     "sol_params": "the damper stops the normal velocity in one step: its time constant is the least, 2 dt, and its stiffness vanishes",
@@ -78,8 +77,8 @@ class Worlds(BatchSimulation):
     """Worlds of one scene with a body each."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, integrator: str, precision: type) -> None:
-        scene, self.velocity_lag = members[0], 0.5 * dt
-        body, floor, morphs, options = scene.body, scene.floor, genesis.morphs, genesis.options
+        self.velocity_lag, morphs, options = 0.5 * dt, genesis.morphs, genesis.options
+        scene, body, floor = members[0], members[0].body, members[0].floor
         contacts: dict[str, Any] = {} if floor is None else {"friction_cone": "elliptic", "contact_resolution": "signorini"}
         chosen = {name: getattr(getattr(genesis, name), value) for name, value in contacts.items()}
         chosen |= {"integrator": getattr(genesis.integrator, integrator), "disable_constraint": floor is None}
@@ -89,14 +88,10 @@ class Worlds(BatchSimulation):
         self._body: Any = self._scene.add_entity(morphs.MJCF(file=description(scene), align=False))
         ground = None if floor is None else self._scene.add_entity(morphs.Plane(normal=(0.0, 1.0, 0.0)))
         self._scene.build(n_envs=len(members))
-        [link] = self._body.links
-        link.set_mass(body.mass)
-        link.set_inertia(body.inertia_tensor)
+        self._body.links[0].set_mass(body.mass)
+        self._body.links[0].set_inertia(body.inertia_tensor)
         if floor is not None and ground is not None:
-            contacts["friction"], contacts["sol_params"] = (
-                min(floor.coefficient, STICKING),
-                [2.0 * dt, NO_SPRING, IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
-            )
+            contacts |= {"friction": min(floor.coefficient, STICKING), "sol_params": [2.0 * dt, *DAMPER]}
             for geom in (*self._body.geoms, *ground.geoms):
                 geom.set_friction(contacts["friction"])
                 geom.set_sol_params(np.array(contacts["sol_params"]))
@@ -104,9 +99,9 @@ class Worlds(BatchSimulation):
             rates = np.repeat([scene.damping.linear, scene.damping.angular], 3)
             contacts["damping"] = (rates * [*np.full(3, body.mass), *np.diag(body.inertia_tensor)]).tolist()
             self._body.set_dofs_damping(np.array(contacts["damping"]))
-        rows = from_world(initial_states(members))
-        self._body.set_qpos(rows[:, :7].astype(precision))
-        self._body.set_dofs_velocity(rows[:, 7:].astype(precision))
+        rows: Array = from_world(initial_states(members)).astype(precision)
+        self._body.set_qpos(rows[:, :7])
+        self._body.set_dofs_velocity(rows[:, 7:])
         made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants"), "device": "cpu"}
         self.settings = made | {"precision": np.dtype(precision).name, "integrator": integrator} | contacts
 
@@ -118,8 +113,7 @@ class Worlds(BatchSimulation):
         return to_world(np.concatenate([self._body.get_qpos().numpy(), self._body.get_dofs_velocity().numpy()], axis=1, dtype=float))
 
     def as_built(self) -> AsBuilt:
-        [link] = self._body.links
-        mass, inertia, gravity = link.get_mass(), self._body.get_links_inertia(), self._scene.rigid_solver.get_gravity()
+        mass, inertia, gravity = self._body.get_mass(), self._body.get_links_inertia(), self._scene.rigid_solver.get_gravity()
         return AsBuilt(float(mass), inertia.numpy().reshape(3, 3).astype(float), gravity.numpy().reshape(-1, 3)[0].astype(float))
 
     def close(self) -> None:

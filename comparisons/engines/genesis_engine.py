@@ -12,6 +12,7 @@ import numpy as np
 
 from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, refusal_of_shape, version
 from comparisons.engines.mujoco_simulation import from_world, to_world
+from comparisons.engines.one_world import OneWorld
 from scenarios import Scenario
 from scenarios.body import Sphere
 from scenarios.model import initial_states
@@ -58,7 +59,8 @@ class Genesis(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return GenesisSimulation(self.prepare_batch([scene], dt))
+        worlds = self.prepare_batch([scene], dt)
+        return OneWorld(scene, worlds, worlds.settings, worlds.as_built())
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "Worlds":
         start(self.option("precision"))
@@ -128,22 +130,3 @@ def description(scene: Scenario) -> str:
     shape = "sphere" if " " not in size else "box"
     parts = f'<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="{shape}" size="{size}"/>'  # mass and inertia are set later
     return f'<mujoco><worldbody><body name="body"><freejoint/>{parts}</body></worldbody></mujoco>'
-
-
-class GenesisSimulation(Simulation):
-    """One world."""
-
-    def __init__(self, worlds: Worlds) -> None:
-        self.velocity_lag, self.settings, self._worlds = worlds.velocity_lag, worlds.settings, worlds
-
-    def advance(self, steps: int) -> None:
-        self._worlds.advance(steps)
-
-    def state(self) -> Array:
-        return self._worlds.states()[0]
-
-    def as_built(self) -> AsBuilt:
-        return self._worlds.as_built()
-
-    def close(self) -> None:
-        self._worlds.close()

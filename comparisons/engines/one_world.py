@@ -28,3 +28,6 @@ class OneWorld(Simulation):
 
     def as_built(self) -> AsBuilt:
         return self._built
+
+    def close(self) -> None:
+        self._worlds.close()

@@ -176,7 +176,9 @@ class MuJoCo(Engine):
         if all(map(members[0].differs_in_start_alone, members)):
             return MuJoCoBatch(first, [model] * len(members), members)
         models = [model, *(self._prepare(member, dt).built[0] for member in members[1:])]
-        return MuJoCoBatch(first, models, members) if len({one.signature for one in models}) == 1 else None
+        # Models of other sizes in the same data give NaN; MuJoCo's signature does not count the sizes of meshes.
+        sizes = {(one.signature, one.nbuffer, one.nbvh) for one in models}
+        return MuJoCoBatch(first, models, members) if len(sizes) == 1 else None
 
     def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
         form = Form(self.option("integrator"), **{name: self.option(name) for name in self.representations})

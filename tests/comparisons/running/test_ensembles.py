@@ -43,7 +43,7 @@ def test_batch_equals_single_runs_bit_for_bit(name):
     drawn = members(FEW)
     together, alone = (record_batch(chosen, drawn, 1e-3) for chosen in (engine(name), Alone(name)))
     for one, other in zip(together, alone, strict=True):
-        np.testing.assert_array_equal(one.states, other.states)
+        np.testing.assert_array_equal(one.motion.states, other.motion.states)
 
 
 @pytest.mark.parametrize("name", ["document", "document[rotation=exact]", "mujoco", "mujoco[profile=default]"])
@@ -53,7 +53,7 @@ def test_timed_batch_ends_where_single_runs_end(name):
     together = chosen.prepare_batch(drawn, 1e-3)
     together.advance(400)
     together.advance(200)
-    alone = [motion.states[-1] for motion in record_batch(Alone(name), drawn, 1e-3)]
+    alone = [recording.motion.states[-1] for recording in record_batch(Alone(name), drawn, 1e-3)]
     np.testing.assert_allclose(together.states(), alone, rtol=0, atol=0.0 if name.startswith("document") else 1e-6)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import engines as made
 
 import dropspin as ds
 from comparisons.engines.registry import engine
@@ -164,6 +165,52 @@ def test_job_has_the_same_bits_in_a_batch_and_by_itself(number):
     together = run_jobs(sweep, 0, sweep.size)
     assert "measured" in together.verdict
     assert_same(together, run_one_by_one(sweep))
+
+
+MASSES = {
+    "scenes": ["drop-box-anyhow"],
+    "engines": ["mujoco"],
+    "dts": [4e-3, 8e-3],
+    "grid": {"floor.friction": ["none", 0.3, 2e9], "floor.restitution": [0.2, 1.0], "body.mass": [1.0, 2.0]},
+}
+
+
+@pytest.mark.parametrize("mixes", [True, False])
+def test_jobs_are_simulated_in_batches(monkeypatch, mixes):
+    """Of one time step and, unless the engine mixes scenes, of one scene: with the bits and the reasons of single simulations."""
+    kind, sizes = type(engine("mujoco")), []
+    prepare_batch = kind.prepare_batch
+
+    def counted(self, members, dt):
+        sizes.append(len(members))
+        return prepare_batch(self, members, dt)
+
+    monkeypatch.setattr(kind, "prepare_batch", counted)
+    monkeypatch.setattr(kind, "mixes_scenes", mixes)
+    sweep = load_sweep(MASSES | ({} if mixes else {"seeds": 2}))
+    together = run_jobs(sweep, 0, sweep.size)
+    assert sizes == [4, 4, 4, 4] if mixes else sizes == [2] * 16
+    alone = run_one_by_one(sweep)
+    assert_same(together, alone)
+    assert set(together.verdict) == {"measured", "declined"}
+    assert any("friction" in reason for reason in alone.reason[alone.verdict == "measured"])
+
+
+@pytest.mark.parametrize("fault", [ValueError("broken"), None])
+def test_jobs_of_a_batch_that_breaks_are_run_by_themselves(monkeypatch, fault):
+    """Whether it raises or gives other numbers of rows."""
+    kind = type(engine("mujoco"))
+    broken = made.in_batches("broken", (lambda motions: motions[:1]) if fault is None else throwing(fault), kind)
+    monkeypatch.setattr(kind, "prepare_batch", type(broken).prepare_batch)
+    sweep = load_sweep(MASSES)
+    assert_same(run_jobs(sweep, 0, sweep.size), run_one_by_one(sweep))
+
+
+def throwing(fault):
+    def throw(motions):
+        raise fault
+
+    return throw
 
 
 TUMBLES = load_sweep(EVERYTHING[0])

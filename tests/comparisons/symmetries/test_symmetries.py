@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support import engines as made
 
+from comparisons.engines.registry import engine
 from comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES
 from comparisons.symmetries.study import SCENES, symmetries
 from scenarios import DropspinError, load, truth_for
@@ -186,6 +187,19 @@ def test_batch_that_swaps_two_members_is_found(scene):
         return motions
 
     assert lost(made.in_batches("swapped", swapped), scene) == {BATCH, *([ONE_CORE] if len(os.sched_getaffinity(0)) > 1 else [])}
+
+
+@pytest.mark.parametrize("scene", ["fall-spin", "spin-asymmetric", "drop-ball", "spin-damped"])
+def test_batch_that_steps_all_scenes_with_the_numbers_of_the_first_is_found(scene):
+    """Of an engine that says that it mixes scenes."""
+
+    class OfTheFirst(type(engine("mujoco"))):
+        name = "of-the-first"
+
+        def prepare_batch(self, members, dt):
+            return super().prepare_batch([members[0].starting_at(member.initial_state) for member in members], dt)
+
+    assert BATCH in lost(OfTheFirst(), scene)
 
 
 def test_result_that_a_new_process_changes_is_found():

@@ -10,7 +10,17 @@ from typing import Any, ClassVar
 import genesis
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, refusal_of_shape, version
+from comparisons.engines.base import (
+    FLOOR_HALF_SIZE,
+    Array,
+    AsBuilt,
+    BatchSimulation,
+    Engine,
+    Simulation,
+    refusal_of_floor,
+    refusal_of_shape,
+    version,
+)
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from comparisons.engines.one_world import OneWorld
 from scenarios import Scenario
@@ -56,7 +66,7 @@ class Genesis(Engine):
             )
         if floor.rest_speed > 0.0:
             return "Genesis has no speed below which restitution is 0 (floor.rest_speed)"
-        return None
+        return refusal_of_floor(scene, "plane with edges")
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         worlds = self.prepare_batch([scene], dt)
@@ -88,7 +98,9 @@ class Worlds(BatchSimulation):
         world = options.SimOptions(dt=dt, gravity=tuple(scene.acceleration))
         self._scene = genesis.Scene(sim_options=world, rigid_options=rigid, show_viewer=False)
         self._body: Any = self._scene.add_entity(morphs.MJCF(file=description(scene), align=False))
-        ground = None if floor is None else self._scene.add_entity(morphs.Plane(normal=(0.0, 1.0, 0.0)))
+        ground = (
+            None if floor is None else self._scene.add_entity(morphs.Plane(normal=(0.0, 1.0, 0.0), plane_size=(2.0 * FLOOR_HALF_SIZE,) * 2))
+        )
         self._scene.build(n_envs=len(members))
         self._body.links[0].set_mass(body.mass)
         self._body.links[0].set_inertia(body.inertia_tensor)

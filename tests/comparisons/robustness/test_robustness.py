@@ -314,6 +314,7 @@ def test_crash_of_the_process_is_a_failure_mode():
 # Known failures of the engines.
 
 
+@pytest.mark.slow
 def test_finds_clamps_of_pybullet():
     kept = "pybullet[coordinates=multibody,velocity_clamp=kept]"
     for name in (kept, "pybullet[profile=default]"):

@@ -159,6 +159,7 @@ def test_each_pair_of_engines_is_compared_once(core):
 
 
 @pytest.mark.usefixtures("few_start_phases")
+@pytest.mark.slow
 def test_exact_engine_passes_everywhere():
     """An engine without any error fails no expectation."""
     # The means over an ensemble have no exact value to compare with, and its exact motions take most of the time.
@@ -291,6 +292,7 @@ def test_scenes_at_the_limits_of_what_can_be_measured():
     assert judged["reason"].str.contains("the exact solution is known for [01] steps of").all()
 
 
+@pytest.mark.slow
 def test_desynchronised_motion_is_no_model_error():
     """A block that rocks slightly, and a slipping box that lands: no model error of MuJoCo or PyBullet."""
     rocks = standing(lean=0.9 * math.atan(0.4), duration=2.0)
@@ -299,6 +301,7 @@ def test_desynchronised_motion_is_no_model_error():
     assert found.asymptotic_errors("model").empty, found.asymptotic_errors("model").to_string()
 
 
+@pytest.mark.slow
 def test_best_method_of_the_project_passes_the_tumbling_box():
     """Its errors shrink with the step in each flight; a metric over more and more flights would not."""
     engine = "document[contact=sequential,law=coulomb,rotation=rk4]"

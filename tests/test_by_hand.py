@@ -1,6 +1,7 @@
 """The programs in docs/by_hand, which repeat findings with an engine alone."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
@@ -17,6 +18,7 @@ PACKAGES = {
     "check_mujoco_warp.py": {"mujoco", "mujoco_warp", "warp"},
 }
 """The engine's packages that each program imports."""
+JAVASCRIPT = "check_rapier_js.mjs"
 
 
 def imported(program):
@@ -32,10 +34,17 @@ def test_program_imports_its_engine_without_dropspin(program):
     assert imported(program) - {"numpy", "scipy", *sys.stdlib_module_names} == PACKAGES[program]
 
 
+def test_program_in_javascript_imports_its_engine_alone():
+    """Its other imports are modules of Node.js."""
+    text = (DOCS / "by_hand" / JAVASCRIPT).read_text(encoding="utf-8")
+    assert re.findall(r"^import .* from \"(?!node:)", text, re.MULTILINE) == []
+    assert re.findall(r"\"(@[^\"]+)\"", text) == ["@dimforge/rapier3d-compat"]
+
+
 def test_page_on_engines_links_every_program():
     page = (DOCS / "engines.md").read_text(encoding="utf-8")
-    programs = [path.name for path in (DOCS / "by_hand").glob("*.py")]
-    assert sorted(programs) == sorted(PACKAGES)
+    programs = [path.name for path in (DOCS / "by_hand").iterdir() if path.suffix in (".py", ".mjs")]
+    assert sorted(programs) == sorted([*PACKAGES, JAVASCRIPT])
     assert [name for name in programs if f"](by_hand/{name})" not in page] == []
 
 

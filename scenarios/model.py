@@ -208,10 +208,6 @@ class Scenario(Table):
         friction = "" if self.floor is None else self.floor.friction if isinstance(self.floor.friction, str) else "coefficient"
         return self.body.shape, len(self.body.vertices), self.gravity is None, self.damping is None, friction
 
-    def differs_in_start_alone(self, other: "Scenario") -> bool:
-        """Whether the rest of the physics of another scene is the same."""
-        return all(getattr(self, name) == getattr(other, name) for name in ("duration", "body", "gravity", "floor", "damping"))
-
     def steps(self, dt: float) -> int:
         """Number of whole steps of dt [s] that fit into the duration."""
         return math.floor(self.duration / dt + 1e-9)
@@ -226,6 +222,16 @@ class Scenario(Table):
             angular_velocity=tuple(values[SPIN]),
         )
         return self.model_copy(update={"start": start})
+
+
+def differ_in_start_alone(scenes: Sequence[Scenario]) -> bool:
+    """Whether the rest of the physics of scenes is the same."""
+    first = scenes[0]
+    # Starts of one scene share its tables, whose values then need not be compared.
+    pairs = (
+        (getattr(first, name), getattr(scene, name)) for scene in scenes for name in ("duration", "body", "gravity", "floor", "damping")
+    )
+    return all(one is other or one == other for one, other in pairs)
 
 
 def initial_states(scenes: Sequence[Scenario]) -> Array:

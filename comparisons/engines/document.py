@@ -12,7 +12,7 @@ from comparisons.measuring.predictions import bounce_error, flight_error
 from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Body, Box, Sphere, Vertices
-from scenarios.model import initial_states
+from scenarios.model import differ_in_start_alone, initial_states
 
 
 class Document(Engine):
@@ -112,7 +112,7 @@ class DocumentBatch(BatchSimulation):
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt
         scene = members[0]
-        if all(map(scene.differs_in_start_alone, members)):
+        if differ_in_start_alone(members):
             body, world = reference_body(scene.body), reference_world(scene)
         else:
             body, world = _side_by_side(members)

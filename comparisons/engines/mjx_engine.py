@@ -20,7 +20,7 @@ from comparisons.engines.mujoco_ports import Port, built, ported_model
 from comparisons.engines.mujoco_simulation import from_world, to_world
 from comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
 from scenarios import Scenario
-from scenarios.model import initial_states
+from scenarios.model import differ_in_start_alone, initial_states
 
 with redirect_stdout(StringIO()):  # it prints that Warp is not installed, which it does not need
     from mujoco import mjx
@@ -59,7 +59,7 @@ class MJX(Port):
         return MJXSimulation(scene, dt, self.option("integrator"), self.precision)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
-        models = members[:1] if all(map(members[0].differs_in_start_alone, members)) else members
+        models = members[:1] if differ_in_start_alone(members) else members
         return MJXBatch([MJXSimulation(member, dt, self.option("integrator"), self.precision) for member in models], members)
 
 

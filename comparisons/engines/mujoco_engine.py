@@ -28,6 +28,7 @@ from comparisons.measuring.predictions import bounce_error, flight_error
 from scenarios import DropspinError, Scenario, Truth
 from scenarios.body import Box, Sphere, Vertices
 from scenarios.mechanics import is_diagonal
+from scenarios.model import differ_in_start_alone
 
 VERSION = numbers_of(mujoco.__version__)
 LEAST_OF_A_SPRING = 0.01  # restitution; the damping ratio there is 5, and a contact that is damped more hardly pushes
@@ -173,7 +174,7 @@ class MuJoCo(Engine):
             return None
         first = self._prepare(members[0], dt)
         model, _ = first.built
-        if all(map(members[0].differs_in_start_alone, members)):
+        if differ_in_start_alone(members):
             return MuJoCoBatch(first, [model] * len(members), members)
         models = [model, *(self._prepare(member, dt).built[0] for member in members[1:])]
         # Models of other sizes in the same data give NaN; MuJoCo's signature does not count the sizes of meshes.

@@ -17,7 +17,7 @@ from comparisons.engines.mujoco_simulation import from_world, to_world
 from comparisons.engines.one_world import OneWorld
 from scenarios import Scenario
 from scenarios.body import Vertices
-from scenarios.model import initial_states
+from scenarios.model import differ_in_start_alone, initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
 import mujoco_warp as mjw  # noqa: E402
@@ -48,7 +48,7 @@ class Worlds(BatchSimulation):
         device = wp.get_device()
         self.settings = {"version": version("mujoco-warp"), "warp": wp.config.version, "device": f"{device} ({device.name})"} | settings
         self.model, self._data = mjw.put_model(model), mjw.make_data(model, nworld=len(members))
-        if not all(map(members[0].differs_in_start_alone, members)):
+        if not differ_in_start_alone(members):
             self._give_each_its_own([ported_model(member, dt, integrator, np.float32)[0] for member in members])
         rows = from_world(initial_states(members)).astype(np.float32)
         mjw.step(self.model, self._data)  # compiles; nothing may be loaded while a graph is captured

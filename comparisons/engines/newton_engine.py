@@ -15,7 +15,7 @@ from comparisons.engines.newton_rounding import rounding_met
 from comparisons.engines.one_world import OneWorld
 from scenarios import Scenario
 from scenarios.body import Box, Sphere
-from scenarios.model import initial_states
+from scenarios.model import differ_in_start_alone, initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
 import newton  # noqa: E402
@@ -81,7 +81,7 @@ class Worlds(BatchSimulation):
         if solver == "xpbd":
             options = options | {"enable_restitution": surface.get("restitution", 0.0) > 0.0}
         builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=tuple(scene.acceleration))
-        if all(map(scene.differs_in_start_alone, members)):
+        if differ_in_start_alone(members):
             builder.replicate(self._world(scene), len(members))
         else:
             for member in members:

@@ -1,7 +1,7 @@
 """Record releases: those that the record does not have yet, several at a time."""
 
 from collections.abc import Callable, Collection, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, ThreadPoolExecutor, wait
+from concurrent.futures import CancelledError, Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,6 +14,7 @@ from comparisons.record.environments import NOT_INSTALLABLE, POLL, NotMeasured, 
 from comparisons.record.plan import Plan
 from comparisons.record.store import Record, machine
 from comparisons.running.cluster import connected
+from comparisons.running.interrupts import finished
 from scenarios import DropspinError, UnknownName
 
 
@@ -73,7 +74,7 @@ def record(
         running = {workers.submit(_measured, plan, *one, time_limit, stopping): one for one in pending}
         try:
             while running:
-                for future in wait(running, timeout=POLL, return_when=FIRST_COMPLETED).done:
+                for future in finished(running, POLL):
                     engine, release = running.pop(future)
                     found = future.result()
                     record.write(engine, release, found.rows, common[engine] | found.machine | {"versions": found.versions})

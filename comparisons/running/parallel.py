@@ -1,12 +1,13 @@
 """Pieces of work on all processors: one at a time on each, with engine processes of its own."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from threading import Event, Lock
 from typing import TypeVar
 
 from comparisons.running.inputs import EngineEntry, ignore
+from comparisons.running.interrupts import finished, interrupts_deferred
 from comparisons.running.processes import Closed, EngineProcesses, ResourceLimits
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError
@@ -59,12 +60,13 @@ def work_in_parallel(
             while True:
                 while idle and (piece := next(pieces, None)) is not None:
                     processes = idle.pop()
-                    running[threads.submit(work, piece, processes, raise_if_stopping)] = piece, processes
+                    with interrupts_deferred():
+                        running[threads.submit(work, piece, processes, raise_if_stopping)] = piece, processes
                 if not running:
                     return
-                finished, _ = wait(running, timeout=POLL_INTERVAL, return_when=FIRST_COMPLETED)
+                done = finished(running, POLL_INTERVAL)
                 on_wait()
-                for future in finished:
+                for future in done:
                     piece, processes = running.pop(future)
                     on_done(piece, future.result())
                     idle.append(processes)

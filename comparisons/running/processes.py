@@ -11,7 +11,6 @@ import os
 import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as OutOfTime
-from concurrent.futures import wait
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
@@ -26,6 +25,7 @@ from comparisons.judging.verdicts import Verdict
 from comparisons.running.engine_process import Failed, call, run_and_count, start_process
 from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
+from comparisons.running.interrupts import finished, interrupts_deferred
 from comparisons.running.progress import OnSimulations
 from comparisons.running.recording import Breakdown
 from scenarios import DropspinError, Scenario
@@ -120,7 +120,10 @@ class EngineProcesses:
         """Start the processes of engines: a process that is forked while another thread compiles or imports may wait for it forever."""
         for entry in entries:
             self._pools[entry.label] = self._pool(entry)
-            wait([self._pools[entry.label].schedule(int)])
+            with interrupts_deferred():
+                started = self._pools[entry.label].schedule(int)
+            while not finished([started], POLL):
+                pass
 
     def call(
         self,
@@ -150,13 +153,14 @@ class EngineProcesses:
         self._processes[entry.label].value = 0
         self._counts[entry.label][:] = [0, 0]
         allowed = self._resources.processor_time + (COMPILATION if entry.engine is not None and entry.engine.compiles else 0.0)
-        task = self._pools[entry.label].schedule(call, args=[work, given, allowed], timeout=WALL_TIME_FACTOR * allowed)
+        with interrupts_deferred():
+            task = self._pools[entry.label].schedule(call, args=[work, given, allowed], timeout=WALL_TIME_FACTOR * allowed)
         largest = 0
         try:
-            while not wait([task], timeout=POLL).done:
+            while not finished([task], POLL):
                 if self._closed:
                     raise Closed
-                if self._has_exited(entry.label) and not wait([task], timeout=GRACE).done:
+                if self._has_exited(entry.label) and not finished([task], GRACE):
                     self.renew(entry)
                     raise Failed("crashed", "its process exited with code 0 before the work was done")
                 largest = max(largest, self._memory(entry.label))

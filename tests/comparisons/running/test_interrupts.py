@@ -1,0 +1,58 @@
+"""Interrupts where they would leave a lock behind: they are raised afterwards, and the work ends."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from comparisons.running.interrupts import interrupts_deferred
+
+PLANTED = """
+import os, signal, time
+from concurrent.futures import _base
+
+from comparisons.running.parallel import work_in_parallel
+from comparisons.running.processes import EngineProcesses, ResourceLimits
+
+take = _base._AcquireFutures.__enter__
+
+def taken_and_interrupted(futures):
+    take(futures)
+    os.kill(os.getpid(), signal.SIGINT)  # the locks of the futures are taken; without the statement that releases them, for ever
+
+_base._AcquireFutures.__enter__ = taken_and_interrupted
+
+def work(piece, processes, raise_if_stopping):
+    time.sleep(0.2)
+    return piece
+
+try:
+    work_in_parallel(iter(range(100)), work, [EngineProcesses(ResourceLimits())], lambda piece, result: None)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_an_interrupt_while_locks_are_taken_ends_the_work():
+    done = subprocess.run([sys.executable, "-c", PLANTED], check=False, capture_output=True, text=True, timeout=60)
+    assert done.stdout == "interrupted\n", done.stderr
+
+
+def test_deferred_interrupts_reach_their_handlers_at_the_end():
+    before, reached = signal.getsignal(signal.SIGTERM), []
+    signal.signal(signal.SIGTERM, lambda number, frame: reached.append("SIGTERM"))
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted_work(reached)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert reached == ["end of the context", "SIGTERM"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def interrupted_work(reached):
+    with interrupts_deferred():
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+        reached.append("end of the context")

@@ -50,14 +50,14 @@ def overview(results: Results) -> Overview:
 
 
 def _quick(results: Results) -> list[str]:
-    """A sentence on what a quick run left out, and the number of its checks that are not decided; empty for other runs."""
+    """What a quick run left out, and the number of its checks that are not decided, if any; empty for other runs."""
     if not results.is_quick:
         return []
     undecided = int(results.table["reason"].str.startswith(UNDECIDED_BY_STARTS).sum())
+    decided = f"{undecided} {'check is' if undecided == 1 else 'checks are'} not decided by so few starts. " if undecided else ""
     return [
         f"Quick run: {QUICK_START_PHASES} start phases instead of {START_PHASES}, at most {QUICK_MEMBERS} members of an ensemble, and no "
-        f"perturbed starts in double precision. {undecided} {'check is' if undecided == 1 else 'checks are'} not decided by so few starts; "
-        "run again without --quick to decide more, and to compare or accept the results."
+        f"perturbed starts in double precision. {decided}Run again without --quick to compare or accept the results."
     ]
 
 

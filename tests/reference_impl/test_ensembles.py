@@ -84,11 +84,11 @@ def test_body_that_diverges_does_not_affect_the_others():
     assert set(diverging) == {"gyroscopic", "midpoint", "rk4", "symmetric-top"}
     for methods in diverging.values():
         many = starts(20)
+        expected = np.delete(reference_impl.simulate(many, BOX, world, 1e-3, 50, methods=methods), 7, axis=0)
         many[7, SPIN] = 1e200
         together = reference_impl.simulate(many, BOX, world, 1e-3, 50, methods=methods)
         assert not np.isfinite(together[7, -1]).all()
-        for body in set(range(20)) - {7}:
-            np.testing.assert_array_equal(together[body], reference_impl.simulate(many[body], BOX, world, 1e-3, 50, methods=methods))
+        np.testing.assert_array_equal(np.delete(together, 7, axis=0), expected)
 
 
 def test_forces_may_differ_from_body_to_body():

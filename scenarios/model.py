@@ -3,6 +3,7 @@
 import hashlib
 import math
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -226,12 +227,10 @@ class Scenario(Table):
 
 def differ_in_start_alone(scenes: Sequence[Scenario]) -> bool:
     """Whether the rest of the physics of scenes is the same."""
-    first = scenes[0]
-    # Starts of one scene share its tables, whose values then need not be compared.
-    pairs = (
-        (getattr(first, name), getattr(scene, name)) for scene in scenes for name in ("duration", "body", "gravity", "floor", "damping")
-    )
-    return all(one is other or one == other for one, other in pairs)
+    physics = attrgetter("duration", "body", "gravity", "floor", "damping")
+    own = physics(scenes[0])
+    # Tuples compare values only of what is not the same object; starts of one scene share its tables.
+    return all(map(own.__eq__, map(physics, scenes)))
 
 
 def initial_states(scenes: Sequence[Scenario]) -> Array:

@@ -156,16 +156,15 @@ def record_batch(
         states = verified_batch(batch.record(steps), size, steps + 1)
         seconds = (time.perf_counter() - start) / size
         lag = verified_lag(batch.velocity_lag, dt)
-        met = [batch.limitations_of(*of_one) if limitations else () for of_one in zip(members, states, strict=True)]
+        met = [verified_limitations(batch.limitations_of(*of_one)) for of_one in zip(members, states, strict=True)] if limitations else []
     times = dt * np.arange(steps + 1, dtype=float)
     verify_starts(engine, members, states[:, 0])
     on_simulations(size, size)
     positions, orientations, velocities, spins = (states[..., part] for part in PARTS.values())
     parts = zip(positions, orientations, velocities, spins, strict=True)
     motions = [Trajectory(times, *of_one, velocity_lag=lag) for of_one in parts]
-    return [
-        Recording(motion, motion[:0], verified_limitations(of_one), seconds=seconds) for motion, of_one in zip(motions, met, strict=True)
-    ]
+    none = motions[0][:0]
+    return [Recording(motion, none, of_one, seconds=seconds) for motion, of_one in zip(motions, met or [()] * size, strict=True)]
 
 
 def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0) -> Recording | Breakdown:

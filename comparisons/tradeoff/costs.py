@@ -19,6 +19,8 @@ from scenarios import Scenario
 
 LONG_ENOUGH = 2e-3
 """The smallest wall time of a timing [s]."""
+MUCH_LONGER = 10.0
+"""A timing in free flight takes at least so many times as long as that of one step: a call may cost as much as hundreds of steps."""
 MOST_RUNS = 200
 WORLDS = (256,)
 """Numbers of worlds in a batch."""
@@ -34,16 +36,17 @@ PROCESS = Path("/proc/self")
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     """Wall time per simulated second of the engine's time steps [s/s]; NaN if the state after them is not finite.
 
-    In free flight every step takes the same time. One call is timed, with enough steps to make the cost of the call itself negligible,
-    beyond the end of the scene if the engine does not break down there. With a floor the time depends on the motion, so whole runs are
-    timed.
+    In free flight every step takes the same time. A call with many steps is timed, and one with a single step; their difference is the time
+    of the other steps without that of the call. It goes beyond the end of the scene if the engine does not break down there; else, and
+    with a floor, where the time depends on the motion, whole runs are timed, the call included.
     """
     if scene.floor is None:
-        steps = 16
-        while (taken := _timed(entry, scene, dt, steps)) < LONG_ENOUGH and steps < MOST_STEPS:
-            steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * LONG_ENOUGH / taken))))
+        steps, one = 16, _timed(entry, scene, dt, 1)
+        enough = max(LONG_ENOUGH, MUCH_LONGER * one)
+        while (taken := _timed(entry, scene, dt, steps)) < enough and steps < MOST_STEPS:
+            steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * enough / taken))))
         if np.isfinite(taken):
-            return taken / (steps * dt)
+            return (taken - one) / ((steps - 1) * dt)
     steps, total, runs = scene.steps(dt), 0.0, 0
     while total < LONG_ENOUGH and runs < MOST_RUNS:
         total, runs = total + _timed(entry, scene, dt, steps), runs + 1
@@ -62,17 +65,19 @@ def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
 def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> list[float]:
     """Wall time per simulated second and world [s/s] of a batch at each time step; NaN if the engine cannot simulate batches.
 
-    In free flight a step takes the same time at any dt; with a floor whole runs are timed, unless they are too long.
+    In free flight a step takes the same time at any dt, and that of a call is left out, as by `cost`; with a floor whole runs are timed,
+    unless they are too long.
     """
     members = [scene] * worlds
     if scene.floor is not None:
         return [_cost_on_a_floor(entry.adapter, members, dt) / (dt * worlds) for dt in dts]
-    _timed_batch(entry.adapter, members, dts[-1], 1)  # compiles
-    steps = 4
-    while (taken := _timed_batch(entry.adapter, members, dts[-1], steps)) < BATCH_SECONDS and steps < MOST_STEPS:
+    dt = dts[-1]
+    _timed_batch(entry.adapter, members, dt, 1)  # compiles
+    steps, one = 4, min(_timed_batch(entry.adapter, members, dt, 1) for _ in range(BATCH_ROUNDS))
+    while (taken := _timed_batch(entry.adapter, members, dt, steps)) < max(BATCH_SECONDS, MUCH_LONGER * one) and steps < MOST_STEPS:
         steps *= 4
-    taken = min([taken, *(_timed_batch(entry.adapter, members, dts[-1], steps) for _ in range(BATCH_ROUNDS - 1))])
-    return [taken / (steps * dt * worlds) for dt in dts]
+    taken = min([taken, *(_timed_batch(entry.adapter, members, dt, steps) for _ in range(BATCH_ROUNDS - 1))])
+    return [(taken - one) / ((steps - 1) * each * worlds) for each in dts]
 
 
 def _cost_on_a_floor(engine: Engine, members: Sequence[Scenario], dt: float) -> float:

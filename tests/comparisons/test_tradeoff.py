@@ -102,6 +102,48 @@ def short_timings():
         yield
 
 
+CALL, STEP = 2.5e-3, 6e-6  # s, as of MJX on a processor
+
+
+class CostlyCalls(Exact):
+    """Each call of `advance` takes some time beside that of its steps, on a clock of its own; a batch has the steps of its worlds."""
+
+    name = "costly-calls"
+    clock = 0.0
+
+    def pass_time(self, steps):
+        CostlyCalls.clock += CALL + STEP * steps
+
+    def prepare(self, scene, dt):
+        made = super().prepare(scene, dt)
+        advance = made.advance
+        made.advance = lambda steps: (self.pass_time(steps), advance(steps))
+        return made
+
+    def prepare_batch(self, members, dt):
+        return CostlyBatch(self, members)
+
+
+class CostlyBatch(BatchSimulation):
+    def __init__(self, engine, members):
+        self._engine, self._members = engine, members
+
+    def advance(self, steps):
+        self._engine.pass_time(steps * len(self._members))
+
+    def states(self):
+        return np.array([member.initial_state for member in self._members])
+
+
+@pytest.mark.parametrize("dt", [1e-2, 1e-3])
+def test_cost_of_a_step_in_flight_is_without_that_of_the_call(monkeypatch, dt):
+    """To 1e-9, where one call costs as much as four hundred steps."""
+    monkeypatch.setattr(costs.time, "perf_counter", lambda: CostlyCalls.clock)
+    entry = EngineEntry("costly-calls", CostlyCalls())
+    assert costs.cost(entry, SPIN, dt) == pytest.approx(STEP / dt, rel=1e-9)
+    assert costs.costs_per_world(entry, SPIN, [dt, 2 * dt], 4) == pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9)
+
+
 @pytest.fixture(scope="module")
 def spin():
     """Wang's method and three other rotations, on a spin of 6 s."""

@@ -32,7 +32,7 @@ def check_repeats(engine: Engine, check: str) -> CheckResult:
             raise CheckFailed("two simulations that take turns affect each other: simulations share state")
     if not _same(first, recorded(engine, a)):
         raise CheckFailed("the same scene gives different bits after another scene (A, B, A): a simulation leaves state behind")
-    return CheckResult(check, "passed", "A, B, A gives the same bits, and so do two simulations that take turns")
+    return CheckResult(check, "passed", "a scene gives the same bits again and after another scene, and so do two that take turns")
 
 
 def _same(one: Array, other: Array) -> bool:

@@ -79,7 +79,7 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
     with engine.prepare(scene, DT) as simulation:
         state = simulation.state()
         if not (isinstance(state, np.ndarray) and state.shape == (13,) and np.isrealobj(state)):
-            raise CheckFailed(f"state() returns {_kind(state)}; it must return an array of 13 real numbers, shape (13,)")
+            raise CheckFailed(f"state() returns {_kind(state)}; it must return a NumPy array of 13 real numbers, shape (13,)")
         if not np.isfinite(state).all():
             raise CheckFailed(f"the state at the start is not finite: {state.tolist()}")
         try:
@@ -171,7 +171,7 @@ def check_settings(engine: Engine, check: str) -> CheckResult:
         raise CheckFailed(f"settings cannot be written as JSON: {error}") from None
     if "version" not in settings:
         return CheckResult(check, "noted", "settings has no 'version'; add the engine's version, with which results are stored")
-    return CheckResult(check, "passed", f"version {settings['version']}, {len(settings) - 1} settings")
+    return CheckResult(check, "passed", f"version {settings['version']}, and {len(settings) - 1} other settings")
 
 
 def _kind(found: Any) -> str:

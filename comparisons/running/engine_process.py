@@ -70,8 +70,9 @@ def start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", cou
 
         _end_with_parent()
         with open("/proc/self/statm", encoding="ascii") as file:
-            taken = int(file.read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
+            taken = int(file.read().split()[5]) * resource.getpagesize()
+        # Not the address space, of which libraries for GPUs and WebAssembly reserve far more than they use.
+        resource.setrlimit(resource.RLIMIT_DATA, (taken + memory, resource.RLIM_INFINITY))
 
 
 PR_SET_PDEATHSIG = 1

@@ -129,13 +129,13 @@ def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
         if verified_refusal(engine.declines(scene)) is not None:
             return Timing()
         first = time_steps(engine, scene, dt, steps) if engine.compiles else None
-        least, repeats = time_steps(engine, scene, dt, steps).stepping, 1
-        while repeats < TIMING_REPEATS and least < LONG_ENOUGH:
-            least, repeats = min(least, time_steps(engine, scene, dt, steps).stepping), repeats + 1
+        timed = [time_steps(engine, scene, dt, steps)]
+        while len(timed) < TIMING_REPEATS and min(one.stepping for one in timed) < LONG_ENOUGH:
+            timed.append(time_steps(engine, scene, dt, steps))
     except Exception as error:  # whatever an engine raises costs its own row only
         return Timing(breakdown=classify(error))
-    compilation = 0.0 if first is None else max(first.building + first.stepping - least, 0.0)
-    return Timing(least / steps, compilation, in_batches=engine.steps_batches)
+    compilation = 0.0 if first is None else max(first.whole - min(one.whole for one in timed), 0.0)
+    return Timing(min(one.per_step for one in timed), compilation, in_batches=engine.steps_batches)
 
 
 def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:

@@ -182,9 +182,9 @@ class EngineProcesses:
         return result
 
     def _memory(self, label: str) -> int:
-        """The memory that an engine's process has reserved [bytes]; 0 where the system does not say."""
+        """The memory that an engine's process has for data [bytes], which is limited; 0 where the system does not say."""
         try:
-            return int((PROCESSES / str(self._processes[label].value) / "statm").read_text().split()[0]) * PAGE
+            return int((PROCESSES / str(self._processes[label].value) / "statm").read_text().split()[5]) * PAGE
         except OSError:
             return 0
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from comparisons.engines.base import Diverged, Engine, numpy_array
 from comparisons.running.inputs import MOST_STEPS, EngineEntry
-from comparisons.running.recording import time_steps
+from comparisons.running.recording import TimedSteps, time_steps
 from scenarios import Scenario
 
 LONG_ENOUGH = 2e-3
@@ -36,30 +36,31 @@ PROCESS = Path("/proc/self")
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     """Wall time per simulated second of the engine's time steps [s/s]; NaN if the state after them is not finite.
 
-    In free flight every step takes the same time. A call with many steps is timed, and one with a single step; their difference is the time
-    of the other steps without that of the call. It goes beyond the end of the scene if the engine does not break down there; else, and
-    with a floor, where the time depends on the motion, whole runs are timed, the call included.
+    The time of the call is left out, as by `TimedSteps.per_step`. In free flight every step takes the same time: so many are timed that the
+    call is short beside them, beyond the end of the scene if the engine does not break down there. With a floor the time depends on the
+    motion, so whole runs are timed.
     """
     if scene.floor is None:
-        steps, one = 16, _timed(entry, scene, dt, 1)
-        enough = max(LONG_ENOUGH, MUCH_LONGER * one)
-        while (taken := _timed(entry, scene, dt, steps)) < enough and steps < MOST_STEPS:
-            steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * enough / taken))))
-        if np.isfinite(taken):
-            return (taken - one) / ((steps - 1) * dt)
-    steps, total, runs = scene.steps(dt), 0.0, 0
-    while total < LONG_ENOUGH and runs < MOST_RUNS:
-        total, runs = total + _timed(entry, scene, dt, steps), runs + 1
-    return total / runs / (steps * dt)
+        steps = 16
+        while (timed := _timed(entry, scene, dt, steps)) is not None and steps < MOST_STEPS:
+            if timed.stepping >= (enough := max(LONG_ENOUGH, MUCH_LONGER * timed.call)):
+                return timed.per_step / dt
+            steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * enough / timed.stepping))))
+    steps, runs = scene.steps(dt), list[TimedSteps]()
+    while sum(run.stepping for run in runs) < LONG_ENOUGH and len(runs) < MOST_RUNS:
+        if (timed := _timed(entry, scene, dt, steps)) is None:
+            return math.nan
+        runs.append(timed)
+    return float(np.mean([run.per_step for run in runs])) / dt
 
 
-def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> float:
-    """Wall time of some time steps [s]; NaN if the state after them is not finite."""
+def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> TimedSteps | None:
+    """The wall times of some time steps; None if the state after them is not finite."""
     try:
         timed = time_steps(entry.adapter, scene, dt, steps)
     except Diverged:
-        return math.nan
-    return timed.stepping if np.isfinite(timed.state).all() else math.nan
+        return None
+    return timed if np.isfinite(timed.state).all() else None
 
 
 def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> list[float]:

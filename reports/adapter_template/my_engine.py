@@ -19,6 +19,7 @@ class MyEngine(ds.Engine):
 
     name = "my-engine"  # in results
     order = 1.0  # claimed order of accuracy in free flight, which `dropspin run` verifies; leave it out for no claim
+    # precision = np.float32  # if the state is in single precision; the default is np.float64
     # compiles = True  # with a JIT compiler (JAX, Warp, Numba): compilation is then timed apart and has time limits of its own
 
     def declines(self, scene: ds.Scenario) -> str | None:
@@ -86,7 +87,7 @@ class MyEngineBatch(ds.BatchSimulation):
         self.w[hit] += cross(arm, impulse) / moment
 
     def states(self) -> Array:
-        """Position, orientation, velocity and angular velocity, shape (size, 13): a copy, never the engine's own memory."""
+        """Position, orientation, velocity and angular velocity, shape (size, 13), in memory of the processor, not of a GPU."""
         return np.concatenate([self.x, self.q, self.v, self.w], axis=1)
 
 
@@ -103,8 +104,8 @@ class MyEngineSimulation(ds.Simulation):
         self.worlds.advance(steps)
 
     def state(self) -> Array:
-        """Position, orientation, velocity and angular velocity, shape (13,)."""
-        return self.worlds.states()[0]
+        """Position, orientation, velocity and angular velocity, shape (13,): a copy, never the engine's own memory."""
+        return np.array(self.worlds.states()[0])
 
     def as_built(self) -> ds.AsBuilt:
         """The mass, inertia and gravity that the engine has, which are compared with the scene; optional."""

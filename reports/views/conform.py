@@ -20,6 +20,8 @@ def sentences(found: Sequence[CheckResult]) -> list[str]:
     errors = Counter(one.message for one in wrong)
     shared = [f"{count} checks have one error: {error}" for error, count in errors.most_common() if count > 1]
     if not wrong:
-        return [f"None of {len(found)} checks fails."]
+        declined = sum(one.outcome == "declined" for one in found)
+        tested = f"; {declined} tested nothing, because the engine declines their scenes" if declined else ""
+        return [f"None of {len(found)} checks fails{tested}."]
     different = f", with {len(errors)} different {'message' if len(errors) == 1 else 'messages'}" if shared else ""
     return [*shared, f"{len(wrong)} of {len(found)} {'check fails' if len(found) == 1 else 'checks fail'}{different}."]

@@ -35,6 +35,15 @@ def allocate():
         hoard.append(np.ones(2**20))
 
 
+def reserve():
+    """64 GiB of addresses that can be neither read nor written."""
+    map_ = ctypes.CDLL(None, use_errno=True).mmap
+    map_.restype, map_.argtypes = ctypes.c_void_p, [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_long]
+    private_anonymous, protected = 0x22, 0
+    if map_(None, 2**36, protected, private_anonymous, -1, 0) == ctypes.c_void_p(-1).value:
+        raise MemoryError
+
+
 def leave():
     os._exit(7)
 

@@ -261,7 +261,7 @@ def test_cost_is_the_least_of_five_timings_and_relative_to_document_timed_in_tur
 
     def timed(engine, scene, dt, steps):
         per_step = 0.1 if engine.label == "document" else next(micros)
-        return TimedSteps(1.0, 1e-6 * per_step * steps, np.zeros(13))
+        return TimedSteps(1.0, 0.0, 1e-6 * per_step * steps, steps, np.zeros(13))
 
     monkeypatch.setattr(release, "time_steps", timed)
     found = release.costs(ds.engine("mujoco"), load("spin-asymmetric"), 1e-3)

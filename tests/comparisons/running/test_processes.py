@@ -55,6 +55,12 @@ def test_broken_engine_costs_its_own_row(what, verdict, reason):
     )
 
 
+def test_addresses_that_are_reserved_and_not_used_are_no_memory():
+    """Libraries for GPUs reserve far more than the limit."""
+    found = ds.run([BALL], [breaking.breaking(breaking.reserve)], [4e-3], resources=TIGHT).table
+    assert not found["verdict"].isin(["crashed", "timed_out"]).any()
+
+
 def test_sleeping_engine_is_ended_by_the_wall_clock():
     """It uses no processor time; the wall time allowed is ten times the processor time."""
     found = ds.run([BALL], [breaking.breaking(breaking.sleep)], [4e-3], resources=ResourceLimits(processor_time=0.1)).table

@@ -1,4 +1,4 @@
-"""The engine `drake`: Drake's discrete plant, a body's corners over a half-space. Its contacts only dissipate: restitution is 0."""
+"""The engine `drake`: Drake's discrete plant, a body's corners over a half-space. Its contacts are damped so that restitution is 0."""
 
 import logging
 from itertools import product
@@ -53,7 +53,7 @@ class Drake(Engine):
         if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
             return "Drake damps a free joint's rotation with one coefficient; angular damping needs a body of equal moments of inertia"
         if scene.floor is not None and scene.floor.restitution > 0.0:
-            return "Drake's contacts only dissipate; it has no coefficient of restitution"
+            return "Drake has no coefficient of restitution; its contacts are springs with dissipation"
         return base.refusal_of_floor(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:

@@ -1,6 +1,7 @@
 """The engine `newton`: Newton's rigid body with one of its solvers, over a ground plane; in single precision.
 
-XPBD alone has restitution; it acts on the velocity after gravity, hence v+ = e (u + g dt). Contacts of the others are springs and dampers.
+Of these solvers XPBD alone has restitution; it acts on the velocity after gravity, hence v+ = e (u + g dt). Contacts of the others have
+stiffness and damping.
 """
 
 from collections.abc import Sequence

@@ -26,7 +26,7 @@ FRICTION = {"none": 0.0, "infinite": 1e6}
 UPWARD = np.sqrt([0.5, 0.0, 0.0, 0.5])  # turns the plane's normal from x to y; w first, as in all poses here
 FASTEST = 1e16  # m/s and rad/s
 REASONS = {
-    "tolerance_length": "m; a box's contacts stay while it moves less than 1/20 of it; at SAPIEN's 0.1 a box gains 6% energy at impacts",
+    "tolerance_length": "m; a box's contacts stay while it moves less than 1/20 of it; at SAPIEN's 0.1 a box gains 8% energy at impacts",
     "enable_tgs": "for a coefficient: a cone; PGS has a pyramid, up to 1.41 times as strong; else PGS: TGS gains 1.3e-3 energy at impacts",
     "bounce_threshold": "the scene's rest speed, but not 0; by default impacts below 2 m/s do not rebound",
     "contact_offset": "a step's fall; at the default 1 cm a ball rebounds up to 1 mm above the floor; at 0 a tipping box errs fivefold",

@@ -15,6 +15,7 @@ from concurrent.futures import _base
 from comparisons.running.parallel import work_in_parallel
 from comparisons.running.processes import EngineProcesses, ResourceLimits
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which jobs in the background of a shell ignore
 take = _base._AcquireFutures.__enter__
 
 def taken_and_interrupted(futures):
@@ -40,15 +41,17 @@ def test_an_interrupt_while_locks_are_taken_ends_the_work():
 
 
 def test_deferred_interrupts_reach_their_handlers_at_the_end():
-    before, reached = signal.getsignal(signal.SIGTERM), []
-    signal.signal(signal.SIGTERM, lambda number, frame: reached.append("SIGTERM"))
+    reached = []
+    handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: lambda number, frame: reached.append("SIGTERM")}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         with pytest.raises(KeyboardInterrupt):
             interrupted_work(reached)
+        assert {number: signal.getsignal(number) for number in handlers} == handlers
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     assert reached == ["end of the context", "SIGTERM"]
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def interrupted_work(reached):

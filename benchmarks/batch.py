@@ -70,9 +70,9 @@ def mujoco_alone(starts: Sequence[scenarios.Scenario], every: int) -> Call:
     from mujoco.rollout import rollout
 
     simulation: Any = engine("mujoco").prepare_batch(starts, DT)
-    model, now = simulation._model, simulation._now.copy()
-    datas = [MjData(model) for _ in range(usable_cores())]
-    return partial(rollout, model, datas, now, nstep=STEPS)
+    models, now = simulation._models, simulation._now.copy()
+    datas = [MjData(models[0]) for _ in range(usable_cores())]
+    return partial(rollout, models, datas, now, nstep=STEPS)
 
 
 def seconds(call: Call) -> float:

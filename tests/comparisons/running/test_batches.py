@@ -1,5 +1,8 @@
 """Batches of scenes that differ in all numbers: each member moves as it does alone, with the same limitations."""
 
+import importlib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -57,3 +60,15 @@ def test_meshes_of_unequal_sizes_are_not_stepped_together():
     assert chosen.prepare_batch(members, DT) is None
     for member, recording in zip(members, record_batch(chosen, members, DT), strict=True):
         np.testing.assert_array_equal(recording.motion.states, record(chosen, member, DT).motion.states)
+
+
+def test_calls_of_engines_in_the_benchmark_end_where_batches_end(monkeypatch):
+    """`make bench` compares their times."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[3] / "benchmarks"))
+    bench = importlib.import_module("batch")
+    monkeypatch.setattr(bench, "STEPS", 20)
+    members = bench.members("drop", 3)
+    alone = bench.document_alone(members, 20)()
+    np.testing.assert_array_equal(alone[:, -1], bench.last_states(engine("document"), members))
+    states, _ = bench.mujoco_alone(members, 1)()
+    np.testing.assert_array_equal(states[:, -1, 1:4], bench.last_states(engine("mujoco"), members)[:, [0, 1, 2]])

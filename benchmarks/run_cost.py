@@ -74,13 +74,15 @@ class ProcessesHere:
         """Call a function with an engine."""
         return work(entry, *given)
 
-    def run_engine(self, entry: EngineEntry, scene: ds.Scenario, dt: float, starts: Sequence[ds.Scenario], _: object) -> EngineRun:
+    def run_engine(
+        self, entry: EngineEntry, scene: ds.Scenario, dt: float, starts: Sequence[ds.Scenario], _: object, *, quick: bool
+    ) -> EngineRun:
         """Run a scene with an engine."""
-        return run_engine(entry, scene, dt, starts)
+        return run_engine(entry, scene, dt, starts, quick=quick)
 
 
-def run_cost() -> None:
-    """Print the parts of a default run relative to its stepping and recording."""
+def run_cost(scenes: Sequence[ds.Scenario]) -> None:
+    """Print the parts of a run relative to its stepping and recording."""
     simulations = (DocumentSimulation, DocumentBatch, MuJoCoSimulation, MuJoCoBatch, PyBulletSimulation)
     for simulation, name in product(simulations, ("record", "advance")):
         time_method(simulation, name, "stepping and recording")
@@ -89,11 +91,10 @@ def run_cost() -> None:
     for engine in (Document, MuJoCo):
         time_method(engine, "prepare_batch", "building")
     import_module("comparisons.running.run").EngineProcesses = ProcessesHere
-    core = [scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags]
-    ds.run(core[:1], "document", jobs=1)  # compiles
+    ds.run(scenes[:1], "document", jobs=1)  # compiles
     seconds.clear()
     start = time.perf_counter()
-    results = ds.run(core, ["document", "mujoco", "pybullet"], jobs=1)
+    results = ds.run(scenes, ["document", "mujoco", "pybullet"], jobs=1)
     seconds["all of the run"] = time.perf_counter() - start
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
@@ -122,4 +123,4 @@ def sweep_cost() -> None:
 
 if __name__ == "__main__":
     sweep_cost()
-    run_cost()
+    run_cost([scene for scene in map(ds.load, ds.scene_names()) if "core" in scene.tags])

@@ -1,6 +1,8 @@
 """Batches of scenes that differ in all numbers: each member moves as it does alone, with the same limitations."""
 
 import importlib
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -62,9 +64,24 @@ def test_meshes_of_unequal_sizes_are_not_stepped_together():
         np.testing.assert_array_equal(recording.motion.states, record(chosen, member, DT).motion.states)
 
 
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
+
+
+def test_benchmark_of_a_run_prints_its_parts():
+    """In a process of its own, because it replaces methods by timed ones."""
+    code = "import run_cost; run_cost.run_cost([run_cost.ds.load('fall-spin')])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=BENCHMARKS, check=True, capture_output=True, text=True)
+    assert [line.partition(":")[0] for line in done.stdout.splitlines()] == [
+        "building",
+        "stepping and recording",
+        "all of the run",
+        "the report, after the run",
+    ]
+
+
 def test_calls_of_engines_in_the_benchmark_end_where_batches_end(monkeypatch):
     """`make bench` compares their times."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[3] / "benchmarks"))
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
     bench = importlib.import_module("batch")
     monkeypatch.setattr(bench, "STEPS", 20)
     members = bench.members("drop", 3)

@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from comparisons.engines.adapter_code import adapter_code
@@ -21,6 +22,8 @@ from comparisons.judging.verdicts import Verdict
 from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
 from scenarios import Scenario
+
+PROCESSES = Path("/proc")
 
 
 class Failed(Exception):
@@ -69,10 +72,17 @@ def start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", cou
         import resource
 
         _end_with_parent()
-        with open("/proc/self/statm", encoding="ascii") as file:
-            taken = int(file.read().split()[5]) * resource.getpagesize()
         # Not the address space, of which libraries for GPUs and WebAssembly reserve far more than they use.
-        resource.setrlimit(resource.RLIMIT_DATA, (taken + memory, resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_DATA, (memory_for_data(os.getpid()) + memory, resource.RLIM_INFINITY))
+
+
+def memory_for_data(process: int) -> int:
+    """The memory that a process has for data, which its limit counts [bytes].
+
+    Raises:
+        OSError: There is no such process, or the system is not Linux.
+    """
+    return int((PROCESSES / str(process) / "statm").read_text().split()[5]) * os.sysconf("SC_PAGE_SIZE")
 
 
 PR_SET_PDEATHSIG = 1

@@ -14,7 +14,6 @@ from concurrent.futures import TimeoutError as OutOfTime
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
-from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar, TypeVarTuple
 
@@ -22,7 +21,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from comparisons.engines.exceptions import described
 from comparisons.judging.verdicts import Verdict
-from comparisons.running.engine_process import Failed, call, run_and_count, start_process
+from comparisons.running.engine_process import PROCESSES, Failed, call, memory_for_data, run_and_count, start_process
 from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.interrupts import finished, interrupts_deferred
@@ -33,9 +32,7 @@ from scenarios import DropspinError, Scenario
 Given = TypeVarTuple("Given")
 Result = TypeVar("Result")
 
-PROCESSES = Path("/proc")
 POLL, GRACE = 0.5, 2.0  # s, between checks of a process, and for the pool to report its end
-PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096  # bytes
 GIB = 2**30  # bytes
 MOST_SECONDS, MOST_BYTES = 1e7, 2**60
 NEAR_LIMIT = 0.5
@@ -184,7 +181,7 @@ class EngineProcesses:
     def _memory(self, label: str) -> int:
         """The memory that an engine's process has for data [bytes], which is limited; 0 where the system does not say."""
         try:
-            return int((PROCESSES / str(self._processes[label].value) / "statm").read_text().split()[5]) * PAGE
+            return memory_for_data(self._processes[label].value)
         except OSError:
             return 0
 

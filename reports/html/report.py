@@ -13,6 +13,7 @@ from comparisons.results.ensembles import ENSEMBLE_METRICS
 from comparisons.results.provenance import first_settings
 from comparisons.results.results import NEGLIGIBLE, Results
 from comparisons.results.stored_table import OF_SYMMETRIES
+from comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from reports.pages import page
 from reports.plots.chart import Chart
 from reports.plots.chart_data import chart_data
@@ -63,6 +64,7 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
         "scenes": [_scene(results, number, name, charts.get(name, {}), name in failing) for number, name in enumerate(results.scenes)],
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,
+        "start_phases": QUICK_START_PHASES if results.is_quick else START_PHASES,
         "settings": first_settings(results.provenance),
     }
 

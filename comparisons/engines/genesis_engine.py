@@ -1,4 +1,4 @@
-"""The engine `genesis`: Genesis's rigid body on the processor, in single or double precision.
+"""The engine `genesis`: Genesis's rigid body on its default device, in single or double precision.
 
 A free body turns by the implicit midpoint rule under `approximate_implicitfast`. Genesis's coordinates are MuJoCo's.
 """
@@ -82,7 +82,7 @@ def start(precision: str) -> None:
     if genesis.backend is not None and genesis.np_float is not np.dtype(precision).type:
         genesis.destroy()
     if not genesis._initialized:
-        genesis.init(backend=genesis.cpu, precision=PRECISIONS[precision], logging_level=logging.CRITICAL)
+        genesis.init(precision=PRECISIONS[precision], logging_level=logging.CRITICAL)
 
 
 class Worlds(BatchSimulation):
@@ -116,19 +116,21 @@ class Worlds(BatchSimulation):
         rows: Array = from_world(initial_states(members)).astype(precision)
         self._body.set_qpos(rows[:, :7])
         self._body.set_dofs_velocity(rows[:, 7:])
-        made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants"), "device": "cpu"}
-        self.settings = made | {"precision": np.dtype(precision).name, "integrator": integrator} | contacts
+        made = {"version": version("genesis-world"), "torch": version("torch"), "quadrants": version("quadrants")}
+        self.settings = made | {"device": str(genesis.device), "precision": np.dtype(precision).name, "integrator": integrator} | contacts
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):
             self._scene.step()
 
     def states(self) -> Array:
-        return to_world(np.concatenate([self._body.get_qpos().numpy(), self._body.get_dofs_velocity().numpy()], axis=1, dtype=float))
+        position, velocity = self._body.get_qpos(), self._body.get_dofs_velocity()
+        return to_world(np.concatenate([position.cpu().numpy(), velocity.cpu().numpy()], axis=1, dtype=float))
 
     def as_built(self) -> AsBuilt:
         mass, inertia, gravity = self._body.get_mass(), self._body.get_links_inertia(), self._scene.rigid_solver.get_gravity()
-        return AsBuilt(float(mass), inertia.numpy().reshape(3, 3).astype(float), gravity.numpy().reshape(-1, 3)[0].astype(float))
+        tensor, first = inertia.cpu().numpy().reshape(3, 3), gravity.cpu().numpy().reshape(-1, 3)[0]
+        return AsBuilt(float(mass), tensor.astype(float), first.astype(float))
 
     def close(self) -> None:
         self._scene.destroy()

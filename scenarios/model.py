@@ -226,11 +226,11 @@ class Scenario(Table):
 
 def differ_in_start_alone(scenes: Sequence[Scenario]) -> bool:
     """Whether the rest of the physics of scenes is the same."""
-    tables = list(map(vars, scenes))  # a fifth of a microsecond for each scene, half of what its attributes take
+    tables = list(map(vars, scenes))  # reading five attributes of each takes twice as long
+    own = tables[0]
     # `count` compares values only of what is not the same object; starts of one scene share its tables.
-    return all(
-        [table[name] for table in tables].count(tables[0][name]) == len(tables) for name in ("duration", "body", "gravity", "floor", "damping")
-    )
+    counts = ([table[name] for table in tables].count(own[name]) for name in ("duration", "body", "gravity", "floor", "damping"))
+    return all(count == len(tables) for count in counts)
 
 
 def initial_states(scenes: Sequence[Scenario]) -> Array:

@@ -78,12 +78,8 @@ class MJXSimulation(Simulation):
         device = jax.devices()[0]
         row = jax.device_put(from_world(scene.initial_state), device)  # placed as results are, else the second call compiles again
         self.data = mjx.make_data(self.model).replace(qpos=row[:7], qvel=row[7:])
-        self.settings = {
-            "version": version("mujoco-mjx"),
-            "jax": jax.__version__,
-            "device": f"{device.platform} ({device.device_kind})",
-            **settings,
-        }
+        name = f"{device.platform} ({device.device_kind})"
+        self.settings = {"version": version("mujoco-mjx"), "jax": jax.__version__, "device": name} | settings
 
     def advance(self, steps: int) -> None:
         self.data, _ = _recorded(self.model, self.data, 1, steps)

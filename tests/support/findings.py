@@ -31,9 +31,15 @@ def heavy_engine(command):
     return "".join(named & CASES.keys())
 
 
+def printed(done):
+    """What a command printed as JSON."""
+    assert done.stdout, done.stderr
+    return json.loads(done.stdout)
+
+
 def verify_twins(command, folder, run):
     """Run a command that compares two engines."""
-    [found] = json.loads(run(*shlex.split(command), "--json", cwd=folder).stdout)
+    [found] = printed(run(*shlex.split(command), "--json", cwd=folder))
     for row in findings()[command]:
         measured = found[row["name"].replace(" ", "_")]
         assert measured < float(row["value"]) if row["relation"] else float(f"{measured:.1e}") == float(row["value"])
@@ -44,7 +50,7 @@ def verify_findings(command, folder, run=cli.dropspin):
     if command.startswith("twins"):
         verify_twins(command, folder, run)
         return
-    results = json.loads(run(*shlex.split(command), "--json", "-o", "out", cwd=folder).stdout)
+    results = printed(run(*shlex.split(command), "--json", "-o", "out", cwd=folder))
     finest = min((one["dt"] for one in results if one["dt"]), default=None)
     for row in findings()[command]:
         kinds = {"order"} if row["order"] else {"asymptotic_error"} if row["relation"] == "→" else {"truth", "invariant"}

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from typing import cast
 
+from comparisons.conformance.batches import check_batches
 from comparisons.conformance.clock import check_time, check_velocity_lag
 from comparisons.conformance.compilation import check_compilation
 from comparisons.conformance.exceptions import described, whole_traceback
@@ -33,6 +34,7 @@ CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
     "velocity lag": check_velocity_lag,
     "repeats": check_repeats,
     "symmetries": check_symmetries,
+    "batches": check_batches,
     "states": check_states,
     "settings": check_settings,
     "files": check_files,

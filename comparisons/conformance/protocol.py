@@ -13,7 +13,7 @@ from comparisons.conformance.exceptions import described
 from comparisons.conformance.explanations import explain_start
 from comparisons.conformance.outcomes import CheckFailed, CheckResult
 from comparisons.conformance.probes import DT, PROBES
-from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene
+from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
 from comparisons.engines.base import Diverged, Engine
 from comparisons.running.verification import ULPS, BuildMismatch, verified_record, verify_build, verify_start
 from scenarios import Scenario, load, names
@@ -149,7 +149,7 @@ def _difference(found: Array, expected: Array) -> float:
 
 def check_states(engine: Engine, check: str) -> CheckResult:
     """A state that was returned does not change."""
-    scene = accepted_scene(engine, "tumbling", "turning", "falling straight", "coasting")
+    scene = accepted_scene(engine, *FLIGHTS)
     with engine.prepare(scene, DT) as simulation:
         state = simulation.state()
         before = state.copy()

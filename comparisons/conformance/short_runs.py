@@ -16,10 +16,11 @@ Array = NDArray[np.float64]
 A_FEW_STEPS = 24
 RICHEST = ("corner", "bouncing ball", "tumbling", "turning", "falling straight", "coasting")
 """Names of probes, those that involve most of an engine first."""
+FLIGHTS = ("tumbling", "turning", "falling straight", "coasting")
 
 
 def accepted_scene(engine: Engine, *preferred: str) -> Scenario:
-    """The first of some probes' scenes that an engine accepts; by default of `RICHEST`, beginning shortly before an impact.
+    """The first of some probes' scenes that an engine accepts, by default of `RICHEST`; one above a floor begins shortly before an impact.
 
     Raises:
         Declined: The engine accepts none of them.
@@ -30,15 +31,14 @@ def accepted_scene(engine: Engine, *preferred: str) -> Scenario:
         scene = probes[name].scene
         refusal = engine.declines(scene)
         if refusal is None:
-            return scene if preferred else _shortly_before_contact(scene)
+            return _shortly_before_contact(scene) if scene.starts_above_floor else scene
     raise Declined(f"the engine declines {', '.join(preferred or RICHEST)}: {refusal}")
 
 
 def _shortly_before_contact(scene: Scenario) -> Scenario:
-    """The scene, started so late that a few steps reach the floor, if it has one."""
+    """The scene, started so late that a few steps reach the floor."""
     truth = truth_for(scene)
-    if truth is None or not truth.events:
-        return scene
+    assert truth is not None
     return scene.starting_at(truth(truth.events[0].time - 5.5 * DT).states[0])
 
 

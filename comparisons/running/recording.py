@@ -17,6 +17,7 @@ from comparisons.judging.verdicts import Verdict
 from comparisons.running.inputs import SceneLike, as_scene, verify_time_step
 from comparisons.running.progress import OnSimulations
 from comparisons.running.verification import (
+    BuildMismatch,
     verified_batch,
     verified_lag,
     verified_limitations,
@@ -182,6 +183,8 @@ def classify(error: Exception) -> Breakdown:
     """The verdict for what an adapter raised: an engine is somebody else's code, so any exception costs its own row only."""
     if isinstance(error, Diverged):
         return Breakdown("diverged", short(str(error)))
+    if isinstance(error, BuildMismatch):
+        return Breakdown("crashed", short(str(error)))
     return Breakdown("crashed", described(error))
 
 
@@ -215,10 +218,13 @@ class TimedSteps(NamedTuple):
 
     @property
     def per_step(self) -> float:
-        """The time of a step [s], without that of the call, unless the second call took hardly longer than the first."""
-        if self.stepping > 2.0 * self.call and self.steps > 1:
-            return (self.stepping - self.call) / (self.steps - 1)
-        return self.stepping / self.steps
+        """The time of a step [s], as `time_per_step`."""
+        return time_per_step(self.call, self.stepping, self.steps)
+
+
+def time_per_step(call: float, stepping: float, steps: int) -> float:
+    """The time of a step [s] without that of the call, unless a call of many steps [s] took hardly longer than one of a single step [s]."""
+    return (stepping - call) / (steps - 1) if stepping > 2.0 * call and steps > 1 else stepping / steps
 
 
 def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> TimedSteps:

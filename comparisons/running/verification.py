@@ -218,7 +218,8 @@ def _verify_equal(engine: Engine, what: str, found: NDArray[np.float64], expecte
     allowed = ulps * float(np.finfo(engine.precision).eps) * largest
     if not (difference <= allowed).all():
         row = int(np.argmin(difference <= allowed))
+        of_which = f" of simulation {row + 1} of {len(found)}" if len(found) > 1 else ""
+        is_now, has = (np.array2string(one[row], precision=17) for one in (found, expected))
         raise BuildMismatch(
-            f"{what} is {np.array2string(found[row], precision=17)}, the scene has {np.array2string(expected[row], precision=17)}; "
-            f"they differ by {difference[row]:.3g}, {ulps} ulp are {allowed[row]:.3g}"
+            f"{what}{of_which} is {is_now}, the scene has {has}; they differ by {difference[row]:.3g}, {ulps} ulp are {allowed[row]:.3g}"
         )

@@ -14,7 +14,7 @@ import numpy as np
 
 from comparisons.engines.base import Diverged, Engine, numpy_array
 from comparisons.running.inputs import MOST_STEPS, EngineEntry
-from comparisons.running.recording import TimedSteps, time_steps
+from comparisons.running.recording import TimedSteps, time_per_step, time_steps
 from scenarios import Scenario
 
 LONG_ENOUGH = 2e-3
@@ -78,7 +78,7 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
     while (taken := _timed_batch(entry.adapter, members, dt, steps)) < max(BATCH_SECONDS, MUCH_LONGER * one) and steps < MOST_STEPS:
         steps *= 4
     taken = min([taken, *(_timed_batch(entry.adapter, members, dt, steps) for _ in range(BATCH_ROUNDS - 1))])
-    return [(taken - one) / ((steps - 1) * each * worlds) for each in dts]
+    return [time_per_step(one, taken, steps) / (each * worlds) for each in dts]
 
 
 def _cost_on_a_floor(engine: Engine, members: Sequence[Scenario], dt: float) -> float:

@@ -21,7 +21,10 @@ def sentences(found: Sequence[CheckResult]) -> list[str]:
     shared = [f"{count} checks have one error: {error}" for error, count in errors.most_common() if count > 1]
     if not wrong:
         declined = sum(one.outcome == "declined" for one in found)
-        tested = f"; {declined} tested nothing, because the engine declines their scenes" if declined else ""
-        return [f"None of {len(found)} checks fails{tested}."]
+        tested = f"; {declined} tested nothing, for the reasons given" if declined else ""
+        return [f"{'The check does not fail' if len(found) == 1 else f'None of {len(found)} checks fails'}{tested}."]
     different = f", with {len(errors)} different {'message' if len(errors) == 1 else 'messages'}" if shared else ""
-    return [*shared, f"{len(wrong)} of {len(found)} {'check fails' if len(found) == 1 else 'checks fail'}{different}."]
+    return [
+        *shared,
+        f"{len(wrong)} of {len(found)} {'check' if len(found) == 1 else 'checks'} {'fails' if len(wrong) == 1 else 'fail'}{different}.",
+    ]

@@ -61,7 +61,7 @@ def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
 def legend(findings: Sequence[Finding]) -> str:
     """The meaning of the numbers, and of each mark that occurs."""
     marks = ", ".join(f"{MARKS[status]} {MEANINGS[status]}" for status in STATUSES if any(one.status == status for one in findings))
-    return f"The largest difference of two motions of any scene, in radians or relative to sizes and speeds: {marks}."
+    return f"Each number is the largest difference of two motions of any scene, in radians or relative to sizes and speeds. {marks}."
 
 
 def sentences(findings: Sequence[Finding]) -> list[str]:
@@ -90,5 +90,6 @@ def _not_run(findings: Sequence[Finding]) -> list[str]:
         scenes = ", ".join(dict.fromkeys(one.scene for one in some))
         names = dict.fromkeys(one.symmetry for one in some)
         ways = f" ({', '.join(names)})" if len(names) < len(NAMES) // 2 else ""
-        sentences.append(f"Not run: {engine} in {scenes}{ways}: {reason.removesuffix('.')}.")
+        options = " (options --time-limit and --dt)" if some[0].verdict == "timed_out" else ""
+        sentences.append(f"Not run: {engine} in {scenes}{ways}: {reason.removesuffix('.')}{options}.")
     return sentences

@@ -122,7 +122,7 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         )
     sentence = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second"
     if advice.next_best is None:
-        sentence += "; no other tested configuration reaches it."
+        sentence += "; no other engine reaches it."
     elif advice.level:
         sentence += f"; {_named(advice.next_best)} takes about as long, {advice.ratio:.2f} times that."
     else:
@@ -130,7 +130,9 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
     for size in found.worlds:
         batched = found.best_in_batch(tolerance, size)
         if batched is not None:
-            sentence += f" In a batch of {size}, {_named(batched)}: {duration(batched.costs_per_world[size])} per world."
+            sentence += (
+                f" In a batch of {size}, {_named(batched)}: {duration(batched.costs_per_world[size])} per world and simulated second."
+            )
     return sentence
 
 

@@ -17,6 +17,7 @@ from comparisons.conformance.clock import check_velocity_lag
 from comparisons.conformance.outcomes import CheckFailed
 from comparisons.conformance.probes import PROBES
 from comparisons.engines.base import KnownLimitation, Simulation
+from comparisons.engines.document import Document
 from comparisons.engines.pybullet_engine import PyBullet
 from comparisons.engines.registry import engine
 from comparisons.running import recording
@@ -361,23 +362,90 @@ def test_unknown_check_suggests_the_nearest_name():
         conform(engine("document"), checks=["bounce ball"])
 
 
-LEAKS = {
-    "leaks between worlds": "motions[1:, 1:] += 1e-9 * motions[0, 1:]",
-    "permutes worlds": "motions[:, 1:] = motions[[1, 2, 0], 1:]",
-    "reuses one state": "motions[:] = motions[0]",
+BATCHES = {
+    "leaks between simulations": (
+        {"record": "motions[1:, 1:] += 1e-9 * motions[0, 1:]"},
+        "simulation 2 differs from the same one by itself",
+    ),
+    "permutes simulations": ({"record": "motions[:, 1:] = motions[[*range(1, len(motions)), 0], 1:]"}, "simulation 1 differs"),
+    "reuses one state": ({"record": "motions[:] = motions[0]"}, "position at the start of simulation 2 of 3 is"),
+    "is right for few alone": ({"record": "motions[:, 1:] *= 1.0 + 1e-9 * (len(motions) > 4)"}, "(in a batch of 32 simulations of"),
+    "takes one step a call": ({"steps": lambda steps: 1}, "calls of advance(8) give other states than record(24), by "),
+    "takes 100 steps at most": ({"steps": lambda steps: min(steps, 100)}, "advance(256) gives other states than calls of advance(8), by "),
+    "lacks the lag": ({"lag": 0.0}, "velocity_lag is 0.0; that of a single simulation is 0.000125"),
 }
 
 
-@pytest.mark.parametrize("fault", LEAKS)
-def test_batch_that_differs_from_single_simulations_fails(fault):
+@pytest.mark.parametrize("fault", BATCHES)
+def test_faults_of_batches_are_found(fault):
+    """A fault in what a batch records, in the number of steps that it takes, or in its attribute; each is right for single simulations."""
+    faults, expected = BATCHES[fault]
+
     def changed(motions):
-        exec(LEAKS[fault])
+        exec(faults.get("record", ""), {"np": np, "motions": motions})
         return motions
 
-    found = not_passed(made.in_batches("batched", changed, type(documented())), "symmetries")
-    outcome, message = found["symmetries"]
+    class Faulty(made.Together):
+        def __init__(self, simulations):
+            super().__init__(simulations, changed)
+            self.velocity_lag = faults.get("lag", self.velocity_lag)
+
+        def advance(self, steps):
+            super().advance(faults.get("steps", int)(steps))
+
+    class Batched(type(documented())):
+        def prepare_batch(self, members, dt):
+            return Faulty([self.prepare(member, dt) for member in members])
+
+    [(outcome, message)] = not_passed(Batched(), "batches").values()
     assert outcome == "failed"
-    assert message.startswith("a batch of three: ")
+    assert expected in message
+
+
+def test_record_of_a_batch_in_memory_that_is_used_again_fails():
+    rows = {}
+
+    class Reusing(made.Together):
+        def record(self, steps, every=1):
+            found = super().record(steps, every)
+            kept = rows.setdefault(found.shape, found)
+            kept[:] = found
+            return kept
+
+    class Batched(type(documented())):
+        def prepare_batch(self, members, dt):
+            return Reusing([self.prepare(member, dt) for member in members])
+
+    [(_, message)] = not_passed(Batched(), "batches").values()
+    assert message.startswith("record returns memory that later steps overwrite; return a copy")
+
+
+def test_engine_without_batches_declines_their_check():
+    found = run_check(EngineEntry("documented", documented()), "batches")
+    assert (found.outcome, found.message) == ("declined", "prepare_batch returns None: the engine simulates one scene at a time")
+
+
+def test_batch_with_the_friction_of_its_first_scene_fails():
+    class FirstFriction(Document):
+        def prepare_batch(self, members, dt):
+            friction = members[0].floor and {"friction": members[0].floor.friction}
+            floors = [one.floor and one.floor.model_copy(update=friction) for one in members]
+            same = [one.model_copy(update={"floor": floor}) for one, floor in zip(members, floors, strict=True)]
+            return super().prepare_batch(same, dt)
+
+    sound, faulty = (kind({"law": "coulomb"}) for kind in (Document, FirstFriction))
+    assert not_passed(sound, "batches") == {}
+    [(_, message)] = not_passed(faulty, "batches").values()
+    assert message.startswith("simulation 2 differs from the same one by itself from step ")
+    assert message.endswith("(in a batch of 3 simulations of the scene slippery-floor; their numbers differ, because mixes_scenes is True)")
+
+
+def test_long_call_that_takes_fewer_steps_is_found():
+    """The time of a step would be too small."""
+    capped = documented(("mujoco.mj_step(self.model, self.data, steps)", "mujoco.mj_step(self.model, self.data, min(steps, 100))"))
+    outcome, message = not_passed(capped, "waiting")["waiting"]
+    assert outcome == "failed"
+    assert "the long call takes fewer steps, or state() does not wait for them" in message
 
 
 @pytest.mark.parametrize(("excess", "outcomes"), [(1e-15, set()), (1e-9, {"failed"})])
@@ -387,7 +455,7 @@ def test_batch_of_an_engine_that_compiles_may_differ_by_rounding_alone(excess, o
         return motions
 
     compiling = type("Compiling", (type(documented()),), {"compiles": True})
-    found = not_passed(made.in_batches("batched", changed, compiling), "symmetries")
+    found = not_passed(made.in_batches("batched", changed, compiling), "batches")
     assert {outcome for outcome, _ in found.values()} == outcomes
 
 

@@ -21,8 +21,8 @@ BALL = ds.load("drop-ball")
         (made.GivingUp(), "diverged", "step 3: a number beyond 1e10", 3),
         (made.Declining(), "declined", "I do not bounce", 0),
         (made.engine_with("nan", made.nan_after_half_a_second), "diverged", "the state is not finite at t = 0.50", 3),
-        (made.HeavyInertia(), "crashed", "BuildMismatch: inertia is", 3),
-        (made.WrongStart(), "crashed", "BuildMismatch: position at the start is", 3),
+        (made.HeavyInertia(), "crashed", "inertia is", 3),
+        (made.WrongStart(), "crashed", "position at the start is", 3),
     ],
     ids=lambda case: getattr(case, "label", ""),
 )

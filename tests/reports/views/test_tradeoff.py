@@ -68,7 +68,7 @@ def test_ladders_are_listed_with_their_ends_and_reasons(found):
 
 
 def test_only_engine_within_a_tolerance_is_compared_with_tested_ones(found):
-    assert "; no other tested configuration reaches it." in tradeoff.sentences(found, [4.5e-3])[0]
+    assert "; no other engine reaches it." in tradeoff.sentences(found, [4.5e-3])[0]
 
 
 def test_every_engine_has_a_row_with_its_place(found):

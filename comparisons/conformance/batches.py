@@ -1,0 +1,145 @@
+"""The check of batches: they have the motions of single simulations, for two sizes and time steps, in long calls and in short ones."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
+from comparisons.conformance.probes import DT
+from comparisons.conformance.protocol import ROUNDING
+from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, RICHEST, accepted_scene
+from comparisons.engines.base import BatchSimulation, Engine, numpy_array
+from comparisons.running.inputs import EngineEntry
+from comparisons.running.recording import record
+from comparisons.running.start_phases import START_PHASES
+from comparisons.running.verification import BuildMismatch, verified_batch, verify_starts
+from comparisons.symmetries.findings import ULPS, Finding, judged
+from comparisons.symmetries.study import effects_of_rounding
+from scenarios import Scenario
+from scenarios.state import POSITION, RATES
+from scenarios.transformations import AWAY, whole_steps, with_other_numbers
+
+Array = NDArray[np.float64]
+
+WITH_FRICTION = ("slippery floor", "sliding box")
+"""Names of probes with a coefficient of friction."""
+PIECE = 8
+"""Steps of a short call."""
+SPREAD = 1e-3
+"""The relative difference of the numbers of a simulation from those of the one before."""
+
+
+class Size(NamedTuple):
+    """A number of simulations, their time step [s], and the steps of a long call; a fault may need many, or a second time step."""
+
+    simulations: int
+    dt: float
+    long: int
+
+
+SIZES = (Size(3, DT, 256), Size(START_PHASES, 2.0 * DT, 16))
+
+
+def check_batches(engine: Engine, check: str) -> CheckResult:
+    """Batches have the states and the velocity lag of single simulations, and the same states by `record` as by `advance`."""
+    verified = {scene.name: [_is_verified(engine, scene, size) for size in SIZES] for scene in _scenes(engine)}
+    compared = [name for name, is_batch in verified.items() if any(is_batch)]
+    if not compared:
+        raise Declined("prepare_batch returns None: the engine simulates one scene at a time")
+    same = "motions, to rounding" if engine.compiles else "bits"
+    sizes = " and ".join(str(size.simulations) for size in SIZES)
+    return CheckResult(check, "passed", f"batches of {sizes} give the same {same} as single simulations, in {', '.join(compared)}")
+
+
+def _scenes(engine: Engine) -> Iterator[Scenario]:
+    """A flight, an impact and a contact with friction, as far as the engine accepts them."""
+    found = {}
+    for names in (FLIGHTS, RICHEST, WITH_FRICTION):
+        with suppress(Declined):
+            scene = accepted_scene(engine, *names)
+            found[scene.name] = scene
+    yield from found.values()
+
+
+def _is_verified(engine: Engine, scene: Scenario, size: Size) -> bool:
+    """Verify a batch; whether there is one.
+
+    Raises:
+        CheckFailed: It differs.
+    """
+    members = _members(engine, whole_steps(scene, size.dt, A_FEW_STEPS), size.simulations)
+    try:
+        first, second = engine.prepare_batch(members, size.dt), engine.prepare_batch(members, size.dt)
+        if first is None or second is None:
+            return False
+        with first, second:
+            _verify_batches(engine, members, size, first, second)
+    except (CheckFailed, BuildMismatch) as wrong:
+        others = "; their numbers differ, because mixes_scenes is True" if engine.mixes_scenes else ""
+        raise CheckFailed(f"{wrong} (in a batch of {size.simulations} simulations of the scene {scene.name}{others})") from None
+    return True
+
+
+def _members(engine: Engine, scene: Scenario, count: int) -> list[Scenario]:
+    """The scene and others, which start elsewhere and with other speeds, and differ in all numbers if the engine mixes scenes."""
+    found = [scene]
+    for share in 1.0 + SPREAD * np.arange(1, count):
+        start = scene.initial_state
+        start[POSITION] += (share - 1.0) * scene.body.size * AWAY
+        start[RATES] *= share
+        found.append((with_other_numbers(scene, float(share)) if engine.mixes_scenes else scene).starting_at(start))
+    return found
+
+
+def _verify_batches(engine: Engine, members: Sequence[Scenario], size: Size, first: BatchSimulation, second: BatchSimulation) -> None:
+    """Compare three simulations of a batch with single ones, and the batch with another of the same simulations."""
+    count = len(members)
+    rows = verified_batch(first.record(A_FEW_STEPS), count, 1 + A_FEW_STEPS)
+    verify_starts(engine, members, rows[:, 0])
+    for number in sorted({0, count // 2, count - 1}):
+        _verify_single(engine, members[number], size.dt, rows[number], first.velocity_lag, number)
+    before = rows.copy()
+    first.advance(size.long)
+    end = _states(first, count)
+    more = verified_batch(first.record(A_FEW_STEPS), count, 1 + A_FEW_STEPS)
+    if not np.array_equal(rows, before):
+        raise CheckFailed("record returns memory that later steps overwrite; return a copy")
+    calls = np.empty((count, (A_FEW_STEPS + size.long) // PIECE, 13))
+    for number in range(calls.shape[1]):
+        second.advance(PIECE)
+        calls[:, number] = _states(second, count)
+    recorded = rows[:, PIECE::PIECE]
+    _verify_calls(
+        engine, calls[:, : recorded.shape[1]], recorded, f"calls of advance({PIECE}) give other states than record({A_FEW_STEPS})"
+    )
+    _verify_calls(engine, end, calls[:, -1], f"advance({size.long}) gives other states than calls of advance({PIECE})")
+    _verify_calls(engine, more[:, 0], end, "a second record does not begin at the current states")
+
+
+def _verify_calls(engine: Engine, found: Array, expected: Array, message: str) -> None:
+    """States that a batch computes by different calls are the same; rounding may differ with the number of steps in a call."""
+    difference = float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
+    if not difference <= max(ROUNDING, ULPS * float(np.finfo(engine.precision).eps)):
+        raise CheckFailed(f"{message}, by {difference:.2g} of the largest number")
+
+
+def _states(batch: BatchSimulation, count: int) -> Array:
+    return verified_batch(numpy_array(batch.states())[:, np.newaxis], count, 1)[:, 0].copy()
+
+
+def _verify_single(engine: Engine, member: Scenario, dt: float, rows: Array, lag: float, number: int) -> None:
+    """Compare one simulation of a batch with a single one."""
+    alone = record(engine, member, dt).motion
+    if lag != alone.velocity_lag:
+        raise CheckFailed(f"velocity_lag is {lag!r}; that of a single simulation is {alone.velocity_lag!r}")
+    entry = EngineEntry(engine.label, engine)
+    # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
+    effects = (lambda: effects_of_rounding(entry, member, dt, alone.states)) if engine.compiles else None
+    none = Finding(member.name, engine.label, "", "not run")
+    found = judged(none, member, dt, [(alone.states, rows)], effects, engine.precision)
+    if found.status not in ("kept", "rounding"):
+        since = f"from step {found.step} on, by {found.difference:.2g} of sizes and speeds"
+        raise CheckFailed(f"simulation {number + 1} differs from the same one by itself {since}")

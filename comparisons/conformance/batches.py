@@ -49,9 +49,9 @@ def check_batches(engine: Engine, check: str) -> CheckResult:
     compared = [name for name, is_batch in verified.items() if any(is_batch)]
     if not compared:
         raise Declined("prepare_batch returns None: the engine simulates one scene at a time")
-    same = "motions, to rounding" if engine.compiles else "bits"
+    same = "the motions of single simulations, up to rounding" if engine.compiles else "the same bits as single simulations"
     sizes = " and ".join(str(size.simulations) for size in SIZES)
-    return CheckResult(check, "passed", f"batches of {sizes} give the same {same} as single simulations, in {', '.join(compared)}")
+    return CheckResult(check, "passed", f"batches of {sizes} give {same}, in {', '.join(compared)}")
 
 
 def _scenes(engine: Engine) -> Iterator[Scenario]:

@@ -79,7 +79,7 @@ def test_one_wrong_start_in_a_batch_is_named():
     starts[5, 3:7] *= -1.0  # the same orientation
     verify_starts(made.Exact(), scenes, starts)
     starts[37, 0] = 38.0
-    with pytest.raises(BuildMismatch, match=r"position at the start is \[38\. .* the scene has \[37\. "):
+    with pytest.raises(BuildMismatch, match=r"position at the start of simulation 38 of 40 is \[38\. .* the scene has \[37\. "):
         verify_starts(made.Exact(), scenes, starts)
 
 

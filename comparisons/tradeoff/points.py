@@ -112,13 +112,15 @@ class TradeOff:
         Args:
             within: The tolerance, in the metric's unit.
 
-        For each engine, the coarsest time step is used for which it and all finer ones are within the tolerance; at a coarser one the error
-        may be small by chance, where it crosses 0.
+        A time step counts only if all finer ones of the engine are within the tolerance too; at a coarser one the error may be small by
+        chance, where it crosses 0.
         """
-        coarsest = self._coarsest(within)
-        if not coarsest:
+        cheapest: dict[str, CostPoint] = {}
+        for point in sorted(self._within(within), key=lambda one: one.typical_cost, reverse=True):
+            cheapest[point.engine] = point
+        if not cheapest:
             return None
-        best, *others = sorted(coarsest, key=lambda one: one.typical_cost)
+        best, *others = sorted(cheapest.values(), key=lambda one: one.typical_cost)
         if not others:
             return Recommendation(within, best, None, math.nan, False)
         ratios = others[0].cost / best.cost
@@ -133,19 +135,18 @@ class TradeOff:
             within: The tolerance, in the metric's unit.
             worlds: Number of worlds in a batch.
         """
-        batched = [point for point in self._coarsest(within) if worlds in point.costs_per_world]
+        batched = [point for point in self._within(within) if worlds in point.costs_per_world]
         return min(batched, key=lambda point: point.costs_per_world[worlds], default=None)
 
-    def _coarsest(self, within: float) -> list[CostPoint]:
-        """For each engine, the coarsest time step for which it and all finer ones are within a tolerance."""
-        coarsest: dict[str, CostPoint] = {}
-        exceeded: set[str] = set()
+    def _within(self, within: float) -> list[CostPoint]:
+        """The configurations within a tolerance, with those of the same engine at all finer time steps."""
+        found, exceeded = [], set()
         for point in sorted(self.points, key=lambda one: one.dt):
             if point.error > within:
                 exceeded.add(point.engine)
             if point.engine not in exceeded:
-                coarsest[point.engine] = point
-        return list(coarsest.values())
+                found.append(point)
+        return found
 
 
 def _pareto_front(points: Sequence[CostPoint], cost: Callable[[CostPoint], float]) -> list[CostPoint]:

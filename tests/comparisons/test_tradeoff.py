@@ -64,7 +64,7 @@ def test_recommendation_is_the_cheapest_within_the_tolerance():
 
 
 def test_best_in_batch_is_among_engines_with_batches():
-    """By cost per world, at the coarsest time step within the tolerance."""
+    """By cost per world, at a time step within the tolerance."""
     lanes, threads = [("lanes", 0.2, 1e-2, {256: 1e-8}), ("lanes", 0.1, 1e-4, {256: 2e-8})], ("threads", 0.1, 1e-4, {16: 1e-9, 256: 3e-8})
     ways = [*lanes, threads, ("alone", 0.1, 1e-5, {})]
     found = found_with(CostPoint(engine, dt, error, np.array([1.0]), costs) for engine, dt, error, costs in ways)
@@ -85,6 +85,14 @@ def test_coarse_step_is_not_recommended_if_a_finer_one_exceeds_the_tolerance():
     """Its error is small by chance, where it crosses 0."""
     found = made(("a", 0.4, 1e-5, [1, 1, 1]), ("a", 0.2, 1e-2, [2, 2, 2]), ("a", 0.1, 1e-4, [4, 4, 4]))
     assert found.recommendation(1e-3).best.dt == 0.1
+
+
+def test_recommendation_is_on_the_pareto_front_if_a_finer_step_took_less_time():
+    """Timings of short steps scatter."""
+    found = made(("a", 0.4, 1e-4, [3, 3, 3]), ("a", 0.2, 1e-5, [2, 2, 2]), ("a", 0.1, 1e-6, [4, 4, 4]))
+    best = found.recommendation(1e-3).best
+    assert best.dt == 0.2
+    assert best in found.pareto_front
 
 
 def test_leading_metric_depends_on_the_scene():

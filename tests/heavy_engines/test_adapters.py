@@ -1,6 +1,7 @@
 """Adapters of engines with an environment of their own: conformance, flight, one bounce, batches, precision."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -74,4 +75,4 @@ def test_state_has_the_precision_that_is_claimed(case):
 
 def test_findings_of_the_page_on_engines_are_measured(finding, tmp_path):
     """In a process of its own, because one in which JAX has started threads must not fork."""
-    verify_findings(finding, tmp_path, cli.spawn)
+    verify_findings(finding, tmp_path, partial(cli.spawn, timeout=1800.0))

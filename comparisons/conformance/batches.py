@@ -1,6 +1,6 @@
 """The check of batches: they have the motions of single simulations, for two sizes and time steps, in long calls and in short ones."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
 from comparisons.conformance.probes import DT
-from comparisons.conformance.protocol import ROUNDING
+from comparisons.conformance.protocol import ROUNDING, relative_difference
 from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, RICHEST, accepted_scene
 from comparisons.engines.base import BatchSimulation, Engine, numpy_array
 from comparisons.running.inputs import EngineEntry
@@ -17,10 +17,9 @@ from comparisons.running.recording import record
 from comparisons.running.start_phases import START_PHASES
 from comparisons.running.verification import BuildMismatch, verified_batch, verify_starts
 from comparisons.symmetries.findings import ULPS, Finding, judged
-from comparisons.symmetries.study import effects_of_rounding
+from comparisons.symmetries.study import batch_member, effects_of_rounding
 from scenarios import Scenario
-from scenarios.state import POSITION, RATES
-from scenarios.transformations import AWAY, whole_steps, with_other_numbers
+from scenarios.transformations import whole_steps
 
 Array = NDArray[np.float64]
 
@@ -54,14 +53,14 @@ def check_batches(engine: Engine, check: str) -> CheckResult:
     return CheckResult(check, "passed", f"batches of {sizes} give {same}, in {', '.join(compared)}")
 
 
-def _scenes(engine: Engine) -> Iterator[Scenario]:
+def _scenes(engine: Engine) -> list[Scenario]:
     """A flight, an impact and a contact with friction, as far as the engine accepts them."""
     found = {}
     for names in (FLIGHTS, RICHEST, WITH_FRICTION):
         with suppress(Declined):
             scene = accepted_scene(engine, *names)
             found[scene.name] = scene
-    yield from found.values()
+    return list(found.values())
 
 
 def _is_verified(engine: Engine, scene: Scenario, size: Size) -> bool:
@@ -70,7 +69,9 @@ def _is_verified(engine: Engine, scene: Scenario, size: Size) -> bool:
     Raises:
         CheckFailed: It differs.
     """
-    members = _members(engine, whole_steps(scene, size.dt, A_FEW_STEPS), size.simulations)
+    first_member = whole_steps(scene, size.dt, A_FEW_STEPS)
+    shares = [1.0 + SPREAD * number for number in range(1, size.simulations)]
+    members = [first_member, *(batch_member(engine, first_member, share) for share in shares)]
     try:
         first, second = engine.prepare_batch(members, size.dt), engine.prepare_batch(members, size.dt)
         if first is None or second is None:
@@ -81,17 +82,6 @@ def _is_verified(engine: Engine, scene: Scenario, size: Size) -> bool:
         others = "; their numbers differ, because mixes_scenes is True" if engine.mixes_scenes else ""
         raise CheckFailed(f"{wrong} (in a batch of {size.simulations} simulations of the scene {scene.name}{others})") from None
     return True
-
-
-def _members(engine: Engine, scene: Scenario, count: int) -> list[Scenario]:
-    """The scene and others, which start elsewhere and with other speeds, and differ in all numbers if the engine mixes scenes."""
-    found = [scene]
-    for share in 1.0 + SPREAD * np.arange(1, count):
-        start = scene.initial_state
-        start[POSITION] += (share - 1.0) * scene.body.size * AWAY
-        start[RATES] *= share
-        found.append((with_other_numbers(scene, float(share)) if engine.mixes_scenes else scene).starting_at(start))
-    return found
 
 
 def _verify_batches(engine: Engine, members: Sequence[Scenario], size: Size, first: BatchSimulation, second: BatchSimulation) -> None:
@@ -121,7 +111,7 @@ def _verify_batches(engine: Engine, members: Sequence[Scenario], size: Size, fir
 
 def _verify_calls(engine: Engine, found: Array, expected: Array, message: str) -> None:
     """States that a batch computes by different calls are the same; rounding may differ with the number of steps in a call."""
-    difference = float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
+    difference = relative_difference(found, expected)
     if not difference <= max(ROUNDING, ULPS * float(np.finfo(engine.precision).eps)):
         raise CheckFailed(f"{message}, by {difference:.2g} of the largest number")
 

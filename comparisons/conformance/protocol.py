@@ -125,23 +125,23 @@ def check_record(engine: Engine, check: str) -> CheckResult:
         )
     _verify_equal(rows[0], stepped[0], "record's first row differs from the state before any step, which it must be")
     _verify_equal(rows, stepped, f"record({A_FEW_STEPS}) differs from {A_FEW_STEPS} times advance(1) and state()")
-    if _difference(sparse, rows[::SEVERAL]) > ROUNDING and _difference(sparse, rows[: len(sparse)]) <= ROUNDING:
+    if relative_difference(sparse, rows[::SEVERAL]) > ROUNDING and relative_difference(sparse, rows[: len(sparse)]) <= ROUNDING:
         raise CheckFailed(f"record ignores `every`: with every={SEVERAL} it returns consecutive steps")
     _verify_equal(sparse, rows[::SEVERAL], f"record with every={SEVERAL} differs from each third row with every=1")
     _verify_equal(rows[-1], end, "after record, state() differs from the last row")
     _verify_equal(again[0], stepped[-1], "a second record does not begin at the current state")
     if not np.array_equal(rows, stepped):
-        return CheckResult(check, "noted", f"record and advance differ by rounding, {_difference(rows, stepped):.1g}")
+        return CheckResult(check, "noted", f"record and advance differ by rounding, {relative_difference(rows, stepped):.1g}")
     return CheckResult(check, "passed", "record and advance take the same steps, bit for bit")
 
 
 def _verify_equal(found: Array, expected: Array, message: str) -> None:
-    difference = _difference(found, expected)
+    difference = relative_difference(found, expected)
     if not difference <= ROUNDING:
         raise CheckFailed(f"{message} (relative difference {difference:.2g})")
 
 
-def _difference(found: Array, expected: Array) -> float:
+def relative_difference(found: Array, expected: Array) -> float:
     """The largest difference relative to the largest number; infinite if one is not finite."""
     difference = float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
     return difference if np.isfinite(difference) else float("inf")

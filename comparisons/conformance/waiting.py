@@ -3,10 +3,9 @@
 import time
 from itertools import pairwise
 
-import numpy as np
-
 from comparisons.conformance.outcomes import CheckFailed, CheckResult
 from comparisons.conformance.probes import DT
+from comparisons.conformance.protocol import relative_difference
 from comparisons.conformance.short_runs import accepted_scene
 from comparisons.engines.base import Engine, Simulation
 from scenarios import Scenario
@@ -52,7 +51,7 @@ def _verify_steps(engine: Engine, scene: Scenario, steps: int) -> None:
                 simulation.advance(each)
             ends.append(simulation.state().copy())
     long, short = ends
-    difference = float(np.max(np.abs(long - short)) / np.max(np.abs(short)))
+    difference = relative_difference(long, short)
     if not difference <= FAR:
         raise CheckFailed(
             f"the state after advance({steps}) is not that after {steps // PIECE} calls of advance({PIECE}), by {difference:.2g} of the "

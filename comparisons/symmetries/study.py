@@ -160,18 +160,21 @@ def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str
 
 def _batched(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> Pairs:
     """Of a scene and two others: the motions of single runs, and those of a batch."""
-    others = []
-    for share in FASTER:
-        start = scene.initial_state
-        start[POSITION] += (share - 1.0) * scene.body.size * AWAY
-        start[RATES] *= share
-        others.append((with_other_numbers(scene, share) if entry.adapter.mixes_scenes else scene).starting_at(start))
+    others = [batch_member(entry.adapter, scene, share) for share in FASTER]
     together = [recording.motion for recording in record_batch(entry.adapter, [scene, *others], dt)]
     for motion in together:
         if (broken := divergence(motion)) is not None:
             raise _NotComparable(broken)
     alone = [own, *(_motion(entry, other, dt) for other in others)]
     return list(zip(alone, (motion.states for motion in together), strict=True))
+
+
+def batch_member(engine: Engine, scene: Scenario, share: float) -> Scenario:
+    """The scene from elsewhere and with speeds a factor larger; all its numbers differ by as much if the engine mixes scenes."""
+    start = scene.initial_state
+    start[POSITION] += (share - 1.0) * scene.body.size * AWAY
+    start[RATES] *= share
+    return (with_other_numbers(scene, share) if engine.mixes_scenes else scene).starting_at(start)
 
 
 def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple[Pairs, Effects]:

@@ -376,6 +376,16 @@ BATCHES = {
 }
 
 
+def batched_by(together):
+    """The page's adapter, with batches of single simulations that a class makes."""
+
+    class Batched(type(documented())):
+        def prepare_batch(self, members, dt):
+            return together([self.prepare(member, dt) for member in members])
+
+    return Batched()
+
+
 @pytest.mark.parametrize("fault", BATCHES)
 def test_faults_of_batches_are_found(fault):
     """A fault in what a batch records, in the number of steps that it takes, or in its attribute; each is right for single simulations."""
@@ -393,11 +403,7 @@ def test_faults_of_batches_are_found(fault):
         def advance(self, steps):
             super().advance(faults.get("steps", int)(steps))
 
-    class Batched(type(documented())):
-        def prepare_batch(self, members, dt):
-            return Faulty([self.prepare(member, dt) for member in members])
-
-    [(outcome, message)] = not_passed(Batched(), "batches").values()
+    [(outcome, message)] = not_passed(batched_by(Faulty), "batches").values()
     assert outcome == "failed"
     assert expected in message
 
@@ -412,11 +418,7 @@ def test_record_of_a_batch_in_memory_that_is_used_again_fails():
             kept[:] = found
             return kept
 
-    class Batched(type(documented())):
-        def prepare_batch(self, members, dt):
-            return Reusing([self.prepare(member, dt) for member in members])
-
-    [(_, message)] = not_passed(Batched(), "batches").values()
+    [(_, message)] = not_passed(batched_by(Reusing), "batches").values()
     assert message.startswith("record returns memory that later steps overwrite; return a copy")
 
 

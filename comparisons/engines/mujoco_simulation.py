@@ -13,6 +13,7 @@ from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, 
 from comparisons.engines.mujoco_limitations import limitations_met
 from reference_impl.threads import usable_cores
 from scenarios import Scenario
+from scenarios.model import initial_states
 from scenarios.rotations import conjugate, rotate
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from scenarios.transformations import heavy_neighbour
@@ -106,8 +107,7 @@ class MuJoCoBatch(BatchSimulation):
         self._datas = [data, *(mujoco.MjData(model) for _ in range(usable_cores() - 1))]
         self._now = np.empty((len(members), mujoco.mj_stateSize(model, FULL_STATE)))
         self._now[:] = _full_state(model, data)
-        starts = np.array([np.concatenate(_starts(model, member)) for member in members])
-        self._now[:, 1 : 1 + starts.shape[1]] = starts
+        self._now[:, 1 : 1 + model.nq + model.nv] = _starts(model, members)
 
     def advance(self, steps: int) -> None:
         self._roll_out(steps, lambda worlds, states: None)
@@ -149,14 +149,15 @@ class MuJoCoBatch(BatchSimulation):
 
 def _place(data: Any, scene: Scenario) -> None:
     """Write a scene's start into the positions and velocities of a simulation."""
-    data.qpos[:], data.qvel[:] = _starts(data.model, scene)
+    start = _starts(data.model, [scene])[0]
+    data.qpos[:], data.qvel[:] = np.split(start, [data.model.nq])
 
 
-def _starts(model: Any, scene: Scenario) -> tuple[Array, Array]:
-    """The positions and velocities of the free body at the start, followed by those of the body far away if there is any."""
-    bodies = [scene, heavy_neighbour(scene)] if model.nq > 7 else [scene]
-    starts = from_world(np.array([one.initial_state for one in bodies]))
-    return starts[:, :7].ravel(), starts[:, 7:].ravel()
+def _starts(model: Any, scenes: Sequence[Scenario]) -> Array:
+    """The positions of the free body and of the body far away if there is one, followed by their velocities, of each scene at the start."""
+    bodies = [scenes, [heavy_neighbour(scene) for scene in scenes]] if model.nq > 7 else [scenes]
+    starts = [from_world(initial_states(one)) for one in bodies]
+    return np.concatenate([start[:, :7] for start in starts] + [start[:, 7:] for start in starts], axis=1)
 
 
 def _columns(model: Any) -> Any:

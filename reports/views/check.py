@@ -16,6 +16,7 @@ from comparisons.results.provenance import versions_behind
 from comparisons.results.results import Results
 from reports.views.failures import Failure
 from reports.views.findings import counts, verdict_sentence
+from reports.views.numbers import counted, failing
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 MOST_ANNOTATIONS = 10
@@ -55,13 +56,17 @@ def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
 def _notes(checked: Checked, known: int) -> list[str]:
     """Sentences on improvements, new results, accepted results that the run does not cover, and known failures."""
     better, new = (int((checked.changes["change"] == change).sum()) for change in ("better", "new"))
-    notes = [f"{_results(better)} better than accepted."] * bool(better) + [f"{_results(new)} new and not yet accepted."] * bool(new)
+    notes = [
+        f"{counted(count, 'result is', 'results are')} {what}."
+        for count, what in ((better, "better than accepted"), (new, "new and not yet accepted"))
+        if count
+    ]
     if len(checked.not_run):
         pairs = len(checked.not_run.drop_duplicates(["scene", "engine"]))
-        counted = f"{pairs} scene–engine {'pair' if pairs == 1 else 'pairs'}"
-        notes.append(f"{len(checked.not_run):,} accepted results are not covered by this run ({counted}).")
+        are = counted(len(checked.not_run), "accepted result is", "accepted results are")
+        notes.append(f"{are} not covered by this run ({counted(pairs, 'scene–engine pair')}).")
     if known:
-        notes.append(f"{known:,} known {'failure' if known == 1 else 'failures'}, not counted as failed.")
+        notes.append(f"{counted(known, 'known failure')}, not counted as failed.")
     return notes
 
 
@@ -70,28 +75,27 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, own: str) -> str:
     failed = len(regressed(checked.changes))
     judged = int(checked.changes["change"].isin(["same", "better"]).sum()) + failed
     changed = failed_rows.loc[failed_rows["reason"].str.startswith(SCENE_CHANGED), "scene"].nunique()
-    scenes = f"{changed} {'scene has' if changed == 1 else 'scenes have'} changed since results were accepted. " if changed else ""
+    scenes = f"{counted(changed, 'scene has', 'scenes have')} changed since results were accepted. " if changed else ""
     if failed or changed:
-        return f"{scenes}{failed:,} of {judged:,} accepted results fail. {own}".rstrip()
-    return f"{own} All {judged:,} accepted results hold.".lstrip() if judged else own
+        return f"{scenes}{failing(failed, judged, 'accepted result')}. {own}".rstrip()
+    return f"{own} All {counted(judged, 'accepted result holds', 'accepted results hold')}.".lstrip() if judged else own
 
 
 def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bool) -> list[str]:
     """Sentences on how many results of a run were accepted, and which cannot be accepted."""
     changed = found["change"].value_counts()
     changes = ", ".join(f"{changed[one]:,} {one}" for one in ("new", "worse", "moved", "better", "gone", "same") if one in changed)
-    scenes = f"{len(results.scenes)} {'scene' if len(results.scenes) == 1 else 'scenes'}"
-    listed = [f"Accepted for {scenes} with {', '.join(results.engines)}: {changes or 'no results'}."]
+    listed = [f"Accepted for {counted(len(results.scenes), 'scene')} with {', '.join(results.engines)}: {changes or 'no results'}."]
     tally = counts(results)
     if tally.failed and not known_failures:
-        listed.append(
-            f"{tally.failed:,} checks of this run fail, so dropspin check will fail too; --known-failures accepts them as known failures."
-        )
+        fail = counted(tally.failed, "check of this run fails", "checks of this run fail")
+        listed.append(f"{fail}, so dropspin check will fail too; --known-failures accepts them as known failures.")
     unknown = tally.failed - int(comparable_results(results)["verdict"].isin(FAILURES).sum())
     if unknown and known_failures:
-        listed.append(f"{unknown:,} failing {'check has' if unknown == 1 else 'checks have'} no comparable result and cannot be accepted.")
+        have = counted(unknown, "failing check has", "failing checks have")
+        listed.append(f"{have} no comparable result and cannot be accepted.")
     if tally.broken:
-        listed.append(f"{tally.broken:,} engine runs broke down; results accepted earlier for them stay in the baseline.")
+        listed.append(f"{counted(tally.broken, 'engine run')} broke down; results accepted earlier for them stay in the baseline.")
     return listed
 
 
@@ -121,10 +125,6 @@ def _changed_versions(checked: Checked, baseline: Baseline) -> list[str]:
     ]
     listed = ", ".join(dict.fromkeys(differ))
     return [f"Changed since they were accepted: {listed}."] if differ else []
-
-
-def _results(count: int) -> str:
-    return f"{count:,} {'result is' if count == 1 else 'results are'}"
 
 
 def _escaped(text: str, more: str = "") -> str:

@@ -11,7 +11,7 @@ from comparisons.regressions.motions import EqualMotions
 from comparisons.regressions.speed import SpeedChange
 from comparisons.results.results import Results
 from reports.views.failures import reproduce_scenes
-from reports.views.numbers import formatted, subject
+from reports.views.numbers import counted, formatted, subject
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
 """The heading of each kind of change, the worst kind first."""
@@ -42,7 +42,7 @@ def tables(changes: Changes) -> list[tuple[str, list[dict[str, str]]]]:
         if len(results):
             lines = _lines(results)
             more = f", the first {MOST_LINES} of {len(lines)} scenes and engines" if len(lines) > MOST_LINES else ""
-            found.append((f"{word}: {_count(len(results))}{more}", lines[:MOST_LINES]))
+            found.append((f"{word}: {counted(len(results), 'result')}{more}", lines[:MOST_LINES]))
     return found
 
 
@@ -61,7 +61,7 @@ def sentences(changes: Changes) -> list[str]:
     if changes.motions:
         found.append(f"Motions equal bit for bit: {'; '.join(map(_motions, changes.motions))}.")
     regressed = changes.regressions
-    total = _count(len(changes.results))
+    total = counted(len(changes.results), "result")
     verdict = f"{len(regressed):,} of {total} are worse, moved or gone" if len(regressed) else f"None of {total} is worse"
     return [*found, f"{verdict}."]
 
@@ -125,10 +125,6 @@ def _speed(change: SpeedChange) -> str:
 def _motions(one: EqualMotions) -> str:
     first = f", the first difference in {one.scene} at {1e3 * one.dt:g} ms in step {one.step:,}" if one.equal < one.compared else ""
     return f"{one.engine} {one.equal:,} of {one.compared:,}{first}"
-
-
-def _count(count: int) -> str:
-    return f"{count:,} result{'' if count == 1 else 's'}"
 
 
 def _plain(value: Any) -> Any:

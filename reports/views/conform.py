@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from comparisons.conformance.outcomes import CheckResult
+from reports.views.numbers import counted, failing
 
 WRONG = frozenset({"failed", "crashed", "timed_out"})
 
@@ -23,8 +24,5 @@ def sentences(found: Sequence[CheckResult]) -> list[str]:
         declined = sum(one.outcome == "declined" for one in found)
         tested = f"; {declined} tested nothing, for the reasons given" if declined else ""
         return [f"{'The check does not fail' if len(found) == 1 else f'None of {len(found)} checks fails'}{tested}."]
-    different = f", with {len(errors)} different {'message' if len(errors) == 1 else 'messages'}" if shared else ""
-    return [
-        *shared,
-        f"{len(wrong)} of {len(found)} {'check' if len(found) == 1 else 'checks'} {'fails' if len(wrong) == 1 else 'fail'}{different}.",
-    ]
+    different = f", with {counted(len(errors), 'different message')}" if shared else ""
+    return [*shared, f"{failing(len(wrong), len(found), 'check')}{different}."]

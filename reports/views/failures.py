@@ -12,7 +12,7 @@ from comparisons.measuring.symmetries import kind_of
 from comparisons.regressions.parameters import WrongParameter, wrong_parameters
 from comparisons.results.results import Results
 from comparisons.running.processes import ResourceLimits
-from reports.views.numbers import bound, formatted, step, subject, word
+from reports.views.numbers import bound, counted, formatted, step, subject, word
 
 Row = Mapping[Hashable, Any]
 MOST_NAMES = 4
@@ -147,7 +147,7 @@ def _of_one_cause(some: Sequence[Failure]) -> str:
     rows = sum(1 + one.others for one in some[1:])
     results = [name for name in dict.fromkeys(one.result for one in some[1:]) if name not in ("", first.result)]
     others_too = f" ({_listed(results)})" if results else ""
-    fail = "1 other result of this scene fails" if rows == 1 else f"{rows} other results of this scene fail"
+    fail = counted(rows, "other result of this scene fails", "other results of this scene fail")
     return first.sentence.rstrip(".") + (f"; {fail}{others_too}" if rows else "") + "."
 
 

@@ -14,7 +14,7 @@ from comparisons.judging.error_budget import is_sufficient
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, SEVERITY
 from comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
 from reports.views.leading_errors import step_times
-from reports.views.numbers import duration, formatted, in_ms, quantity
+from reports.views.numbers import counted, duration, failing, formatted, in_ms, quantity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,31 +162,33 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
     """The outcome of the checks in one sentence."""
     judged = tally.passed + tally.failed
     if tally.broken:
-        judgement = f"; {tally.failed} of {judged} checks fail" if judged else ""
-        return f"{tally.broken} engine {'run' if tally.broken == 1 else 'runs'} broke down{judgement}{_known(tally)}."
+        judgement = f"; {failing(tally.failed, judged, 'check')}" if judged else ""
+        return f"{counted(tally.broken, 'engine run')} broke down{judgement}{_known(tally)}."
     if tally.failed:
-        return f"{tally.failed} of {judged} checks fail{_known(tally)}."
+        return f"{failing(tally.failed, judged, 'check')}{_known(tally)}."
     if judged == 0 and tally.known:
         return f"No check passes or fails{_known(tally)}."
     if judged == 0:
         set_at_all = any(scene.expect for scene in results.scenes.values())
         none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
         return f"{none}; {len(results.measurements):,} values were measured."
-    expected = f"No unexpected results: {judged} checks pass" if tally.known or tally.limited else f"All {judged} checks pass"
-    return f"{expected}{_known(tally)}."
+    passing = counted(judged, "check passes", "checks pass")
+    if tally.known or tally.limited:
+        return f"No unexpected results: {passing}{_known(tally)}."
+    return f"{'The check passes' if judged == 1 else f'All {passing}'}{_known(tally)}."
 
 
 def _known(tally: Counts) -> str:
     """The end of a sentence: how many values show known errors or are within limitations, how many expected faults do not occur."""
     parts = []
     if tally.known:
-        shows = "value shows a known error" if tally.known == 1 else "values show known errors"
-        parts.append(f"{tally.known} {shows} of {_named(tally.known_engines, 'engine')} in {_scenes(tally.known_scenes)}")
+        shows = counted(tally.known, "value shows a known error", "values show known errors")
+        parts.append(f"{shows} of {_named(tally.known_engines, 'engine')} in {counted(tally.known_scenes, 'scene')}")
     if tally.limited:
-        shows = "value shows a known limitation" if tally.limited == 1 else "values show known limitations"
-        parts.append(f"{tally.limited} {shows} of {_named(tally.limited_engines, 'engine')}")
+        shows = counted(tally.limited, "value shows a known limitation", "values show known limitations")
+        parts.append(f"{shows} of {_named(tally.limited_engines, 'engine')}")
     if tally.fixed:
-        parts.append(f"{tally.fixed} expected {'fault does' if tally.fixed == 1 else 'faults do'} not occur")
+        parts.append(f"{counted(tally.fixed, 'expected fault does', 'expected faults do')} not occur")
     return "".join(f"; {part}" for part in parts)
 
 
@@ -237,8 +239,8 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     if not (mine["kind"] == "asymptotic_error").any():
         enough = is_sufficient(results.provenance["asked"]["dts"])
         none = "no asymptotic errors" + ("" if enough else ", which need three time steps that span a factor of four")
-        return f"{', '.join(others)} of {_scenes(len(statuses))}; {none}"
-    converges = ", ".join([f"converges in {kinds['converges']} of {_scenes(len(statuses))}", *others])
+        return f"{', '.join(others)} of {counted(len(statuses), 'scene')}; {none}"
+    converges = ", ".join([f"converges in {kinds['converges']} of {counted(len(statuses), 'scene')}", *others])
     found = mine[mine["kind"].isin(["truth", "invariant"]) & (mine["value"].abs() > NEGLIGIBLE)]
     found = found[~found["metric"].isin([*JUMPING, *ARTEFACTS])]
     finest = found[found["dt"] == found.groupby("scene")["dt"].transform("min")]
@@ -278,7 +280,3 @@ def _cost(engine: str, times: Mapping[str, float], compilation: float | None) ->
     relative = "" if engine == fastest or ratio == 1.0 else f", {ratio:g} times that of {fastest}"
     compiling = "" if compilation is None else f", after compiling a scene for up to {duration(float(f'{compilation:.2g}'))}"
     return [f"{absolute}{relative}{compiling}"]
-
-
-def _scenes(count: int) -> str:
-    return f"{count} {'scene' if count == 1 else 'scenes'}"

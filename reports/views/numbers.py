@@ -45,6 +45,16 @@ def duration(seconds: float) -> str:
     return f"{seconds * scale:.3g} {unit}"
 
 
+def counted(count: int, singular: str, plural: str = "") -> str:
+    """A number of things, such as 1 scene or 2 scenes."""
+    return f"{count:,} {singular if count == 1 else plural or f'{singular}s'}"
+
+
+def failing(count: int, total: int, what: str) -> str:
+    """How many of some things fail, such as 1 of 2 checks fails."""
+    return f"{count:,} of {counted(total, what)} {'fails' if count == 1 else 'fail'}"
+
+
 def step(dt: float) -> str:
     """A time step in seconds; → 0 for an extrapolation of several."""
     return "→ 0" if math.isnan(dt) else f"{dt:g}"

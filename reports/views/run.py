@@ -18,6 +18,7 @@ from reports.views.findings import (
     profile_comparisons,
     verdict_sentence,
 )
+from reports.views.numbers import counted
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ def _quick(results: Results) -> list[str]:
     if not results.is_quick:
         return []
     undecided = int(results.table["reason"].str.startswith(UNDECIDED_BY_STARTS).sum())
-    decided = f"{undecided} {'check is' if undecided == 1 else 'checks are'} not decided by so few starts. " if undecided else ""
+    decided = f"{counted(undecided, 'check is', 'checks are')} not decided by so few starts. " if undecided else ""
     return [
         f"Quick run: {QUICK_START_PHASES} start phases instead of {START_PHASES}, at most {QUICK_MEMBERS} members of an ensemble, and no "
         f"perturbed starts in double precision. {decided}Run again without --quick to compare or accept the results."
@@ -74,8 +75,7 @@ def forecast_sentence(found: Forecast) -> str:
     longest = max(found.by_engine, key=found.by_engine.__getitem__)
     of_engine = f", of which {longest} {_minutes(found.by_engine[longest])}" if len(found.by_engine) > 1 else ""
     of_quick = f"; --quick takes {_minutes(found.quick)}" if found.quick < MUCH_SHORTER * found.seconds else ""
-    processors = f"{found.jobs} {'processor' if found.jobs == 1 else 'processors'}"
-    return f"{_minutes(found.seconds)} on {processors}{of_engine}{of_quick}"
+    return f"{_minutes(found.seconds)} on {counted(found.jobs, 'processor')}{of_engine}{of_quick}"
 
 
 def _minutes(seconds: float) -> str:

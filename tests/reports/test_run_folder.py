@@ -153,7 +153,7 @@ def test_failures_come_before_the_comparison():
     }
     found = run(load(harsh), "mujoco", 1e-2)
     text = html_report(found, overview(found))
-    assert "1 of 1 checks fail." in text
+    assert "1 of 1 check fails." in text
     assert text.index("Failures") < text.index("<h3>Errors</h3>")
     assert "too much to ask" in text
     assert "± 1e-09" in text

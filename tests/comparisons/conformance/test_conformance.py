@@ -427,19 +427,20 @@ def test_engine_without_batches_declines_their_check():
     assert (found.outcome, found.message) == ("declined", "prepare_batch returns None: the engine simulates one scene at a time")
 
 
-def test_batch_with_the_friction_of_its_first_scene_fails():
-    class FirstFriction(Document):
+@pytest.mark.parametrize(("attribute", "member", "scene"), [("friction", 2, "slippery-floor"), ("rest_speed", 3, "corner")])
+def test_batch_with_a_number_of_its_first_scene_fails(attribute, member, scene):
+    class First(Document):
         def prepare_batch(self, members, dt):
-            friction = members[0].floor and {"friction": members[0].floor.friction}
-            floors = [one.floor and one.floor.model_copy(update=friction) for one in members]
+            number = members[0].floor and {attribute: getattr(members[0].floor, attribute)}
+            floors = [one.floor and one.floor.model_copy(update=number) for one in members]
             same = [one.model_copy(update={"floor": floor}) for one, floor in zip(members, floors, strict=True)]
             return super().prepare_batch(same, dt)
 
-    sound, faulty = (kind({"law": "coulomb"}) for kind in (Document, FirstFriction))
+    sound, faulty = (kind({"law": "coulomb"}) for kind in (Document, First))
     assert not_passed(sound, "batches") == {}
     [(_, message)] = not_passed(faulty, "batches").values()
-    assert message.startswith("simulation 2 differs from the same one by itself from step ")
-    assert message.endswith("(in a batch of 3 simulations of the scene slippery-floor; their numbers differ, because mixes_scenes is True)")
+    assert message.startswith(f"simulation {member} differs from the same one by itself from step ")
+    assert message.endswith(f"(in a batch of 3 simulations of the scene {scene}; their numbers differ, because mixes_scenes is True)")
 
 
 def test_long_call_that_takes_fewer_steps_is_found():

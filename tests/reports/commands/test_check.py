@@ -135,7 +135,7 @@ def expecting(metric):
         (
             "energy_error_raw",
             ["1 failing check has no comparable result and cannot be accepted."],
-            ["1 of 1 checks fail. All 15 accepted results hold."],
+            ["1 of 1 check fails. All 15 accepted results hold."],
         ),
     ],
 )

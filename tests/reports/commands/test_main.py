@@ -48,7 +48,7 @@ reason = "no engine is that stiff"
         (
             ["run", "harsh.toml", "-e", "mujoco", "--dt", "0.01"],
             1,
-            "1 of 1 checks fail.",
+            "1 of 1 check fails.",
             "timing the steps of each engine\n",
         ),
         (["show", "drop-bal"], 2, "", "dropspin: scene 'drop-bal' is not in the catalogue and no file of that name exists. Did you mean"),

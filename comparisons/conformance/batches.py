@@ -17,7 +17,7 @@ from comparisons.running.inputs import EngineEntry
 from comparisons.running.recording import record
 from comparisons.running.start_phases import START_PHASES
 from comparisons.running.verification import BuildMismatch, verified_batch, verify_starts
-from comparisons.symmetries.findings import ULPS, Finding, judged
+from comparisons.symmetries.findings import STEP_MULTIPLE, Finding, judged
 from comparisons.symmetries.study import batch_member, effects_of_rounding
 from scenarios import Scenario
 from scenarios.transformations import whole_steps
@@ -118,7 +118,7 @@ def _verify_batches(engine: Engine, members: Sequence[Scenario], size: Size, fir
 def _verify_calls(engine: Engine, found: Array, expected: Array, message: str) -> None:
     """States that a batch computes by different calls are the same; rounding may differ with the number of steps in a call."""
     difference = relative_difference(found, expected)
-    if not difference <= max(ROUNDING, ULPS * float(np.finfo(engine.precision).eps)):
+    if not difference <= max(ROUNDING, STEP_MULTIPLE * float(np.finfo(engine.precision).eps)):
         raise CheckFailed(f"{message}, by {difference:.2g} of the largest number")
 
 

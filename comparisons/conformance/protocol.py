@@ -15,7 +15,7 @@ from comparisons.conformance.outcomes import CheckFailed, CheckResult
 from comparisons.conformance.probes import DT, PROBES
 from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
 from comparisons.engines.base import Diverged, Engine
-from comparisons.running.verification import ULPS, BuildMismatch, verified_record, verify_build, verify_start
+from comparisons.running.verification import MULTIPLE, BuildMismatch, verified_record, verify_build, verify_start
 from scenarios import Scenario, load, names
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ def check_builds(engine: Engine, check: str) -> CheckResult:
             ) from error
     if not read_back:
         return CheckResult(check, "passed", "the start equals the scene's; as_built() returns no mass, inertia and gravity to compare")
-    return CheckResult(check, "passed", f"start, mass, inertia and gravity equal the scene's to {ULPS} ulp")
+    return CheckResult(check, "passed", f"start, mass, inertia and gravity equal the scene's to {MULTIPLE} eps")
 
 
 def _verify_built(engine: Engine, scene: Scenario) -> bool:
@@ -93,7 +93,7 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
 
 def _start_explained(engine: Engine, scene: Scenario, state: Array) -> str:
     """The fault that gives this start, as a message; empty if none is known."""
-    single = float(ULPS * np.finfo(np.float32).eps)
+    single = float(MULTIPLE * np.finfo(np.float32).eps)
     near = np.abs(state - scene.initial_state).max() <= single * np.abs(scene.initial_state).max()
     if engine.precision is np.float64 and near and np.array_equal(state, np.float32(state)):
         return "the state has single precision only; declare precision = numpy.float32, or pass the start on in double precision"

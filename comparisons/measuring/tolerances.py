@@ -2,7 +2,7 @@
 
     metrics              rounding over the time steps, and sampling noise: the impact of one start phase may move to the neighbouring step.
                          If there is only one start, or if the body starts on the floor, sampling noise is replaced by the effect of
-                         perturbing the initial states by some ulp
+                         perturbing the initial states by some eps
     orders               the change of the order if the errors to which it is fitted change by their tolerances
     asymptotic errors    the width of their interval; unresolved ones are not compared
     ensemble means       the confidence interval of the difference between the means of two random ensembles
@@ -24,9 +24,9 @@ NEGLIGIBLE = 3e-8
 """Errors below this, relative to the metric's scale, are attributed to rounding and to the residuals of iterative solvers."""
 MATTERS = 1e-5
 """Errors below this, relative to the metric's scale, do not matter to any use of an engine: contact solvers stop at such residuals."""
-ULPS_PER_STEP = 16.0
+EPS_PER_STEP = 16.0
 PERTURBATION = 16.0
-"""Perturbation of each number of an initial state, in ulp of the engine's precision, by which the effect of rounding is measured."""
+"""Perturbation of each number of an initial state, in eps of the engine's precision, by which the effect of rounding is measured."""
 _FIRST, _SECOND = np.random.default_rng(0).choice([-1.0, 1.0], (2, 13))
 SIGNS = (_FIRST, -_FIRST, _SECOND, -_SECOND)
 """The signs of the perturbations: two random sets and their opposites."""
@@ -42,7 +42,7 @@ OF_TWO_DRAWS = math.sqrt(2.0)
 
 def rounding(scene: Scenario, unit: str, precision: type, steps: Array) -> Array:
     """The largest error that rounding and the residuals of solvers may cause in a number of steps, in the unit of the metric."""
-    rounded: Array = scale(scene, unit) * (NEGLIGIBLE + ULPS_PER_STEP * float(np.finfo(precision).eps) * steps)
+    rounded: Array = scale(scene, unit) * (NEGLIGIBLE + EPS_PER_STEP * float(np.finfo(precision).eps) * steps)
     return rounded
 
 
@@ -54,14 +54,14 @@ def negligible(scene: Scenario, unit: str) -> float:
 def tolerance(scene: Scenario, unit: str, precision: type, steps: int, sampling_noise: float) -> float:
     """The tolerance of a metric: sampling noise and rounding of random sign; residuals of solvers occur only with a floor."""
     residual = 0.0 if scene.floor is None else NEGLIGIBLE
-    rounded = ULPS_PER_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
+    rounded = EPS_PER_STEP * float(np.finfo(precision).eps) * math.sqrt(steps)
     return sampling_noise + scale(scene, unit) * (residual + TRUTH_ACCURACY + rounded)
 
 
 def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> list[list[Scenario]]:
-    """The initial states of a scene perturbed by a few ulp, in sets; empty if there are many initial states and none touches the floor.
+    """The initial states of a scene perturbed by a few eps, in sets; empty if there are many initial states and none touches the floor.
 
-    A body that touches the floor is perturbed by ulps of double precision, because those of single precision would lift it or sink it. The
+    A body that touches the floor is perturbed by eps of double precision, because those of single precision would lift it or sink it. The
     sign of the perturbation then decides whether all of the initial states touch the floor or none, so each set of perturbations is
     followed by its opposite.
     """
@@ -69,7 +69,7 @@ def perturbed(scene: Scenario, starts: Sequence[Scenario], precision: type) -> l
         return [[_moved(scene, signs, precision)] for signs in SIGNS]
     if scene.floor is None or scene.starts_above_floor:
         return []
-    # It rolls about its corner: perturbed by ulps of single precision it would slip, which is another motion.
+    # It rolls about its corner: perturbed by eps of single precision it would slip, which is another motion.
     return [[_moved(start, signs, np.float64) for start in starts] for signs in SIGNS[:SETS_OF_STARTS]]
 
 

@@ -32,7 +32,7 @@ POSITION_OFF = 0.5  # of the distance that the exact solution covers, or of the 
 BLOWN_UP = 1e6  # times the scene's energy
 DEEPER = 1e-3  # of the body's size; smaller distances are ignored
 NEVER_RESTS = 1.5  # times the speed that gravity adds in a step, which a resting body may have between two solutions
-ULPS = 1e-15  # relative; speeds closer than this are equal to the last digit, also if they are norms
+SAME_SPEED = 1e-15  # relative; speeds closer than this are equal to the last digit, also if they are norms
 HELD = 3  # rows in which a clamped speed is equal to the last digit
 SUDDEN = 1e-6  # relative; the least change of a speed from row to row just before a clamp; one that settles changes less
 
@@ -193,7 +193,7 @@ def held_speeds(motion: Trajectory) -> dict[str, float]:
 
 def _is_held(sizes: Array, largest: float) -> bool:
     """Whether a component or norm that varied, or was larger initially, stays at its largest value for some rows."""
-    held = np.abs(sizes - largest) <= ULPS * largest
+    held = np.abs(sizes - largest) <= SAME_SPEED * largest
     if sizes[0] > largest * (1.0 + SUDDEN) and held[1]:
         return True
     in_a_row = np.logical_and.reduce([held[shift : len(held) - HELD + 1 + shift] for shift in range(HELD)])

@@ -32,7 +32,7 @@ class EngineRun:
         breakdown: Why there is no motion; None if there is one.
         motion: From the scene's own start, every step.
         phases: From each start phase.
-        perturbed: From starts perturbed by a few ulp, set by set: an estimate of what rounding may do.
+        perturbed: From starts perturbed by a few eps, set by set: an estimate of what rounding may do.
         limitations: Known limitations that the engine met.
         settings: The settings that it reported.
         outcome: What became of the scene's ensemble.

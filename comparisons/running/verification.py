@@ -18,10 +18,11 @@ from scenarios.rotations import length
 from scenarios.state import ORIENTATION, PARTS, SPIN
 from scenarios.validation import shown
 
-ULPS = 8
-BATCH_ULPS = 64
-"""Of many starts a few differ from the scene's by more than the 8 ulp that one is allowed."""
-SPIN_ULPS = 64
+MULTIPLE = 8
+"""Eps of the engine's precision by which numbers may differ from the scene's, relative to the largest number of a vector."""
+BATCH_MULTIPLE = 64
+"""Of many starts a few differ from the scene's by more than the 8 eps that one is allowed."""
+SPIN_MULTIPLE = 64
 """Of an angular velocity that was rotated to the body's axes and back, by a quaternion whose length is rounded: measured up to 23."""
 UNIT_TOLERANCE = 1e-5
 """How far a quaternion's length may be from 1; single precision drifts by 1e-7."""
@@ -34,7 +35,7 @@ class BuildMismatch(Exception):
 
 
 def verify_build(engine: Engine, scene: Scenario, simulation: Simulation, dt: float) -> None:
-    """Raise `BuildMismatch` unless state, mass, inertia and gravity equal the scene's to 8 ulp, a spin to 64, of the engine's precision."""
+    """Raise `BuildMismatch` unless state, mass, inertia and gravity equal the scene's to 8 eps, a spin to 64, of the engine's precision."""
     verified_lag(simulation.velocity_lag, dt)
     state = simulation.state()
     if state.shape != (13,):
@@ -58,18 +59,18 @@ def verified_lag(lag: Any, dt: float) -> float:
     return float(lag)
 
 
-def verify_start(engine: Engine, scene: Scenario, state: NDArray[np.float64], ulps: int = ULPS) -> None:
-    """Raise `BuildMismatch` unless a state equals the scene's start to some ulp, a spin to 64; q and -q are the same orientation."""
-    verify_starts(engine, [scene], state[np.newaxis], ulps)
+def verify_start(engine: Engine, scene: Scenario, state: NDArray[np.float64], multiple: int = MULTIPLE) -> None:
+    """Raise `BuildMismatch` unless a state equals the scene's start to some eps, a spin to 64; q and -q are the same orientation."""
+    verify_starts(engine, [scene], state[np.newaxis], multiple)
 
 
-def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: NDArray[np.float64], ulps: int = BATCH_ULPS) -> None:
+def verify_starts(engine: Engine, scenes: Sequence[Scenario], states: NDArray[np.float64], multiple: int = BATCH_MULTIPLE) -> None:
     """As `verify_start`, for each scene and its state, states of shape (size, 13)."""
     starts = initial_states(scenes)
     opposite = np.einsum("ij,ij->i", states[:, ORIENTATION], starts[:, ORIENTATION]) < 0.0
     starts[opposite, ORIENTATION] *= -1.0
     for name, part in PARTS.items():
-        allowed = SPIN_ULPS if part == SPIN else ulps
+        allowed = SPIN_MULTIPLE if part == SPIN else multiple
         _verify_equal(engine, f"{name.replace('_', ' ')} at the start", states[:, part], starts[:, part], allowed)
 
 
@@ -212,14 +213,14 @@ def _verified_number(what: str, number: Any) -> float:
     return float(number)
 
 
-def _verify_equal(engine: Engine, what: str, found: NDArray[np.float64], expected: NDArray[np.float64], ulps: int = ULPS) -> None:
-    """Raise `BuildMismatch` unless each row of an array equals that of another to some ulp of its largest number."""
+def _verify_equal(engine: Engine, what: str, found: NDArray[np.float64], expected: NDArray[np.float64], multiple: int = MULTIPLE) -> None:
+    """Raise `BuildMismatch` unless each row of an array equals that of another to some eps of its largest number."""
     largest, difference = np.abs(expected).max(axis=1), np.abs(found - expected).max(axis=1)
-    allowed = ulps * float(np.finfo(engine.precision).eps) * largest
+    allowed = multiple * float(np.finfo(engine.precision).eps) * largest
     if not (difference <= allowed).all():
         row = int(np.argmin(difference <= allowed))
         of_which = f" of simulation {row + 1} of {len(found)}" if len(found) > 1 else ""
         is_now, has = (np.array2string(one[row], precision=17) for one in (found, expected))
         raise BuildMismatch(
-            f"{what}{of_which} is {is_now}, the scene has {has}; they differ by {difference[row]:.3g}, {ulps} ulp are {allowed[row]:.3g}"
+            f"{what}{of_which} is {is_now}, the scene has {has}; they differ by {difference[row]:.3g}, {multiple} eps is {allowed[row]:.3g}"
         )

@@ -1,7 +1,7 @@
 """What the comparison of two motions that should be equal finds, and whether rounding explains their difference.
 
 Rounding breaks every symmetry a little, and a sensitive motion amplifies that. So the initial state of the transformed scene is perturbed
-by a few ulp, and the nominal scene is run from there: a difference is attributed to rounding as long as it is not larger than the largest
+by a few eps, and the nominal scene is run from there: a difference is attributed to rounding as long as it is not larger than the largest
 effect of the perturbations so far, times a factor that allows for a rounding error in each time step. Repeated runs must be equal bit for
 bit.
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from comparisons.judging.verdicts import Verdict
 from comparisons.measuring.differences import differences
-from comparisons.measuring.tolerances import FEW_DRAWS, MATTERS, PERTURBATION, ULPS_PER_STEP
+from comparisons.measuring.tolerances import EPS_PER_STEP, FEW_DRAWS, MATTERS, PERTURBATION
 from comparisons.running.recording import Breakdown
 from scenarios import Scenario
 
@@ -31,8 +31,8 @@ rounding explains it, but it is larger. Nearly kept: rounding does not explain i
 engine does not run the transformed scene, or breaks down in it.
 """
 
-ULPS = 1000.0
-"""Rounding errors of a single time step, in ulp of the scene's sizes and speeds, which some engines make in their transformations."""
+STEP_MULTIPLE = 1000.0
+"""Rounding errors of a single time step, in eps of the scene's sizes and speeds, which some engines make in their transformations."""
 BY_CHANCE = 3.0
 """Factor on the largest effect of a few perturbations, if it is so large that it is due to chance."""
 
@@ -76,13 +76,13 @@ def judged(none: Finding, scene: Scenario, dt: float, pairs: Pairs, effects: Eff
     of_pairs = [differences(scene, *pair) for pair in pairs]
     difference: Array = np.max(of_pairs, axis=0)
     largest, steps = float(difference.max()), np.arange(len(difference), dtype=float)
-    allowed, ulp = np.zeros_like(difference), float(np.finfo(precision).eps)
+    allowed, eps = np.zeros_like(difference), float(np.finfo(precision).eps)
     if effects is not None:
-        allowed = ulp * (ULPS + ULPS_PER_STEP * steps)
+        allowed = eps * (STEP_MULTIPLE + EPS_PER_STEP * steps)
     if effects is not None and not (difference <= allowed).all():  # most engines need no perturbed runs
         grown = np.maximum.accumulate(np.max([np.zeros_like(difference), *effects()], axis=0))
         # A large effect is one of chance, such as a contact that is missed in a time step: it does not add up, and others are as large.
-        small = np.minimum(grown * (FEW_DRAWS + steps / PERTURBATION), MATTERS * ulp / np.finfo(float).eps)
+        small = np.minimum(grown * (FEW_DRAWS + steps / PERTURBATION), MATTERS * eps / np.finfo(float).eps)
         allowed = BY_CHANCE * grown + small + allowed
     beyond = np.flatnonzero(~(difference <= allowed))
     if not len(beyond):

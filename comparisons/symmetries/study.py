@@ -225,7 +225,7 @@ def effects_of_rounding(
 
 
 def _perturbed(scene: Scenario, entry: EngineEntry) -> list[Scenario]:
-    """A scene with its initial state perturbed by a few ulp, in some ways."""
+    """A scene with its initial state perturbed by a few eps, in some ways."""
     return [one for [one] in perturbed(scene, [scene], entry.adapter.precision)]
 
 

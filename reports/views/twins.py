@@ -9,7 +9,7 @@ from comparisons.symmetries.twins import LEVELS, TwinFinding
 
 LEGEND = (
     "Steps are the first after which the motions differ at all, and by more than each size, of angles in radians, and relative to sizes "
-    "and speeds; 0 is the start. Rounding explains a difference if the initial state perturbed by 16 ulp changes the motion of one of the "
+    "and speeds; 0 is the start. Rounding explains a difference if the initial state perturbed by 16 eps changes the motion of one of the "
     "two engines as much."
 )
 

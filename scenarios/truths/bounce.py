@@ -9,7 +9,7 @@ For e < 1 the impacts accumulate at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time
 Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
 Valid for: a ball on a frictionless floor, with any spin and any horizontal motion; a box that lands on a face on a frictionless floor, with
 any horizontal motion and with spin only about the vertical, up to rounding; both on any floor without spin and horizontal motion; gravity
-straight down, no damping. Valid until a difference of one ulp in a spin about the intermediate axis can turn the body over.
+straight down, no damping. Valid until a difference of one eps in a spin about the intermediate axis can turn the body over.
 """
 
 import math

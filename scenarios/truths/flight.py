@@ -51,7 +51,7 @@ class Flight:
 
     @property
     def horizon(self) -> float:
-        """Time up to which a difference of one ulp in the initial state does not change the motion noticeably [s]."""
+        """Time up to which a difference of one eps in the initial state does not change the motion noticeably [s]."""
         kappa, until = self.damping.angular, self.rotor.horizon
         if kappa == 0.0:
             return until

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scenarios.mechanics import is_diagonal, principal_axes
 from scenarios.rotations import about, cross, multiply
 from scenarios.truths.elliptic import Jacobi, argument, integral_of_sn2, jacobi, quarter_period
-from scenarios.truths.rotor_horizon import ULP, horizon, spin_rounding
+from scenarios.truths.rotor_horizon import EPS, horizon, spin_rounding
 
 Array = NDArray[np.float64]
 SMALLEST_M1 = 1e-290
@@ -47,7 +47,7 @@ class FreeRotor:
         motion: Function of times that returns orientations and angular velocities.
         largest_spin: The largest magnitude of ω [rad/s].
         is_steady: Whether ω is constant.
-        horizon: Time up to which one ulp of the start leaves the motion determined [s]: `rotor_horizon`.
+        horizon: Time up to which one eps of the start leaves the motion determined [s]: `rotor_horizon`.
     """
 
     motion: Rotor
@@ -76,7 +76,7 @@ def free_rotor(inertia: Array, orientation: Array, angular_velocity: Array) -> F
     spin = _along(axes, orientation, unit_spin)
     rounding = spin_rounding(orientation, unit_spin)
     if not is_diagonal(inertia):  # the axes are rounded too
-        rounding = np.full(3, ULP * float(np.linalg.norm(unit_spin)))
+        rounding = np.full(3, EPS * float(np.linalg.norm(unit_spin)))
     ascending = np.argsort(moments, kind="stable")
     until = horizon(tuple(moments[ascending].tolist()), tuple(spin[ascending]), rounding[ascending]) / fastest
     if all(moments[m] == moments[n] or spin[m] == 0 or spin[n] == 0 for m, n in ((0, 1), (1, 2), (2, 0))):

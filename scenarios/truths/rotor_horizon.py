@@ -1,6 +1,6 @@
 """The horizon of a free rotation near the unstable rotation about the intermediate axis.
 
-The horizon is the time up to which the initial state, known to one ulp, determines the motion.
+The horizon is the time up to which the initial state, known to one eps, determines the motion.
 
 With a < b < c or a > b > c the principal axes, P = |I_c (I_c - I_b)| and Q = |I_a (I_b - I_a)|, the separatrix is
 
@@ -22,23 +22,23 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9
-"""Largest error of the orientation, relative to the angle turned, that one ulp of the initial state may cause before the solution counts as
+"""Largest error of the orientation, relative to the angle turned, that one eps of the initial state may cause before the solution counts as
 undetermined.
 """
 
-ULP = 2.0**-52
+EPS = 2.0**-52
 
 
 def spin_rounding(orientation: Array, angular_velocity: Array) -> Array:
-    """The change of ω along the body axes by one ulp of the initial state [rad/s], shape (3,); 0 where all terms are 0."""
+    """The change of ω along the body axes by one eps of the initial state [rad/s], shape (3,); 0 where all terms are 0."""
     x, y, z, w = np.abs(orientation)
     off = 2.0 * np.array([[0.0, x * y + z * w, x * z + y * w], [x * y + z * w, 0.0, y * z + x * w], [x * z + y * w, y * z + x * w, 0.0]])
-    rounding: Array = ULP * (np.eye(3) + off) @ np.abs(angular_velocity)
+    rounding: Array = EPS * (np.eye(3) + off) @ np.abs(angular_velocity)
     return rounding
 
 
 def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Array) -> float:
-    """Time [s] up to which one ulp of the initial state changes the orientation by at most `TOLERANCE` times the angle turned.
+    """Time [s] up to which one eps of the initial state changes the orientation by at most `TOLERANCE` times the angle turned.
 
     Args:
         moments: Principal moments [kg m²], the intermediate one second.
@@ -50,7 +50,7 @@ def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Ar
     at_c, at_a = P * abs(float(spin[2])), Q * abs(float(spin[0]))
     of_state = P * rounding[2] + Q * rounding[0]
     of_moments = sum(
-        at * ULP * float((one + other) / abs(one - other)) for at, one, other in ((at_c, Ic, Ib), (at_a, Ib, Ia)) if one != other
+        at * EPS * float((one + other) / abs(one - other)) for at, one, other in ((at_c, Ic, Ib), (at_a, Ib, Ia)) if one != other
     )
     separation = abs(float(Ic * (Ic - Ib) * spin[2] ** 2 - Ia * (Ib - Ia) * spin[0] ** 2))
     change = of_state + of_moments

@@ -36,13 +36,13 @@ def vec3(v) -> Vec3:
 
 @given(arrays(float, 4, elements=numbers).filter(lambda q: np.linalg.norm(q) > 1e-3))
 def test_eq3_normalised_quaternion_has_unit_length(q):
-    """Eq 3, to 2 ulp."""
+    """Eq 3, to 2 eps."""
     assert abs(np.linalg.norm(normalise(quat(q))) - 1.0) <= 2 * EPS
 
 
 @given(quaternions)
 def test_eq4_rotation_matrix_matches_scipy(q):
-    """To 8 ulp of 1 (measured: 2.2e-16)."""
+    """To 8 eps of 1 (measured: 2.2e-16)."""
     np.testing.assert_allclose(np.array(rotation_matrix(quat(q))), Rotation.from_quat(q).as_matrix(), rtol=0, atol=8 * EPS)
 
 

@@ -8,7 +8,7 @@ from support import taylor
 from scenarios import load, truth_for
 from scenarios.rotations import angle_between_orientations, rotate
 from scenarios.truths.free_rotor import free_rotor
-from scenarios.truths.rotor_horizon import TOLERANCE, ULP
+from scenarios.truths.rotor_horizon import EPS, TOLERANCE
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 TURNED = np.array([0.5, 10.0, 40.0])  # rad, about
@@ -119,12 +119,12 @@ def test_tilted_start_is_taken_at_its_exact_numbers(offset):
 
 @pytest.mark.parametrize("moments", [(1.0, 2.0, 3.0), (1.0, 1.2, 2.0)])
 def test_horizon_is_where_one_ulp_has_grown_to_its_tolerance(moments):
-    """A start whose quaternion is one ulp off differs at the horizon by 0.01 to 1 of the tolerance, and by more than it a little later."""
+    """A start whose quaternion is one eps off differs at the horizon by 0.01 to 1 of the tolerance, and by more than it a little later."""
     spin = rotate(TILTED, np.array([0.0, 3.0, 0.0]))
     horizon = free_rotor(np.diag(moments), TILTED, spin).horizon
     times = np.array([horizon, horizon + 4.0])
     exact, _ = exact_motion(moments, body_spin(TILTED, spin), TILTED, times)
-    moved = TILTED + np.array([ULP, 0.0, -ULP, 0.0])
+    moved = TILTED + np.array([EPS, 0.0, -EPS, 0.0])
     other, _ = exact_motion(moments, body_spin(moved, spin), moved, times)
     grown = angle_between_orientations(exact, other) / (TOLERANCE * 3.0 * times)
     assert 0.01 < grown[0] < 1.0 < grown[1]
@@ -133,7 +133,7 @@ def test_horizon_is_where_one_ulp_has_grown_to_its_tolerance(moments):
 @pytest.mark.parametrize(
     ("orientation", "spin", "is_limited"),
     [
-        (IDENTITY, (0.0, 5.0, 0.0), False),  # the zeros have no ulp
+        (IDENTITY, (0.0, 5.0, 0.0), False),  # the zeros have no eps
         (IDENTITY, (1e-16, 5.0, 0.0), False),
         ((0.0, 0.6, 0.0, 0.8), (0.0, 5.0, 0.0), False),  # turned about the spin
         (TILTED, (0.0, 5.0, 0.0), True),

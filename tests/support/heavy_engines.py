@@ -10,7 +10,7 @@ class Case(NamedTuple):
         label: The engine with its options.
         turned: The orientation error of the scene `spin-asymmetric` after 1 s with steps of 2 ms [rad], as it was measured.
         restitution: The restitution error of a ball dropped from 1 m, at most; None if the engine declines it.
-        batch: The largest difference of a batch from single simulations in 0.2 s of tumbling, in ulp of 1; 0 for the same bits, None
+        batch: The largest difference of a batch from single simulations in 0.2 s of tumbling, in eps of 1; 0 for the same bits, None
             if the engine cannot step a batch.
     """
 

@@ -66,7 +66,7 @@ class Euler(Candidate):
 
 
 class OnAnotherMachine(Candidate):
-    """Rounds differently: the start, which the whole motion depends on, is some ulp off."""
+    """Rounds differently: the start, which the whole motion depends on, is some eps off."""
 
     name = "on-another-machine"
 

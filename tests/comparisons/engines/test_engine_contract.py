@@ -27,7 +27,7 @@ CASES = list(product(ENGINES, QUICK))
 
 @pytest.mark.parametrize(("name", "scene_name"), CASES)
 def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
-    """State, mass, inertia and gravity to 8 ulp; shapes; finite; advance and record take the same steps, bit for bit."""
+    """State, mass, inertia and gravity to 8 eps; shapes; finite; advance and record take the same steps, bit for bit."""
     chosen, scene = engine(name), scenarios.load(scene_name)
     refusal = chosen.declines(scene)
     if refusal is not None:

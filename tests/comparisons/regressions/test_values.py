@@ -51,7 +51,7 @@ def test_tolerances_come_from_how_a_result_was_measured():
 
 
 def test_tolerance_of_a_single_start_is_its_sensitivity_to_rounding(before):
-    """The tumble's tolerance is what a start some ulp off leads to: far below its error, above rounding alone."""
+    """The tumble's tolerance is what a start some eps off leads to: far below its error, above rounding alone."""
     held = comparable_results(before)
     tumble = held[(held["scene"] == "spin-asymmetric") & (held["metric"] == "orientation_error") & (held["kind"] == "truth")]
     assert len(tumble) == 6  # two engines, three time steps

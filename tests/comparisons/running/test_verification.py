@@ -1,4 +1,4 @@
-"""What an adapter may round: the start, to a few ulp; and the verification of a batch as a whole."""
+"""What an adapter may round: the start, to a few eps; and the verification of a batch as a whole."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_a_spin_may_be_rotated_to_the_body_s_axes_and_back():
         state[SPIN] = start[SPIN] * (1.0 + 1e-13)
         with pytest.raises(BuildMismatch, match="angular velocity at the start"):
             verify_start(made.Exact(), scene, state)
-    assert largest > 2e-15  # 9 ulp and more do occur
+    assert largest > 2e-15  # 9 eps and more do occur
 
 
 def motions_of_a_batch():

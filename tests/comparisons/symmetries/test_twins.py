@@ -9,7 +9,7 @@ from comparisons.symmetries.twins import twins
 from scenarios import DropspinError, load
 
 DT = 4e-3
-ULP = np.finfo(float).eps
+EPS = np.finfo(float).eps
 
 
 def after(step, share):
@@ -36,7 +36,7 @@ def test_equal_engines_never_differ():
 
 
 def test_one_ulp_is_found_at_its_step():
-    found = compared("spin-asymmetric", made.Exact(), after(123, ULP))
+    found = compared("spin-asymmetric", made.Exact(), after(123, EPS))
     assert (found.status, found.first, found.unexplained) == ("kept", 123, None)
     assert 0.0 < found.before_contact < 1e-15
 
@@ -100,7 +100,7 @@ def test_growth_of_one_ulp_in_a_chaotic_motion_is_rounding():
     start = scene.initial_state
     start[0] = 0.3
     scene = scene.starting_at(start)
-    other = type("Other", (Chaotic,), {"name": "other", "error": ULP})
+    other = type("Other", (Chaotic,), {"name": "other", "error": EPS})
     wrong = type("Wrong", (Chaotic,), {"name": "wrong", "error": 1e-6})
     same = compared(scene, Chaotic(), other(), dt=0.03)
     assert (same.status, same.unexplained, same.first) == ("rounding", None, 1)

@@ -7,6 +7,7 @@ import sys
 import sysconfig
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
@@ -79,9 +80,19 @@ def _add_imports(files: dict[Path, None], file: Path, module: str) -> None:
             _add(files, name)
 
 
-def _imported(file: Path, package: str) -> Iterator[str]:
+def _imported(file: Path, package: str) -> tuple[str, ...]:
     """The names of modules that a file imports, in functions too; of `from a import b` both a and a.b, which may be a module."""
-    for node in ast.walk(ast.parse(file.read_bytes())):
+    return _imported_by(file.read_bytes(), package)
+
+
+@cache
+def _imported_by(source: bytes, package: str) -> tuple[str, ...]:
+    """The same for the content of a file, parsed once: every run needs the hashes of its adapters."""
+    return tuple(dict.fromkeys(_imports(ast.parse(source), package)))
+
+
+def _imports(tree: ast.Module, package: str) -> Iterator[str]:
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

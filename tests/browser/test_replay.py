@@ -27,11 +27,14 @@ PROJECT = """([points, time, number]) => {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(shared):
     """The folder of a run with its page of replays."""
-    made = ds.write_report(ds.run(SCENES, ENGINES, dt=[DT]), tmp_path_factory.mktemp("out") / "run").parent
-    assert dropspin("replay", made, "--no-open", cwd=made.parent).returncode == 0
-    return made
+
+    def make(place):
+        made = ds.write_report(ds.run(SCENES, ENGINES, dt=[DT]), place / "run").parent
+        assert dropspin("replay", made, "--no-open", cwd=place).returncode == 0
+
+    return shared("replays", make) / "run"
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,12 @@ PAGES = ("index.html", "engine-mujoco.html", "release-mujoco-3.11.0.html", "scen
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("site")
-    write_record(made / "record")
-    assert dropspin("publish", cwd=made).returncode == 0
-    return made / "out/site-record"
+def folder(shared):
+    def make(place):
+        write_record(place / "record")
+        assert dropspin("publish", cwd=place).returncode == 0
+
+    return shared("site", make) / "out/site-record"
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -13,8 +13,8 @@ from comparisons.engines.registry import BUILT_IN
 from comparisons.record.environments import NOT_INSTALLABLE, POLL, NotMeasured, measured, releases
 from comparisons.record.plan import Plan
 from comparisons.record.store import Record, machine
+from comparisons.results.interrupts import finished
 from comparisons.running.cluster import connected
-from comparisons.running.interrupts import finished
 from scenarios import DropspinError, UnknownName
 
 

@@ -7,11 +7,12 @@ import glob
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from comparisons.results.interrupts import interrupts_deferred
 from scenarios import DropspinError
 
 UNFINISHED = "unfinished-"
@@ -36,12 +37,11 @@ def unfinished_folder(place: Path, name: str = "") -> Iterator[Path]:
     prefix = f".{name[:100]}-{UNFINISHED}" if name else f".{UNFINISHED}"
     for left in place.glob(f"{glob.escape(prefix)}{'?' * _SUFFIX}"):
         _remove_if_abandoned(left, place / name)
-    folder, lock = _locked_folder(place, prefix)
-    try:
+    with ExitStack() as removal:
+        with interrupts_deferred():
+            folder, lock = _locked_folder(place, prefix)
+            removal.callback(_remove, folder, lock)
         yield folder
-    finally:
-        lock.release()
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _locked_folder(place: Path, prefix: str) -> tuple[Path, FileLock]:
@@ -56,6 +56,12 @@ def _locked_folder(place: Path, prefix: str) -> tuple[Path, FileLock]:
             continue
         if folder.exists():
             return folder, lock
+
+
+def _remove(folder: Path, lock: FileLock) -> None:
+    with interrupts_deferred():
+        lock.release()
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _remove_if_abandoned(left: Path, target: Path) -> None:

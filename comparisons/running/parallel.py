@@ -6,8 +6,8 @@ from contextlib import ExitStack, contextmanager
 from threading import Event, Lock
 from typing import TypeVar
 
+from comparisons.results.interrupts import finished, interrupts_deferred
 from comparisons.running.inputs import EngineEntry, ignore
-from comparisons.running.interrupts import finished, interrupts_deferred
 from comparisons.running.processes import Closed, EngineProcesses, ResourceLimits
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError

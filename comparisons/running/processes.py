@@ -21,10 +21,10 @@ from pebble import ProcessExpired, ProcessPool
 
 from comparisons.engines.exceptions import described
 from comparisons.judging.verdicts import Verdict
+from comparisons.results.interrupts import finished, interrupts_deferred
 from comparisons.running.engine_process import PROCESSES, Failed, call, memory_for_data, run_and_count, start_process
 from comparisons.running.engine_run import EngineRun, run_engine
 from comparisons.running.inputs import EngineEntry
-from comparisons.running.interrupts import finished, interrupts_deferred
 from comparisons.running.progress import OnSimulations
 from comparisons.running.recording import Breakdown
 from scenarios import DropspinError, Scenario

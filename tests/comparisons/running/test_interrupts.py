@@ -1,12 +1,14 @@
-"""Interrupts where they would leave a lock behind: they are raised afterwards, and the work ends."""
+"""Interrupts where they would leave a lock or a folder behind: they are raised afterwards, and the work ends."""
 
 import signal
 import subprocess
 import sys
 
 import pytest
+from filelock import FileLock
 
-from comparisons.running.interrupts import interrupts_deferred
+from comparisons.results.interrupts import interrupts_deferred
+from comparisons.results.output import unfinished_folder
 
 PLANTED = """
 import os, signal, time
@@ -59,3 +61,22 @@ def interrupted_work(reached):
         signal.raise_signal(signal.SIGTERM)
         signal.raise_signal(signal.SIGINT)
         reached.append("end of the context")
+
+
+@pytest.mark.parametrize("moment", ["acquire", "release"])
+def test_unfinished_folder_is_removed_if_an_interrupt_comes_while_it_is_made_or_removed(moment, tmp_path, monkeypatch):
+    original = getattr(FileLock, moment)
+
+    def interrupted(*given, **options):
+        found = original(*given, **options)
+        signal.raise_signal(signal.SIGINT)
+        return found
+
+    monkeypatch.setattr(FileLock, moment, interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), unfinished_folder(tmp_path) as folder:
+            assert folder.is_dir()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,7 @@
-"""Interrupts that leave no lock behind: Python raises them anywhere, even between taking a lock and the statement that releases it."""
+"""Interrupts that leave no lock and no folder behind.
+
+Python raises them anywhere, even between taking a lock and the statement that releases it.
+"""
 
 import signal
 import threading

@@ -27,6 +27,16 @@ def joined(text: object) -> object:
     return " ".join(text.split()) if isinstance(text, str) else text
 
 
+def counted(count: int, singular: str, plural: str = "") -> str:
+    """A number of things, such as 1 scene or 2 scenes."""
+    return f"{count:,} {singular if count == 1 else plural or f'{singular}s'}"
+
+
+def rounded(value: float, digits: int) -> str:
+    """A number to some significant digits, without an exponent up to a million."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
 Text = Annotated[str, AfterValidator(verify_line)]
 """A field of a model whose value is printable text."""
 Prose = Annotated[Text, BeforeValidator(joined)]

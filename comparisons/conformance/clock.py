@@ -52,7 +52,9 @@ def check_time(engine: Engine, check: str) -> CheckResult:
             continue
         late = float(np.median(np.arange(len(times)) - times))
         if abs(late) > LATE:
-            raise CheckFailed(f"{what} is {late:.2g} steps late: it does not belong to the time of its row")
+            steps = "1 step" if f"{abs(late):.2g}" == "1" else f"{abs(late):.2g} steps"
+            when = "late" if late > 0.0 else "early"
+            raise CheckFailed(f"{what} is {steps} {when}: it does not belong to the time of its row")
     return CheckResult(check, "passed", f"steps have the length asked for, {asked} s")
 
 
@@ -92,7 +94,8 @@ def check_velocity_lag(engine: Engine, check: str) -> CheckResult:
     ahead = (motion.position[STARTED:] - truth(t).position) @ g / (g @ g * dt)
     measured = float(polyfit(t, ahead, 2)[1])  # what remains of the first steps is constant; damping and wrong gravity grow with t²
     if abs(measured) > LARGEST_LAG:
-        return CheckResult(check, "noted", f"a fall runs ahead by {measured:.3g} steps; known schemes by at most half a step")
+        ahead_or_behind = f"{'runs ahead' if measured > 0.0 else 'lags'} by {abs(measured):.3g} steps"
+        return CheckResult(check, "noted", f"a fall {ahead_or_behind}; known schemes run ahead by at most half a step")
     if abs(measured - stated) > LAG_TOLERANCE:
         raise CheckFailed(
             f"velocity_lag is {stated:.3g} steps, but velocity lags position by {measured:.3g} steps, by how far a fall runs ahead of the "

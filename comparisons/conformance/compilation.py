@@ -5,6 +5,7 @@ from comparisons.conformance.probes import DT
 from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene
 from comparisons.engines.base import Engine
 from comparisons.running.recording import time_steps
+from scenarios.text import rounded
 
 MUCH = 10.0
 """Compilation that should be stated [s], because it counts against limits of processor time otherwise."""
@@ -19,7 +20,7 @@ def check_compilation(engine: Engine, check: str) -> CheckResult:
         if compiling < MUCH:
             return CheckResult(check, "passed", "the engine does not compile for long")
         return CheckResult(check, "noted", f"the first simulation takes {compiling:.2g} s longer than the second; set compiles = True")
-    found = f"a scene compiles in {max(compiling, 0.0):.2g} s; a simulation of {A_FEW_STEPS} steps then takes {1e3 * later:.2g} ms"
+    found = f"a scene compiles in {max(compiling, 0.0):.2g} s; a simulation of {A_FEW_STEPS} steps then takes {rounded(1e3 * later, 2)} ms"
     if again > 0.25 * compiling and again > MUCH / 10.0:  # the first simulation may compile for two numbers of steps, 1 and others
         return CheckResult(check, "noted", f"{found}; with another number of steps it compiles again, for {again:.2g} s")
     return CheckResult(check, "passed", found)

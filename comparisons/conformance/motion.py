@@ -83,9 +83,10 @@ def _symptoms(probe: Probe, rows: Array, exact: Array) -> Iterator[str]:
         for what, unit, part in (("speed", "m/s", VELOCITY), ("angular velocity", "rad/s", SPIN)):
             final, expected = (float(np.linalg.norm(state[part])) for state in (end, exact[-1]))
             if abs(final - expected) > 1e-3 * expected:
-                cause = "damping or a clamp that the scene does not have: " if final < expected else ""
-                if final > expected and scene.damping is not None:
-                    cause = "damping is missing or too weak: "
+                too_fast, too_slow = "", "damping or a clamp that the scene does not have: "
+                if scene.damping is not None:
+                    too_fast, too_slow = "damping is missing or too weak: ", "damping is too strong, or a clamp: "
+                cause = too_slow if final < expected else too_fast
                 yield f"{cause}the final {what} is {final:.4g} {unit}, expected {expected:.4g}"
     rises = np.flatnonzero((rows[1:, UPWARD] > 0.0) & (rows[:-1, UPWARD] <= 0.0))
     truth = truth_for(scene)

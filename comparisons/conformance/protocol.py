@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from comparisons.conformance.exceptions import described
 from comparisons.conformance.explanations import explain_start
-from comparisons.conformance.outcomes import CheckFailed, CheckResult
+from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
 from comparisons.conformance.probes import DT, PROBES
 from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
 from comparisons.engines.base import Diverged, Engine
@@ -55,12 +55,13 @@ def check_refusals(engine: Engine, check: str) -> CheckResult:
 
 def check_builds(engine: Engine, check: str) -> CheckResult:
     """The built simulation equals the scene, for the probes and for every scene of the catalogue."""
-    read_back = 0
+    read_back, built = 0, 0
     for scene in [ASYMMETRIC, *(probe.scene for probe in PROBES), *(load(name) for name in names())]:
         if engine.declines(scene) is not None:
             continue
         try:
             read_back += _verify_built(engine, scene)
+            built += 1
         except (CheckFailed, BuildMismatch) as wrong:
             raise CheckFailed(f"{wrong} (in the scene {scene.name})") from None
         except Diverged:
@@ -69,6 +70,8 @@ def check_builds(engine: Engine, check: str) -> CheckResult:
             raise CheckFailed(
                 f"{described(error, engine)}, in the scene {scene.name}; decline scenes that the engine cannot run, with a reason"
             ) from error
+    if not built:
+        raise Declined("the engine declines every scene")
     if not read_back:
         return CheckResult(check, "passed", "the start equals the scene's; as_built() returns no mass, inertia and gravity to compare")
     return CheckResult(check, "passed", f"start, mass, inertia and gravity equal the scene's to {MULTIPLE} eps")

@@ -1,6 +1,6 @@
 """The check of symmetries: peculiarities of an engine that exact solutions may not show."""
 
-from comparisons.conformance.outcomes import CheckResult
+from comparisons.conformance.outcomes import CheckResult, Declined
 from comparisons.conformance.probes import DT
 from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
 from comparisons.engines.base import Engine
@@ -9,6 +9,7 @@ from comparisons.running.inputs import EngineEntry
 from comparisons.running.recording import record
 from comparisons.symmetries.findings import Finding
 from comparisons.symmetries.study import findings_of
+from scenarios.text import counted
 from scenarios.transformations import whole_steps
 
 
@@ -20,8 +21,10 @@ def check_symmetries(engine: Engine, check: str) -> CheckResult:
         named = "; ".join(f"{name}: by {one.difference:.2g} from step {one.step} on" for name, one in lost.items())
         return CheckResult(check, "noted", f"the motion differs if the scene is transformed; {named} (dropspin symmetries shows more)")
     compared = {one.symmetry for one in found if one.status != "not run"}
+    if not compared:
+        raise Declined(f"no symmetry could be compared: {found[0].reason if found else 'the motion is not finite'}")
     scenes = " and ".join(dict.fromkeys(one.scene for one in found))
-    return CheckResult(check, "passed", f"{len(compared)} symmetries are kept in {scenes}")
+    return CheckResult(check, "passed", f"{counted(len(compared), 'symmetry is', 'symmetries are')} kept in {scenes}")
 
 
 def _found(engine: Engine, *preferred: str) -> list[Finding]:

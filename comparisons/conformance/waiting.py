@@ -9,6 +9,7 @@ from comparisons.conformance.protocol import relative_difference
 from comparisons.conformance.short_runs import accepted_scene
 from comparisons.engines.base import Engine, Simulation
 from scenarios import Scenario
+from scenarios.text import rounded
 
 LONG_ENOUGH = 0.02
 """Wall time of the steps [s]; a shorter one could be hidden by the time that it takes to read a state."""
@@ -34,9 +35,10 @@ def check_waiting(engine: Engine, check: str) -> CheckResult:
         # Other processes may delay a call now and then.
         stepping, waiting = min([(stepping, waiting), *(_timed(simulation, steps) for _ in range(REPEATS))], key=lambda times: times[1])
     if waiting > LARGEST_SHARE * (stepping + waiting) and waiting > LARGEST_SHARE * LONG_ENOUGH:
+        returned, took = (f"{rounded(1e3 * seconds, 2)} ms" for seconds in (stepping, waiting))
         raise CheckFailed(
-            f"advance({steps}) returned after {1e3 * stepping:.2g} ms, and state() then took {1e3 * waiting:.2g} ms: the steps were not "
-            "done; wait for them in advance (JAX: block_until_ready; Warp: synchronize)"
+            f"advance({steps}) returned after {returned}, and state() then took {took}: the steps were not done; wait for them in advance "
+            "(JAX: block_until_ready; Warp: synchronize)"
         )
     _verify_steps(engine, scene, steps)
     return CheckResult(check, "passed", f"advance({steps}) returns when its steps are done")

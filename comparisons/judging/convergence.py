@@ -126,7 +126,7 @@ def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy 
     own, other = study.asymptotic_error, calibrated.asymptotic_error
     if max(-other.lower, other.upper) >= max(own.lower, -own.upper):
         return study
-    cured = ", but the calibrated profile does: it is a setting" if own.verdict == "failed" else ""
+    cured = ", but the calibrated profile has none or a smaller one: it is a setting" if own.verdict == "failed" else ""
     order = None if study.order is None else replace(study.order, cause="setting")
     return ConvergenceStudy("setting", order, replace(own, cause="setting", reason=own.reason + cured))
 

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from comparisons.judging.extrapolation import ORDERS, Posterior, extrapolate
 from comparisons.judging.verdicts import Cause
 from scenarios import DropspinError
+from scenarios.text import counted
 
 Array = NDArray[np.float64]
 
@@ -133,8 +134,10 @@ def error_budget(
     usable = coarsest_first[np.isfinite(e[coarsest_first])][-MOST_TIME_STEPS:]
     h, e, noise, floor = h[usable], e[usable], noise[usable], floor[usable]
     if not is_sufficient(list(h)):
-        steps = f"only {len(usable)} of {len(coarsest_first)} time steps are usable; extrapolation needs three that span a factor of four"
-        return ErrorBudget("unresolved", steps)
+        span = f" span a factor of {h.max() / h.min():.3g}" if len(h) > 2 else ""
+        usable_steps = f"{'' if span else 'only '}{len(usable)} of {counted(len(coarsest_first), 'time step is', 'time steps are')} usable"
+        needed = "extrapolation needs three that span a factor of four"
+        return ErrorBudget("unresolved", f"{usable_steps}{' and' if span else ''}{span}; {needed}")
     if (np.abs(e) <= floor).all():
         value, reach = float(e[-1]), float(floor[-1])
         return ErrorBudget("rounding", "within rounding at every time step", value, value - reach, value + reach)
@@ -143,9 +146,9 @@ def error_budget(
     cause, median, lower, upper = _attributed(e, found, max(negligible, float(floor[-1])), float(noise[-1]), judged_together)
     order, fitted = _fitted_order(h, e, 0.0 if cause == "discretisation" else median, small)
     if cause == "unresolved" or math.isnan(order):
-        return ErrorBudget(cause, _reason(cause, e, small, order), median, lower, upper)
+        return ErrorBudget(cause, _reason(cause, e, small, float(floor[-1]), order), median, lower, upper)
     orders = min(found.order_lower, order), max(found.order_upper, order)
-    return ErrorBudget(cause, _reason(cause, e, small, order), median, lower, upper, order, *orders, fitted)
+    return ErrorBudget(cause, _reason(cause, e, small, float(floor[-1]), order), median, lower, upper, order, *orders, fitted)
 
 
 def vector_budget(
@@ -225,7 +228,7 @@ def _fitted_order(h: Array, e: Array, limit: float, small: Array) -> tuple[float
     return (slope, tuple(float(step) for step in h[clear])) if slope > 0.5 * ORDERS[0] else (math.nan, ())
 
 
-def _reason(cause: Cause, e: Array, small: Array, order: float) -> str:
+def _reason(cause: Cause, e: Array, small: Array, floor: float, order: float) -> str:
     if cause == "model":
         return "approaches a value other than 0" + ("" if math.isnan(order) else f" as dt^{order:.2f}")
     if cause == "discretisation":
@@ -234,6 +237,8 @@ def _reason(cause: Cause, e: Array, small: Array, order: float) -> str:
         return "within the sampling noise at every time step; more start phases would reduce the noise"
     if (np.diff(np.abs(e)) > small[1:]).all():
         return "grows as dt decreases; finer time steps are needed"
-    if np.abs(e[-1]) <= small[-1]:
+    if np.abs(e[-1]) <= floor:
         return "within rounding at the finest time step, but not at coarser ones; finer time steps are needed"
+    if np.abs(e[-1]) <= small[-1]:
+        return "within the sampling noise at the finest time step, but not at coarser ones; more start phases would reduce the noise"
     return "the time steps do not decide whether it vanishes as dt → 0; finer ones are needed"

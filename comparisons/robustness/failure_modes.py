@@ -144,7 +144,8 @@ def _errors(motion: ExtendedMotion, own: Comparison, within: float) -> Iterator[
             unit = "" if metric.unit == "1" else f" {metric.unit}"
             name = metric.name.replace("_", " ")
             value = f"{name} is {size:.4g}{unit} (tolerance {within:g})"
-            message = value if math.isfinite(size) else f"{name} is undefined: no impact was detected"
+            why = ": no impact was detected" if own.first_contact is None else ""
+            message = value if math.isfinite(size) else f"{name} is undefined{why}"
             yield Diagnosis("inaccurate", metric.name, size if math.isfinite(size) else math.inf, message)
 
 
@@ -154,12 +155,10 @@ def _position_off(own: Comparison) -> Iterator[Diagnosis]:
         return
     exact = own.reference.position
     distance, size = float(length(exact - exact[0]).max()), own.scene.body.size
-    distance = distance if distance > DEEPER * size else size
+    distance, of = (distance, "distance covered") if distance > DEEPER * size else (size, "size of the body")
     error = float(length(own.motion.position[: len(exact)] - exact).max()) / distance
     if not error <= POSITION_OFF:
-        yield Diagnosis(
-            "inaccurate", "position", error, f"the position error is {error:.3g} of the distance covered (limit {POSITION_OFF:g})"
-        )
+        yield Diagnosis("inaccurate", "position", error, f"the position error is {error:.3g} of the {of} (limit {POSITION_OFF:g})")
 
 
 def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosis]:

@@ -40,8 +40,9 @@ def _row(found: Finding, dt: float) -> Measurement:
         assert found.verdict
         return replace(row, verdict=found.verdict, reason=found.reason)
     fails = found.status == "lost" or (found.status == "nearly kept" and bound == 0.0)
+    differ = "the motions differ" if bound == 0.0 else "rounding does not explain the difference"
     reason = {"kept": "", "rounding": "rounding explains the difference"}.get(
-        found.status, f"rounding does not explain the difference from step {found.step} on, at {found.time:.4g} s"
+        found.status, f"{differ} from step {found.step} on, at {found.time:.4g} s"
     )
     # What perturbations explain is due to chance, and is of another size on another machine.
     tolerance = max(MATTERS, BY_CHANCE * found.difference * (found.status == "rounding"))

@@ -113,7 +113,8 @@ def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: s
     """The reason why an engine is left out: no error is finite, or the errors of the motion do not fall; empty if it takes part."""
     if not tried:
         return reason
-    range_tried = f"{len(tried)} time steps tried, {1e3 * tried[0][0]:.4g} ms to {1e3 * tried[-1][0]:.4g} ms"
+    first, last = (f"{1e3 * tried[place][0]:.4g} ms" for place in (0, -1))
+    range_tried = f"{len(tried)} time steps tried, {first} to {last}" if len(tried) > 1 else f"only time step tried, {first}"
     errors = [motion for _, (_, motion) in tried if np.isfinite(motion)]
     if not errors:
         return f"no error is finite at the {range_tried}: {reason}"

@@ -122,7 +122,8 @@ def tradeoff(
     ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
     found = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory)
     if not points:
-        raise DropspinError(f"no engine runs {scene.name}: {'; '.join(f'{label}: {why}' for label, why in found.left_out.items())}.")
+        reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in found.left_out.items())
+        raise DropspinError(f"no engine runs {scene.name}: {reasons}.")
     return found
 
 

@@ -36,6 +36,7 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
     from reports.terminal.rows import json_rows
     from reports.views.check import accepted_sentences
     from scenarios import DropspinError
+    from scenarios.text import counted
 
     if not reason.strip():
         raise click.UsageError("--reason is empty; give the reason why these results are accepted.")
@@ -54,4 +55,4 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
         return
     for sentence in sentences:
         echo(sentence)
-    echo(f"Written: {baseline}, {len(new.results):,} accepted results. Review the difference and commit it.")
+    echo(f"Written: {baseline}, {counted(len(new.results), 'accepted result')}. Review the difference and commit it.")

@@ -33,12 +33,13 @@ def record_command(
     from comparisons.record.store import Record
     from comparisons.record.study import Release, record
     from comparisons.running.parallel import as_jobs
+    from scenarios.text import counted
 
     if sent and (engines or releases):
         raise click.UsageError("--merge runs nothing; leave out --engine and --release.")
     folder = Record(output)
     if sent:
-        echo(f"{len(folder.merge(sent))} files added to {output}, as unsigned")
+        echo(f"{counted(len(folder.merge(sent)), 'file')} added to {output}, as unsigned")
         return
 
     def on_done(one: Release, left: int) -> None:

@@ -129,6 +129,7 @@ def _run(
     from reports.commands.symmetries import with_progress
     from reports.run_folder import MeasuredScenes, fill, run_folder
     from reports.terminal.progress import progress_bar, status
+    from scenarios.text import counted
 
     measured, chosen, steps = MeasuredScenes(output), engines or CORE_ENGINES, dts or DEFAULT_DTS
     try:
@@ -158,7 +159,8 @@ def _run(
                 fill(results, folder)
     except KeyboardInterrupt:
         kept = len(measured)
-        message = f"{kept} of {len(scenes)} scenes are kept; --resume continues the run" if kept else "nothing was written"
+        are = f"{kept} of {counted(len(scenes), 'scene')} {'is' if kept == 1 else 'are'} kept"
+        message = f"{are}; --resume continues the run" if kept else "nothing was written"
         raise KeyboardInterrupt(message) from None
     measured.clear()
     return results

@@ -31,6 +31,7 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, t
     from reports.terminal.progress import jobs_bar
     from reports.terminal.rows import print_rows
     from reports.views import sweep as view
+    from scenarios.text import counted
 
     asked = load_sweep(spec)
     try:
@@ -50,5 +51,5 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, t
         echo(json.dumps(view.summary_rows(found), indent=1, ensure_ascii=False))
     else:
         print_rows(view.formatted_rows(found), json_output=False, left_out_first=view.LEFT_OUT_FIRST)
-        echo(f"Written: {output}, {asked.size:,} jobs; from Python: dropspin.read_sweep({output!r})")
+        echo(f"Written: {output}, {counted(asked.size, 'job')}; from Python: dropspin.read_sweep({output!r})")
     return view.exit_code(found)

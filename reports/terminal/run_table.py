@@ -11,6 +11,7 @@ from rich.text import Text
 from comparisons.judging.agreement import NO_EVIDENCE
 from comparisons.judging.verdicts import MARKS
 from comparisons.measuring.metrics import METRICS
+from comparisons.results.ensembles import QUICK_MEMBERS
 from comparisons.results.results import Results
 from reports.terminal.safe import styled
 from reports.terminal.summary import print_summary
@@ -100,7 +101,8 @@ def _print_ensemble(results: Results, name: str, out: Console) -> None:
         means = [f"{row.engine} {row.value:.3g} ± {row.upper - row.value:.1g}{unit}" for row in rows.itertuples()]
         spread = results.scenes[name].ensemble
         assert spread is not None
-        out.print(styled(f"over {spread.size} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
+        starts = min(spread.size, QUICK_MEMBERS) if results.is_quick else spread.size
+        out.print(styled(f"over {starts} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
 
 
 def _print_remarks(results: Results, name: str, out: Console) -> None:

@@ -11,6 +11,7 @@ from reports.terminal.safe import styled
 from reports.views.failures import FailureGroup, grouped
 from reports.views.matrix import Matrix, matrix
 from reports.views.run import overview
+from scenarios.text import counted
 
 MOST_SENTENCES = 6
 """Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
@@ -33,7 +34,7 @@ def print_failures(groups: Sequence[FailureGroup], console: Console | None = Non
         for sentence in group.sentences[:MOST_SENTENCES]:
             print_sentence(f"✗ {sentence}", out, "red")
         if len(group.sentences) > MOST_SENTENCES:
-            print_sentence(f"✗ {group.engine} fails in {len(group.sentences) - MOST_SENTENCES} more scenes.", out, "red")
+            print_sentence(f"✗ {group.engine} has {counted(len(group.sentences) - MOST_SENTENCES, 'more failure')}.", out, "red")
         if group.consistent_with:
             print_sentence(group.consistent_with, out)
         out.print(styled(f"Reproduce: {group.reproduce}"), soft_wrap=True)  # a command is one line

@@ -16,7 +16,8 @@ from comparisons.results.provenance import versions_behind
 from comparisons.results.results import Results
 from reports.views.failures import Failure
 from reports.views.findings import counts, verdict_sentence
-from reports.views.numbers import counted, failing
+from reports.views.numbers import failing
+from scenarios.text import counted
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 MOST_ANNOTATIONS = 10
@@ -77,20 +78,25 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, own: str) -> str:
     changed = failed_rows.loc[failed_rows["reason"].str.startswith(SCENE_CHANGED), "scene"].nunique()
     scenes = f"{counted(changed, 'scene has', 'scenes have')} changed since results were accepted. " if changed else ""
     if failed or changed:
-        return f"{scenes}{failing(failed, judged, 'accepted result')}. {own}".rstrip()
-    return f"{own} All {counted(judged, 'accepted result holds', 'accepted results hold')}.".lstrip() if judged else own
+        those = f"{failing(failed, judged, 'accepted result')}." if judged else "No accepted result was compared."
+        return f"{scenes}{those} {own}".rstrip()
+    hold = "The accepted result holds" if judged == 1 else f"All {judged:,} accepted results hold"
+    return f"{own} {hold}.".lstrip() if judged else own
 
 
 def accepted_sentences(results: Results, found: pd.DataFrame, known_failures: bool) -> list[str]:
     """Sentences on how many results of a run were accepted, and which cannot be accepted."""
     changed = found["change"].value_counts()
     changes = ", ".join(f"{changed[one]:,} {one}" for one in ("new", "worse", "moved", "better", "gone", "same") if one in changed)
-    listed = [f"Accepted for {counted(len(results.scenes), 'scene')} with {', '.join(results.engines)}: {changes or 'no results'}."]
+    measured = [engine for engine in results.engines if (found["engine"] == engine).any()]
+    listed = [f"Accepted for {counted(len(results.scenes), 'scene')} with {', '.join(measured)}: {changes or 'no results'}."]
     tally = counts(results)
+    acceptable = int(comparable_results(results)["verdict"].isin(FAILURES).sum())
+    unknown = tally.failed - acceptable
     if tally.failed and not known_failures:
         fail = counted(tally.failed, "check of this run fails", "checks of this run fail")
-        listed.append(f"{fail}, so dropspin check will fail too; --known-failures accepts them as known failures.")
-    unknown = tally.failed - int(comparable_results(results)["verdict"].isin(FAILURES).sum())
+        those = f"the {acceptable:,} with comparable results" if unknown else "them"
+        listed.append(f"{fail}, so dropspin check will fail too; --known-failures accepts {those} as known failures.")
     if unknown and known_failures:
         have = counted(unknown, "failing check has", "failing checks have")
         listed.append(f"{have} no comparable result and cannot be accepted.")
@@ -103,10 +109,13 @@ def annotations(found: Sequence[Failure]) -> list[str]:
     """The workflow commands by which a runner of GitHub shows failures; empty elsewhere."""
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return []
-    return [
-        f"::error title={_escaped(f'{one.scene} {one.engine}', ':,')}::{_escaped(f'{one.sentence}. Reproduce: {one.reproduce}')}"
-        for one in found[:MOST_ANNOTATIONS]
-    ]
+    return [_annotation(one) for one in found[:MOST_ANNOTATIONS]]
+
+
+def _annotation(failure: Failure) -> str:
+    title = _escaped(f"{failure.scene} {failure.engine}", ":,")
+    text = _escaped(f"{failure.sentence.removesuffix('.')}. Reproduce: {failure.reproduce}")
+    return f"::error title={title}::{text}"
 
 
 def _without_baseline(results: Results) -> Results:

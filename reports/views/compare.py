@@ -11,7 +11,8 @@ from comparisons.regressions.motions import EqualMotions
 from comparisons.regressions.speed import SpeedChange
 from comparisons.results.results import Results
 from reports.views.failures import reproduce_scenes
-from reports.views.numbers import counted, formatted, subject
+from reports.views.numbers import formatted, subject
+from scenarios.text import counted
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
 """The heading of each kind of change, the worst kind first."""
@@ -28,7 +29,7 @@ def listed(changes: Changes) -> list[str]:
             f"  {line['scene']} · {line['engine']}: {line['result']} at {line['step']} from {line['before']} to {line['now']}"
             f"{'' if line['ratio'] == '–' else ', ' + line['ratio'] + ' times'}"
             f"{'' if line['tolerances'] == '–' else ', ' + line['tolerances'] + ' times its tolerance away'}"
-            f"{'' if line['others'] == '–' else '; and ' + line['others'] + ' other results'}"
+            f"{'' if line['others'] == '–' else '; and ' + line['others']}"
             for line in lines
         ]
     return listed
@@ -62,7 +63,8 @@ def sentences(changes: Changes) -> list[str]:
         found.append(f"Motions equal bit for bit: {'; '.join(map(_motions, changes.motions))}.")
     regressed = changes.regressions
     total = counted(len(changes.results), "result")
-    verdict = f"{len(regressed):,} of {total} are worse, moved or gone" if len(regressed) else f"None of {total} is worse"
+    are = "is" if len(regressed) == 1 else "are"
+    verdict = f"{len(regressed):,} of {total} {are} worse, moved or gone" if len(regressed) else f"None of {total} is worse"
     return [*found, f"{verdict}."]
 
 
@@ -105,7 +107,7 @@ def _line(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
         "now": formatted(after),
         "ratio": f"{ratio:.3g}" if math.isfinite(ratio) else "–",
         "tolerances": "–" if math.isnan(row["in_tolerances"]) else f"{row['in_tolerances']:.3g}",
-        "others": f"{count - 1:,}" if count > 1 else "–",
+        "others": counted(count - 1, "other result") if count > 1 else "–",
     }
 
 
@@ -118,7 +120,7 @@ def _speed(change: SpeedChange) -> str:
     between = f"{change.least:.2f} to {change.most:.2f}" if math.isfinite(change.most) else "unbounded with so few cases"
     return (
         f"Speed (reported, not gated): {change.engine} relative to {change.other} takes {change.ratio:.2f} times as long as before "
-        f"(median of {change.cases} cases, 95 % interval {between})."
+        f"(median of {counted(change.cases, 'case')}, 95 % interval {between})."
     )
 
 

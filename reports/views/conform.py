@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from comparisons.conformance.outcomes import CheckResult
-from reports.views.numbers import counted, failing
+from reports.views.numbers import failing
+from scenarios.text import counted
 
 WRONG = frozenset({"failed", "crashed", "timed_out"})
 

@@ -82,7 +82,8 @@ def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:
         return f"Discretisation error{halved}."
     if cause not in ("model", "setting"):
         return f"Set by {cause}, which is the engine's own: it {row['reason_of_limit']}."
-    kind = "setting error, which the calibrated profile does not have" if cause == "setting" else "model error, which no time step removes"
+    a_setting, a_model = "setting error: the calibrated profile has none or a smaller one", "model error, which no time step removes"
+    kind = a_setting if cause == "setting" else a_model
     rest = value - limit
     because = f" {EXPLAINED[row['verdict_of_limit']]}: {row['reason_of_limit']}." if row["verdict_of_limit"] in EXPLAINED else ""
     if abs(rest) <= 0.5 * (float(row["upper_of_limit"]) - float(row["lower_of_limit"])):

@@ -12,7 +12,8 @@ from comparisons.measuring.symmetries import kind_of
 from comparisons.regressions.parameters import WrongParameter, wrong_parameters
 from comparisons.results.results import Results
 from comparisons.running.processes import ResourceLimits
-from reports.views.numbers import bound, counted, formatted, step, subject, word
+from reports.views.numbers import bound, formatted, step, subject, word
+from scenarios.text import counted
 
 Row = Mapping[Hashable, Any]
 MOST_NAMES = 4

@@ -1,6 +1,7 @@
 """The findings of a run as counts and sentences, for terminal, HTML and Markdown."""
 
 import math
+import statistics
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,8 +14,10 @@ from comparisons.judging.convergence import ARTEFACTS, JUMPING
 from comparisons.judging.error_budget import is_sufficient
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, SEVERITY
 from comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
+from comparisons.running.measured import UNDECIDED_BY_STARTS
 from reports.views.leading_errors import step_times
-from reports.views.numbers import counted, duration, failing, formatted, in_ms, quantity
+from reports.views.numbers import duration, failing, formatted, in_ms, quantity
+from scenarios.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,7 +27,7 @@ CONVERGING = frozenset({"passed", "measured", "no_truth"})
 MOST_NAMED = 3
 """Scenes, metrics or engines that a sentence names; of more it has the number."""
 SAME_SIZE = 0.999
-"""Errors count as equal above this share of the largest one."""
+"""Errors count as equal from this share of the largest one on."""
 ENGINE_NAMES = {"document": "document (Wang's method)"}
 """Descriptive names of engines, by label, where the label is not descriptive."""
 
@@ -108,11 +111,12 @@ class ProfileComparison:
     @property
     def clause(self) -> str:
         """The comparison as a clause that follows the engine's name."""
-        parts = sorted(row["part"] for row in self.rows)
-        half = parts[len(parts) // 2]
+        parts = [row["part"] for row in self.rows]
+        most = sum(part > 0.5 for part in parts)
+        are = "is mostly a setting error" if most == 1 else "are mostly setting errors"
         return (
-            f"{sum(part > 0.5 for part in parts)} of its {len(parts)} errors above {NEGLIGIBLE:g} at the finest time step "
-            f"are mostly setting errors (median share {100 * half:.1f} %)"
+            f"{most} of its {counted(len(parts), 'error')} above {NEGLIGIBLE:g} at the finest time step {are} "
+            f"(median share {100 * statistics.median(parts):.1f} %)"
         )
 
     @property
@@ -166,8 +170,12 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
         return f"{counted(tally.broken, 'engine run')} broke down{judgement}{_known(tally)}."
     if tally.failed:
         return f"{failing(tally.failed, judged, 'check')}{_known(tally)}."
-    if judged == 0 and tally.known:
+    if judged == 0 and (tally.known or tally.limited):
         return f"No check passes or fails{_known(tally)}."
+    if judged == 0 and results.measurements.empty:
+        return "No check was made, because no scene was simulated."
+    if judged == 0 and results.table["reason"].str.startswith(UNDECIDED_BY_STARTS).any():
+        return "No check is decided by the few starts of a quick run."
     if judged == 0:
         set_at_all = any(scene.expect for scene in results.scenes.values())
         none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
@@ -255,7 +263,7 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
     sizes = np.array(relative_sizes(errors, results.scenes))
     first = errors.to_dict("records")[int(np.argmax(sizes))]
     similar = errors["value"].abs().between(SAME_SIZE * abs(first["value"]), abs(first["value"]) / SAME_SIZE)
-    equal = errors[(errors["metric"] == first["metric"]) & (sizes > SAME_SIZE * sizes.max()) & similar]
+    equal = errors[(errors["metric"] == first["metric"]) & (sizes >= SAME_SIZE * sizes.max()) & similar]
     of = "" if first["unit"] == "1" else f" {first['unit']}"
     names = _named(list(equal["scene"].unique()), "scene")
     return f"; largest error {quantity(first['metric'])} {formatted(abs(first['value']))}{of} at dt = {in_ms(first['dt'])} in {names}"

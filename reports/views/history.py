@@ -2,6 +2,7 @@
 
 from comparisons.regressions.history import History, Move
 from reports.views.numbers import formatted, subject
+from scenarios.text import counted
 
 MOST_RESULTS = 6
 """Largest number of results listed for one run; the table in the file has all of them."""
@@ -24,12 +25,12 @@ def listed(found: History) -> list[str]:
 def sentences(found: History) -> list[str]:
     """The cause to which the changes in each run are attributed."""
     moved = [
-        f"{move.engine}: {len(move.results):,} results changed in {found.names[move.run]}, after {found.names[move.before]}. "
+        f"{move.engine}: {counted(len(move.results), 'result')} changed in {found.names[move.run]}, after {found.names[move.before]}. "
         f"{move.attribution.message[0].upper()}{move.attribution.message[1:]}."
         for move in found.moves
     ]
     scenes = found.results["scene"].nunique()
-    return moved or [f"No result changed in {len(found.names)} runs of {scenes} scenes."]
+    return moved or [f"No result changed in {counted(len(found.names), 'run')} of {counted(scenes, 'scene')}."]
 
 
 def _of_move(found: History, move: Move) -> list[dict[str, str]]:

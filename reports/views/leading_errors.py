@@ -71,4 +71,6 @@ def level(error: float) -> int | None:
     """The decade of a relative error, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1)."""
     if math.isnan(error):
         return None
+    if error > 0.1:  # it may be infinite
+        return 8
     return 0 if error <= 1e-8 else min(8, 8 + math.ceil(math.log10(error) - 1e-9))

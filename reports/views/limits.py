@@ -10,6 +10,8 @@ import numpy as np
 from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.scan import AxisScan, ScanPoint
 from comparisons.robustness.study import RobustnessStudy
+from reports.views.numbers import left_out
+from scenarios.text import rounded
 
 ACCURATE_AND_STABLE = "Accurate: sound at every smaller tested time step. Stable: there, errors beyond the tolerance are the only failures."
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
@@ -68,7 +70,7 @@ def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
 
 
 def _step(dt: float) -> str:
-    return f"{1e3 * dt:.3g} ms" if dt < 1.0 else f"{dt:.3g} s"
+    return f"{rounded(1e3 * dt, 3)} ms" if dt < 0.9995 else f"{rounded(dt, 3)} s"
 
 
 def _mode(point: ScanPoint) -> str:
@@ -93,6 +95,9 @@ def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
         return {"sound from": "–", "to": "–", "beyond": beyond}
     first, last = sound
     outside = [f"{_mode(points[number])} at {points[number].value:.4g}" for number in (first - 1, last + 1) if 0 <= number < len(points)]
+    if scan.axis.invariant and nominal:
+        same = f"{nominal} at the nominal value; the same motion from {points[first].value:.4g} to {points[last].value:.4g}"
+        return {"sound from": "–", "to": "–", "beyond": "; ".join([same, *outside])}
     if not outside:
         outside = [f"not tested; {'the same motion' if scan.axis.invariant else 'sound'} at all {len(points)} tested values"]
     elif len(outside) == 1:
@@ -103,9 +108,7 @@ def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
 def sentences(found: RobustnessStudy) -> list[str]:
     """Sentences on engines that are not sound at the nominal values, with their errors, and on engines left out."""
     failing = [(engine, points) for engine, points in found.refinements.items() if points[0].mode != "sound"]
-    return [_refinement(engine, points) for engine, points in failing] + [
-        f"Left out: {engine}, {why}." for engine, why in found.left_out.items()
-    ]
+    return [_refinement(engine, points) for engine, points in failing] + left_out(found.left_out)
 
 
 def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:

@@ -70,7 +70,7 @@ def _shown(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str
     found = [scene for scene, by_engine in statuses.items() if any(map(_is_finding, by_engine.values()))]
     worst = sorted(found, key=lambda scene: min(SEVERITY.index(status.verdict) for status in statuses[scene].values()))[:MOST_SCENES]
     fine, more = len(statuses) - len(found), len(found) - len(worst)
-    left_out = [f"{fine} in which every engine converges or declines"] * bool(fine) + [f"{more} with less severe findings"] * bool(more)
+    left_out = [f"{fine} in which no engine has a finding"] * bool(fine) + [f"{more} with less severe findings"] * bool(more)
     return [scene for scene in statuses if scene in worst], f"Scenes not shown: {', '.join(left_out)}."
 
 

@@ -1,10 +1,12 @@
 """The format of numbers, bounds and verdicts in all output."""
 
 import math
+from collections.abc import Mapping
 from functools import cache
 
 from comparisons.judging.verdicts import WORDS
 from comparisons.measuring.symmetries import kind_of
+from scenarios.text import counted, rounded
 
 
 def formatted(value: float) -> str:
@@ -41,18 +43,19 @@ def quantity(metric: str) -> str:
 def duration(seconds: float) -> str:
     """A time in s, ms, µs or ns, to three significant digits."""
     units = ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns"))
+    seconds = float(f"{seconds:.3g}")
     scale, unit = next((scale, unit) for scale, unit in units if seconds * scale >= 1.0 or unit == "ns")
-    return f"{seconds * scale:.3g} {unit}"
-
-
-def counted(count: int, singular: str, plural: str = "") -> str:
-    """A number of things, such as 1 scene or 2 scenes."""
-    return f"{count:,} {singular if count == 1 else plural or f'{singular}s'}"
+    return f"{rounded(seconds * scale, 3)} {unit}"
 
 
 def failing(count: int, total: int, what: str) -> str:
     """How many of some things fail, such as 1 of 2 checks fails."""
     return f"{count:,} of {counted(total, what)} {'fails' if count == 1 else 'fail'}"
+
+
+def left_out(reasons: Mapping[str, str]) -> list[str]:
+    """A sentence for each engine that is left out of a study; a reason may be a sentence that begins with the engine's name."""
+    return [f"Left out: {'' if why.startswith(label) else f'{label}, '}{why.removesuffix('.')}." for label, why in reasons.items()]
 
 
 def step(dt: float) -> str:

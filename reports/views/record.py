@@ -136,7 +136,8 @@ def summary(release: Release, label: str, dt: float) -> list[str]:
     groups: dict[str, list[str]] = {words: [] for words in GROUPS}
     for scene, case in release.at(label, dt).items():
         found = digits(relative_error(case, scene))
-        groups.setdefault(next((words for words, least in GROUPS.items() if found >= least), word(case.verdict)), []).append(scene)
+        without = "too coarse" if case.verdict == "measured" else word(case.verdict)  # as in `cell`
+        groups.setdefault(next((words for words, least in GROUPS.items() if found >= least), without), []).append(scene)
     return [f"{words}: {', '.join(scenes)}" for words, scenes in groups.items() if scenes]
 
 

@@ -10,6 +10,7 @@ from typing import Any, get_args
 from comparisons.judging.verdicts import BREAKDOWNS
 from comparisons.published.results import Result, Status
 from comparisons.published.sources import Source
+from scenarios.text import counted
 
 COLUMNS = tuple(field.name for field in fields(Result))
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -72,8 +73,9 @@ def verdict(results: Sequence[Result]) -> str:
     """Whether everything that is claimed to be reproducible is."""
     counts = Counter(one.status for one in results)
     claimed = counts["reproduced"] + counts["differs"]
-    not_run = f"; {counts['not run']} were not run" if counts["not run"] else ""
-    return f"{counts['reproduced']} of {claimed} values are reproduced; {counts['differs']} differ{not_run}."
+    not_run = f"; {counted(counts['not run'], 'was', 'were')} not run" if counts["not run"] else ""
+    reproduced = f"{counts['reproduced']} of {counted(claimed, 'value')} {'is' if counts['reproduced'] == 1 else 'are'} reproduced"
+    return f"{reproduced}; {counted(counts['differs'], 'differs', 'differ')}{not_run}."
 
 
 def exit_code(results: Sequence[Result]) -> int:

@@ -7,6 +7,7 @@ from comparisons.measuring.metrics import METRICS
 from comparisons.record.findings import Case, leading
 from comparisons.record.rerun import Again
 from reports.views.numbers import in_ms, quantity, unit, word
+from scenarios.text import counted
 
 
 def table(found: Again, scene: str) -> list[dict[str, str]]:
@@ -37,9 +38,10 @@ def sentences(found: Again) -> list[str]:
         if was.verdict != "measured" and was.reason != now.reason:
             reasons.append(f"In the record {word(was.verdict)}: {was.reason}.")
         if now.verdict != "measured":
-            reasons.append(f"{word(now.verdict).capitalize()}: {now.reason}.")
+            reasons.append(f"{word(now.verdict).capitalize()}: {now.reason or 'the plan no longer has this time step'}.")
     moved, count = len(found.moved), len(found.cases)
-    result = f"{moved} of {count} results differ from the record." if moved else "Every result is that of the record, bit for bit."
+    differ = f"{moved} of {counted(count, 'result')} {'differs' if moved == 1 else 'differ'} from the record."
+    result = differ if moved else "Every result is that of the record, bit for bit."
     others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in found.differing.items())
     surroundings = f"Not as in the record: {others}." if others else "Adapter, versions and machine are those of the record."
     return [*dict.fromkeys(reasons), result, surroundings]

@@ -18,7 +18,7 @@ from reports.views.findings import (
     profile_comparisons,
     verdict_sentence,
 )
-from reports.views.numbers import counted
+from scenarios.text import counted
 
 
 @dataclass(frozen=True)

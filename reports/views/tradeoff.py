@@ -8,8 +8,9 @@ import numpy as np
 
 from comparisons.measuring.metrics import METRICS
 from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import CostPoint, TradeOff
-from reports.views.numbers import duration, formatted
+from comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff
+from reports.views.numbers import duration, formatted, left_out
+from scenarios.text import rounded
 
 
 def columns(found: Sequence[TradeOff]) -> list[str]:
@@ -102,7 +103,7 @@ def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
         *(_recommendation(found, tolerance) for tolerance in within),
         *_memory(found),
         *(f"No smaller time step was tried because {reason}: {', '.join(labels)}." for reason, labels in ended.items()),
-        *(f"Left out: {label}, {why}." for label, why in found.left_out.items()),
+        *left_out(found.left_out),
     ]
 
 
@@ -115,6 +116,12 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         nearest = min(found.points, key=lambda point: point.error)
         ladder = next(one for one in found.ladders if one.engine == nearest.engine)
         last = ladder.steps[-1][0]
+        if nearest.error <= tolerance:
+            return (
+                f"{goal}: no configuration is within it at its time step and at all smaller ones; {_named(nearest)} has "
+                f"{formatted(nearest.error)}{unit}, but more at smaller time steps; its ladder of time steps ended at {_step(last)} "
+                f"because {_reason(ladder)}."
+            )
         where = "where its ladder of time steps ended" if nearest.dt == last else f"and its ladder of time steps ended at {_step(last)}"
         return (
             f"{goal}: no tested configuration reaches it; the most accurate is {_named(nearest)} with {formatted(nearest.error)}{unit}, "
@@ -122,7 +129,9 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
         )
     sentence = f"{goal}: {_named(advice.best)}, {duration(advice.best.typical_cost)} per simulated second"
     if advice.next_best is None:
-        sentence += "; no other engine reaches it."
+        sentence += "; no other engine reaches it." if len(found.ladders) > 1 else "."
+    elif advice.level and advice.ratio >= LEVEL:
+        sentence += f"; {_named(advice.next_best)} takes {advice.ratio:.1f} times that, but less in a quarter of the rounds."
     elif advice.level:
         sentence += f"; {_named(advice.next_best)} takes about as long, {advice.ratio:.2f} times that."
     else:
@@ -138,7 +147,7 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
 
 def _memory(found: TradeOff) -> list[str]:
     """A sentence with the memory per world of each engine, where it was measured."""
-    memory = ", ".join(f"{label} {value / 1e3:.2g} kB" for label, value in found.memory_per_world.items())
+    memory = ", ".join(f"{label} {rounded(value / 1e3, 2)} kB" for label, value in found.memory_per_world.items())
     return [f"Memory per world in a batch of {found.worlds[-1]}: {memory}."] if memory else []
 
 

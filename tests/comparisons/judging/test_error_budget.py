@@ -146,15 +146,26 @@ def test_errors_within_the_noise_are_not_attributed():
     assert "sampling noise" in found.reason
 
 
+def test_finest_error_within_the_noise_is_not_called_rounding():
+    found = error_budget(H, [0.1, 0.05, 1e-3], resolution=2e-3, rounding=1e-8)
+    assert found.cause == "unresolved"
+    assert found.reason.startswith("within the sampling noise at the finest time step, but not at coarser ones")
+
+
 @pytest.mark.parametrize(
-    ("errors", "h", "usable"),
-    [([0.1, 0.05], [2e-3, 1e-3], 2), ([0.1, 0.09, 0.08], [2e-3, 1.9e-3, 1.8e-3], 3), ([math.nan, 0.1, 0.05], H, 2)],
+    ("errors", "h", "reason"),
+    [
+        ([0.1, 0.05], [2e-3, 1e-3], "only 2 of 2 time steps are usable"),
+        ([0.1, 0.09, 0.08], [2e-3, 1.9e-3, 1.8e-3], "3 of 3 time steps are usable and span a factor of 1.11"),
+        ([math.nan, 0.1, 0.05], H, "only 2 of 3 time steps are usable"),
+        ([0.1], [1e-3], "only 1 of 1 time step is usable"),
+    ],
 )
-def test_too_few_steps_are_unresolved(errors, h, usable):
+def test_too_few_steps_are_unresolved(errors, h, reason):
     """Two steps, a range below four, an undefined error: the reason counts what is usable, and nothing is stated."""
     found = error_budget(h, errors)
     assert found.cause == "unresolved"
-    assert found.reason.startswith(f"only {usable} of {len(h)} time steps are usable")
+    assert found.reason == f"{reason}; extrapolation needs three that span a factor of four"
     assert math.isnan(found.asymptotic_error)
 
 

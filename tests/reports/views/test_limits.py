@@ -60,7 +60,8 @@ def test_sound_range_around_the_nominal_value():
     """Both ways from the scene's nominal value, as far as every point is sound; none if the nominal value is not."""
     found = scan("a", ["sound", "inaccurate", "sound", "sound", "sound", "clamped", "sound"])
     masses = scan("a", ["sound"] * 4, "mass"), scan("b", ["sound"] * 4, "mass")
-    scans = (replace(found, base=1e3), replace(found, base=10.0), scan("a", ["sound"] * 4), *masses)
+    changing = scan("b", ["sound", "sound", "inaccurate"], "mass")
+    scans = (replace(found, base=1e3), replace(found, base=10.0), scan("a", ["sound"] * 4), *masses, changing)
     study = RobustnessStudy(SPIN, 5e-3, 0.1, scans, {}, {"b": (points_of("inaccurate"),)})
     assert [(row["sound from"], row["to"], row["beyond"]) for row in limits.range_rows(study)] == [
         ("100", "1e+04", "inaccurate at 10; clamped at 1e+05"),
@@ -68,6 +69,7 @@ def test_sound_range_around_the_nominal_value():
         ("1", "1000", "not tested; sound at all 4 tested values"),
         ("1", "1000", "not tested; the same motion at all 4 tested values"),
         ("–", "–", "inaccurate at the nominal value; the same motion at all 4 tested values"),
+        ("–", "–", "inaccurate at the nominal value; the same motion from 1 to 10; inaccurate at 100"),
     ]
 
 

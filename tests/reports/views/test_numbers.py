@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from reports.views.numbers import formatted
+from reports.views.leading_errors import level
+from reports.views.numbers import duration, failing, formatted, left_out
 
 
 @pytest.mark.parametrize(
@@ -27,3 +28,27 @@ from reports.views.numbers import formatted
 def test_three_significant_digits(value, text):
     """Also where the last ones are zero, so that the numbers of a column have the same precision."""
     assert formatted(value) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.9997, "1 s"), (0.123456, "123 ms"), (1234.0, "1230 s"), (9.999e-7, "1 µs"), (3e-8, "30 ns"), (1.5, "1.5 s"), (0.0, "0 ns")],
+)
+def test_durations_have_no_exponent(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_sizes_of_errors_that_are_infinite_have_the_largest_level():
+    assert [level(error) for error in (0.0, 1e-8, 2e-8, 0.1, 0.11, math.inf, math.nan)] == [0, 0, 1, 7, 8, 8, None]
+
+
+def test_counts_and_reasons_are_sentences():
+    assert [failing(*counts, "check") for counts in ((1, 1), (1, 2), (2, 1200))] == [
+        "1 of 1 check fails",
+        "1 of 2 checks fails",
+        "2 of 1,200 checks fail",
+    ]
+    assert left_out({"rapier": "rapier is not installed: pip install x.", "a": "diverged"}) == [
+        "Left out: rapier is not installed: pip install x.",
+        "Left out: a, diverged.",
+    ]

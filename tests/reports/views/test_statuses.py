@@ -1,5 +1,6 @@
 """One status for each engine in each scene, and known faults in every count."""
 
+import numpy as np
 import pytest
 from support import engines as made
 
@@ -30,6 +31,24 @@ def test_engine_has_one_status_in_a_scene(core, scene, engine, verdict, words):
 def test_failure_is_the_status_of_its_scene():
     results = ds.run("spin-principal", made.engine_with("drifting", made.turned_by(0.1)))
     assert overview(results).statuses["spin-principal"]["drifting"] == ("failed", "failed")
+
+
+def test_run_in_which_nothing_was_simulated_says_so():
+    class Declining(made.Exact):
+        name = "declining"
+
+        def declines(self, scene):
+            return "no"
+
+    assert overview(ds.run("spin-principal", Declining())).verdict == "No check was made, because no scene was simulated."
+
+
+def test_error_that_overflows_is_reported(tmp_path):
+    """Finite states, whose energy is infinite."""
+    faster = np.repeat([1.0, 1e200], [10, 3])
+    results = ds.run("spin-principal", made.engine_with("fast", lambda state, time: state * faster))
+    assert any("largest error energy inf at dt = 1 ms in spin-principal" in sentence for sentence in overview(results).findings)
+    assert ds.write_report(results, tmp_path / "run").is_file()
 
 
 def test_known_faults_are_counted_apart_and_in_the_headline(core):

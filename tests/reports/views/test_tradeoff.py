@@ -69,6 +69,24 @@ def test_ladders_are_listed_with_their_ends_and_reasons(found):
 
 def test_only_engine_within_a_tolerance_is_compared_with_tested_ones(found):
     assert "; no other engine reaches it." in tradeoff.sentences(found, [4.5e-3])[0]
+    alone = TradeOff(found.scene, found.metric, found.points[-2:], found.ladders[2:3])
+    assert ": accurate at 10 ms, 100 µs per simulated second. In a batch" in tradeoff.sentences(alone, [4.5e-3])[0]
+
+
+def test_error_that_is_small_at_a_coarse_step_alone_is_no_recommendation(found):
+    """Where it crosses 0."""
+    crossing = Ladder("accurate", ((0.033, 5e-4), (0.01, 3e-3)), "budget", SPENT)
+    points = tuple(CostPoint("accurate", dt, error, np.full(3, 1e-6 / dt), {}) for dt, error in crossing.steps)
+    [sentence] = tradeoff.sentences(TradeOff(found.scene, found.metric, points, (crossing,)), [1e-3])[:1]
+    assert "no configuration is within it at its time step and at all smaller ones; accurate at 33 ms has 5.00e-04 rad" in sentence
+
+
+def test_slower_engine_that_is_faster_in_some_rounds_is_said_to_be(found):
+    rounds = {"accurate": np.ones(5), "other": np.array([0.9, 0.9, 2.0, 2.0, 2.0])}
+    ladders = tuple(Ladder(engine, ((0.01, 1e-3),), "budget", SPENT) for engine in rounds)
+    points = tuple(CostPoint(engine, 0.01, 1e-3, cost, {}) for engine, cost in rounds.items())
+    sentence = tradeoff.sentences(TradeOff(found.scene, found.metric, points, ladders), [1e-2])[0]
+    assert sentence.endswith("; other at 10 ms takes 2.0 times that, but less in a quarter of the rounds.")
 
 
 def test_every_engine_has_a_row_with_its_place(found):

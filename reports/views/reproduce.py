@@ -74,7 +74,8 @@ def verdict(results: Sequence[Result]) -> str:
     counts = Counter(one.status for one in results)
     claimed = counts["reproduced"] + counts["differs"]
     not_run = f"; {counted(counts['not run'], 'was', 'were')} not run" if counts["not run"] else ""
-    reproduced = f"{counts['reproduced']} of {counted(claimed, 'value')} {'is' if counts['reproduced'] == 1 else 'are'} reproduced"
+    are = "is" if 1 in (counts["reproduced"], claimed) else "are"
+    reproduced = f"{counts['reproduced']} of {counted(claimed, 'value')} {are} reproduced"
     return f"{reproduced}; {counted(counts['differs'], 'differs', 'differ')}{not_run}."
 
 

@@ -50,9 +50,9 @@ def test_json_has_every_value(tmp_path):
 @pytest.mark.parametrize(
     ("status", "verdict", "code", "words"),
     [
-        ("differs", "", 1, "0 of 1 values are reproduced; 1 differ."),
-        ("not run", "crashed", 3, "0 of 0 values are reproduced; 0 differ; 1 were not run."),
-        ("not run", "missing", 0, "0 of 0 values are reproduced; 0 differ; 1 were not run."),
+        ("differs", "", 1, "0 of 1 value is reproduced; 1 differs."),
+        ("not run", "crashed", 3, "0 of 0 values are reproduced; 0 differ; 1 was not run."),
+        ("not run", "missing", 0, "0 of 0 values are reproduced; 0 differ; 1 was not run."),
     ],
 )
 def test_exit_codes(status, verdict, code, words, tmp_path, monkeypatch):

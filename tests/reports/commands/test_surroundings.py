@@ -131,7 +131,7 @@ def test_run_is_resumed_with_scenes_of_the_same_adapter_only(tmp_path):
     command = ("run", "ball.toml", "later.toml", "-j1", "-e", "stopping:Mine", "--dt", "0.01", "-o", "out")
     done = spawn(*command, cwd=tmp_path)
     assert done.returncode == 130
-    assert "1 of 2 scenes are kept" in done.stderr
+    assert "1 of 2 scenes is kept" in done.stderr
     (tmp_path / "stopping.py").write_text(texts["stopping.py"])
     done = spawn(*command, "--resume", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

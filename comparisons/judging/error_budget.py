@@ -10,8 +10,9 @@ interval; docs/coverage.md counts how often the interval contains the true value
     rounding         no error is larger than rounding
     unresolved       all other cases: the time steps do not determine the cause
 
-The interval excludes 0 if the cause is `model`, and contains 0 otherwise. It is computed as if the asymptotic error were not 0; so if the
-cause is `discretisation`, it may extend beyond the allowed error.
+The interval excludes 0 if the cause is `model`, and contains 0 otherwise. It is computed as if the asymptotic error were not 0. That of a
+discretisation error with a sign ends at the allowed error, or at half of it if the probability of more is below 5 %. That an error vanishes
+is said only if its interval ends before half of the error at the finest time step.
 """
 
 from __future__ import annotations  # help() then shows ArrayLike, not all that it stands for
@@ -24,17 +25,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.judging.extrapolation import ORDERS, Posterior, extrapolate
+from comparisons.judging.series import (
+    ABOVE_NOISE,
+    FEWEST_TIME_STEPS,
+    SMALLEST_RATIO,
+    fitted_order,
+    is_clear_power,
+    most_informative,
+    start_of_finest,
+    verified,
+    verify_options,
+)
 from comparisons.judging.verdicts import Cause
-from scenarios import DropspinError
 from scenarios.text import counted
 
 Array = NDArray[np.float64]
 
-FEWEST_TIME_STEPS = 3
-MOST_TIME_STEPS = 5
-"""Largest number of time steps used; coarser ones contain little information about dt → 0."""
-SMALLEST_RATIO = 3.99
-"""Extrapolation needs three time steps that span a factor of four."""
 SHARE_OF_COARSEST = 1.0 / 64.0
 """Factor by which an error of third order falls over three halved time steps."""
 LARGEST_SHARE_OF_COARSEST = 0.5
@@ -48,10 +54,12 @@ steps.
 """
 LARGER_THAN_HALF = 0.25
 """Largest probability of an asymptotic error larger than half of the allowed one, if a discretisation error is stated."""
-ABOVE_NOISE = 3.0
-"""An order is fitted to errors larger than this multiple of their noise."""
-SAME_SLOPE = 0.5
-"""Slopes between neighbouring time steps that differ by less than this count as one power of the time step."""
+FAR = 1e100
+"""Larger than every asymptotic error in units of the largest error, noise or rounding."""
+WIDEST_ORDER = 2.0
+"""An order with a wider interval is not stated: the interval would contain three whole numbers."""
+
+SLOW = f"changes more slowly than dt^{ORDERS[0]:g}, too slowly to be extrapolated; much finer time steps are needed"
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,7 @@ class ErrorBudget:
         upper: Upper end of the 95 % interval of the asymptotic error.
         order: Observed order of convergence, fitted to the errors without the asymptotic error; NaN where there is none.
         order_lower: Lower end of the order's 95 % interval.
-        order_upper: Upper end of the order's 95 % interval.
+        order_upper: Upper end of the order's 95 % interval. Where the interval is wider than 2, the time steps do not determine the order.
         dts: The time steps to which the order was fitted [s], coarsest first.
     """
 
@@ -86,14 +94,22 @@ class ErrorBudget:
             return f"{cause}{self.reason}."
         why = f"{self.reason}; " if self.cause == "unresolved" else ""
         value = f"the asymptotic error is {self.asymptotic_error:.3g} (95 % interval {self.lower:.3g} to {self.upper:.3g})"
-        has_no_order = math.isnan(self.order)
-        order = "" if has_no_order else f", the order {self.order:.2f} ({self.order_lower:.2f} to {self.order_upper:.2f})"
-        return f"{cause}{why}{value}{order}."
+        interval = f"{self.order_lower:.2f} to {self.order_upper:.2f}"
+        if math.isnan(self.order):
+            return f"{cause}{why}{value}."
+        if not is_determined(self.order_lower, self.order_upper):
+            return f"{cause}{why}{value}; the order, {interval}, is not determined."
+        return f"{cause}{why}{value}, the order {self.order:.2f} ({interval})."
 
 
 def is_sufficient(dts: Sequence[float]) -> bool:
     """Whether time steps suffice for extrapolation, which needs three that span a factor of four."""
     return len(dts) >= FEWEST_TIME_STEPS and max(dts) / min(dts) >= SMALLEST_RATIO
+
+
+def is_determined(order_lower: float, order_upper: float) -> bool:
+    """Whether the interval of an order is so narrow that the order is worth stating."""
+    return order_upper - order_lower <= WIDEST_ORDER
 
 
 def error_budget(
@@ -110,7 +126,8 @@ def error_budget(
     """Estimate the asymptotic value, the order and the cause of one error.
 
     Args:
-        dts: Time steps [s], shape (n,), in any order. The five finest usable ones are used.
+        dts: Time steps [s], shape (n,), in any order. Of more than five usable ones, five are used: the finest, unless these span less
+            than a factor of 16; then those that are spaced most evenly.
         errors: The error at each time step, shape (n,), in any unit, with its sign if it has one; NaN if the time step was too coarse to
             resolve it.
         claimed_order: The order of accuracy claimed for the method; None or inf if there is none.
@@ -125,30 +142,38 @@ def error_budget(
         The cause, the asymptotic error and the order, each with its 95 % interval.
 
     Raises:
-        DropspinError: The time steps or the errors are invalid.
+        DropspinError: An argument is invalid.
     """
-    h, e = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (dts, errors))
-    _verify(h, e, signed)
-    noise, floor = (np.broadcast_to(np.asarray(values, dtype=float), h.shape) for values in (resolution, rounding))
+    h, e, noise, floor = verified(dts, errors, resolution, rounding)
+    verify_options(e, claimed_order, signed, negligible, judged_together)
     coarsest_first = np.argsort(-h)
-    usable = coarsest_first[np.isfinite(e[coarsest_first])][-MOST_TIME_STEPS:]
-    h, e, noise, floor = h[usable], e[usable], noise[usable], floor[usable]
-    if not is_sufficient(list(h)):
-        span = f" span a factor of {h.max() / h.min():.3g}" if len(h) > 2 else ""
-        usable_steps = f"{'' if span else 'only '}{len(usable)} of {counted(len(coarsest_first), 'time step is', 'time steps are')} usable"
-        needed = "extrapolation needs three that span a factor of four"
-        return ErrorBudget("unresolved", f"{usable_steps}{' and' if span else ''}{span}; {needed}")
+    usable = coarsest_first[np.isfinite(e[coarsest_first])]
+    if not is_sufficient(list(h[usable])):
+        return ErrorBudget("unresolved", _why_insufficient(h[usable], len(h)))
+    used = usable[most_informative(h[usable])]
+    h, e, noise, floor = h[used], e[used], noise[used], floor[used]
     if (np.abs(e) <= floor).all():
-        value, reach = float(e[-1]), float(floor[-1])
-        return ErrorBudget("rounding", "within rounding at every time step", value, value - reach, value + reach)
+        if not is_clear_power(h, e):
+            value, reach = float(e[-1]), float(floor[-1])
+            return ErrorBudget("rounding", "within rounding at every time step", value, value - reach, value + reach)
+        floor = np.zeros_like(floor)
+    # In a unit that is a power of two no digit changes, and the squares of all numbers are finite.
+    unit = 2.0 ** (math.frexp(float(np.max(np.abs([e, noise, floor]))))[1] - 1)
+    e, noise, floor, negligible = e / unit, noise / unit, floor / unit, min(max(negligible, float(floor[-1])) / unit, FAR)
     small = np.hypot(noise, floor)
     found = extrapolate(h, e, small, claimed_order, signed=signed)
-    cause, median, lower, upper = _attributed(e, found, max(negligible, float(floor[-1])), float(noise[-1]), judged_together)
-    order, fitted = _fitted_order(h, e, 0.0 if cause == "discretisation" else median, small)
-    if cause == "unresolved" or math.isnan(order):
-        return ErrorBudget(cause, _reason(cause, e, small, float(floor[-1]), order), median, lower, upper)
-    orders = min(found.order_lower, order), max(found.order_upper, order)
-    return ErrorBudget(cause, _reason(cause, e, small, float(floor[-1]), order), median, lower, upper, order, *orders, fitted)
+    cause, limit = _attributed(h, e, found, negligible, float(noise[-1]), judged_together)
+    order, fitted = fitted_order(h, e if cause == "discretisation" else e - limit[0], small)
+    is_slow = cause == "model" and order < ORDERS[0] and max(limit[1], -limit[2]) < abs(float(e[-1]) - limit[0])
+    if is_slow:
+        cause, limit = "unresolved", (limit[0], min(limit[1], 0.0), max(limit[2], 0.0))
+    in_units = unit * limit[0], unit * limit[1], unit * limit[2]
+    if cause == "unresolved":
+        return ErrorBudget(cause, SLOW if is_slow else _why_unresolved(e, noise, floor), *in_units)
+    has_order = not math.isnan(order)
+    orders = (min(found.order_lower, order), max(found.order_upper, order)) if has_order else (math.nan, math.nan)
+    power = f" as dt^{order:.2f} ({orders[0]:.2f} to {orders[1]:.2f})" if is_determined(*orders) else ""
+    return ErrorBudget(cause, _trend(cause, e, limit, power, negligible, unit), *in_units, order, *orders, fitted)
 
 
 def vector_budget(
@@ -183,18 +208,11 @@ def vector_budget(
     return replace(most, cause=cause, asymptotic_error=length, lower=nearest, upper=farthest)
 
 
-def _verify(h: Array, e: Array, signed: bool) -> None:
-    if h.ndim != 1 or h.shape != e.shape:
-        raise DropspinError(f"an error budget takes one error for each time step; got {h.shape} time steps and {e.shape} errors.")
-    if not ((h > 0.0) & np.isfinite(h)).all() or len(np.unique(h)) < len(h):
-        raise DropspinError(f"time steps must be positive and different; got {', '.join(f'{step:g}' for step in h)}.")
-    if not signed and (e < 0.0).any():
-        raise DropspinError(f"an error without a sign cannot be negative; got {float(np.nanmin(e)):g}. Pass signed=True if it has a sign.")
-
-
-def _attributed(e: Array, found: Posterior, floor: float, noise: float, judged_together: int) -> tuple[Cause, float, float, float]:
+def _attributed(
+    h: Array, e: Array, found: Posterior, floor: float, noise: float, judged_together: int
+) -> tuple[Cause, tuple[float, float, float]]:
     """The cause that the posterior of the asymptotic error implies, with the median and the interval; errors coarsest first."""
-    coarsest, finest = float(np.min(np.abs(e[[0, -FEWEST_TIME_STEPS]]))), abs(float(e[-1]))
+    coarsest, finest = float(np.min(np.abs(e[[0, start_of_finest(h)]]))), abs(float(e[-1]))
     large = max(LARGEST_SHARE_OF_COARSEST * coarsest, floor)
     allowed = min(max(finest, SHARE_OF_COARSEST * coarsest, floor), large)
     above, below = found.beyond(floor)
@@ -203,42 +221,46 @@ def _attributed(e: Array, found: Posterior, floor: float, noise: float, judged_t
         upper = max(upper, finest)
     if max(above, below) > 1.0 - MODEL_RISK / judged_together:
         lower, upper = (lower, min(upper, -floor)) if found.has_sign and below > above else (max(lower, floor), upper)
-        return "model", median, lower, upper
+        return "model", (median, lower, upper)
     lower, upper = min(lower, 0.0), max(upper, 0.0)
     risks = ((allowed, DISCRETISATION_RISK), (0.5 * allowed, LARGER_THAN_HALF), (large, LARGE_RISK))
     is_small = all(sum(found.beyond(reach)) < risk for reach, risk in risks)
     if not is_small or allowed < noise:
-        return "unresolved", median, lower, upper
-    return "discretisation", median, lower, upper
+        return "unresolved", (median, lower, upper)
+    if not found.has_sign:
+        return "discretisation", (median, lower, upper)
+    reach = 0.5 * allowed if sum(found.beyond(0.5 * allowed)) < DISCRETISATION_RISK else allowed
+    return "discretisation", (min(max(median, -reach), reach), max(lower, -reach), min(upper, reach))
 
 
-def _fitted_order(h: Array, e: Array, limit: float, small: Array) -> tuple[float, tuple[float, ...]]:
-    """The slope of the error without the asymptotic error, over the three finest steps above the noise, and these steps.
-
-    Errors that noise or rounding could have caused do not count as noise if they follow a power of the time step.
-    """
-    rest = e - limit
-    clear = np.flatnonzero(np.abs(rest) > ABOVE_NOISE * small)[-FEWEST_TIME_STEPS:]
-    if len(clear) < 2 and (rest != 0.0).all():
-        slopes = np.diff(np.log(np.abs(rest))) / np.diff(np.log(h))
-        clear = np.arange(len(h) - FEWEST_TIME_STEPS, len(h)) if np.ptp(slopes) < SAME_SLOPE and np.min(slopes) > 0.0 else clear
-    if len(clear) < 2 or abs(np.sign(rest[clear]).sum()) < len(clear):
-        return math.nan, ()
-    slope = float(np.polyfit(np.log(h[clear]), np.log(np.abs(rest[clear])), 1)[0])
-    return (slope, tuple(float(step) for step in h[clear])) if slope > 0.5 * ORDERS[0] else (math.nan, ())
-
-
-def _reason(cause: Cause, e: Array, small: Array, floor: float, order: float) -> str:
+def _trend(cause: Cause, e: Array, limit: Sequence[float], power: str, floor: float, unit: float) -> str:
+    """How an error with a known cause depends on the time step; the errors and their limit are in multiples of the unit."""
     if cause == "model":
-        return "approaches a value other than 0" + ("" if math.isnan(order) else f" as dt^{order:.2f}")
-    if cause == "discretisation":
-        return "vanishes as dt → 0" if math.isnan(order) else f"vanishes as dt^{order:.2f}"
+        return f"approaches a value other than 0{power}"
+    reach = max(-limit[1], limit[2])
+    if reach < 0.5 * abs(float(e[-1])):
+        return f"vanishes{power or ' as dt → 0'}"
+    if reach <= floor:
+        return f"at most {unit * reach:.2g} remains as dt → 0, which is negligible"
+    return f"falls{power or ' with dt'}; up to {unit * reach:.2g} may remain as dt → 0"
+
+
+def _why_insufficient(usable: Array, of: int) -> str:
+    span = f" and span a factor of {usable.max() / usable.min():.3g}" if len(usable) >= FEWEST_TIME_STEPS else ""
+    steps = f"{'' if span else 'only '}{len(usable)} of {counted(of, 'time step is', 'time steps are')} usable"
+    return f"{steps}{span}; extrapolation needs three that span a factor of four"
+
+
+def _why_unresolved(e: Array, noise: Array, floor: Array) -> str:
+    small, finest = np.hypot(noise, floor), abs(float(e[-1]))
     if (np.abs(e) <= ABOVE_NOISE * small).all():
+        if (floor > noise).all():
+            return "hardly larger than rounding at every time step"
         return "within the sampling noise at every time step; more start phases would reduce the noise"
     if (np.diff(np.abs(e)) > small[1:]).all():
         return "grows as dt decreases; finer time steps are needed"
-    if np.abs(e[-1]) <= floor:
+    if finest <= floor[-1]:
         return "within rounding at the finest time step, but not at coarser ones; finer time steps are needed"
-    if np.abs(e[-1]) <= small[-1]:
+    if finest <= small[-1]:
         return "within the sampling noise at the finest time step, but not at coarser ones; more start phases would reduce the noise"
     return "the time steps do not decide whether it vanishes as dt → 0; finer ones are needed"

@@ -3,9 +3,12 @@
     e(h) = m + s Hᵖ (c₀ + q (c₁ r Hᵈ + c₂ r² H²ᵈ + c₃ r³ H³ᵈ)) + s ρ Hᵖ ξ(h) + noise        H = h / the coarsest h
 
 m is the asymptotic error. The cₖ and ξ(h) are independent standard normal variables: the former give a series of powers that starts at the
-order p, the latter a discrepancy that no smooth series has, such as a kink of a maximum or the time of an impact between two steps. What is
-not known is averaged over: p, r, d and ρ over the values below, s with the density 1/s, and m, which is 0 with even odds and else normal
-with a standard deviation of s times a value on a logarithmic grid. Given these, everything is Student-t, with closed forms.
+order p, the latter a discrepancy that no smooth series has, such as a kink of a maximum or the time of an impact between two steps. Some
+series have another term in the bracket: c (X/H)ˡ of the lower order p - l, which is as large as the leading term at the step X; or c / √12
+times the finest step over H, the constant that a first-order error contains while the remainder of a time divided by the step does not
+change. What is not known is averaged over: p, r, d, l, X and ρ over the values below, s with the density 1/s, and m, which is 0 with even
+odds and else normal with a standard deviation of s times a value on a logarithmic grid. Given these, everything is Student-t, with closed
+forms.
 
 The error of a signed metric is e itself. One that cannot be negative is a norm, |m + …|, whose square is a smooth function of the step
 where the norm itself has a kink; then e and e² have even odds of being the series above.
@@ -16,13 +19,15 @@ Source: the model average is in the manner of C. J. Oates et al., Probabilistic 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from comparisons.judging.mixtures import quantiles, student_t
 
 Array = NDArray[np.float64]
 
@@ -34,10 +39,23 @@ LATER_TERMS = 1.0 / 3.0
 """q: the size of further coefficients relative to the leading one; a series whose leading term is cancelled by others is rare."""
 TERM_RATIOS = (0.3, 1.0)
 """r: the ratio of each further coefficient to the previous one, at the coarsest time step."""
-TERM_DISTANCES = {1.0: 0.6, 2.0: 0.15, 0.5: 0.15}
+TERM_DISTANCES = {1.0: 0.5, 2.0: 0.1, 0.5: 0.1}
 """d: the difference of successive powers, and its probability: all powers, only even powers, or also half powers."""
 LOGARITHM = 0.1
 """Probability that a logarithm of the step multiplies the leading power."""
+COMPETING = 0.2
+"""Probability of a lower order beside the leading one: these four kinds of series are all that there are."""
+LOWER_BY = (0.5, 1.0, 1.5, 2.0, 3.0)
+"""l: by how much the lower order is lower."""
+CROSSINGS = (1 / 2, 1 / 16, 1 / 128)
+"""X: from the coarsest steps to steps so fine that the lower order hardly shows at those in use; its size varies by more than the factor of
+eight between two of these values, because c does.
+"""
+REMAINDER = np.array([0.25, 0.05])
+"""Probability that a part of a first-order error is proportional to the remainder of a time divided by the step, without and beside an
+asymptotic error. If each step is a multiple of the finest, all remainders are equal with the probability h/H of the finest and the coarsest
+step; such a part is the same at all steps.
+"""
 DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
 """ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime changes each error by a fifth."""
 NO_ASYMPTOTIC_ERROR = 0.5
@@ -46,7 +64,6 @@ SMALLEST_SCALE, LARGEST_SCALE, SCALES_PER_DECADE = 1e-3, 10.0, 2
 """Standard deviations of m if it is not 0: from a thousandth of the change of the errors to ten times the largest error."""
 NEGLIGIBLE_WEIGHT = 1e-3
 """The least likely forms, whose total weight is this, are left out."""
-HALVINGS = 30
 CREDIBLE = 0.99
 """Probability of the interval in this model, given that m is not 0. It exceeds the stated 95 %, to allow for series that no form
 describes.
@@ -56,8 +73,12 @@ describes.
 class _Forms(NamedTuple):
     covariances: Array
     """Covariances of the series divided by Hᵖ, shape (forms, n, n)."""
+    leading: Array
+    """Hᵖ, shape (forms, n)."""
     orders: Array
+    """The order that dominates at the finest step."""
     log_weights: Array
+    """(forms, 2): if m is 0, and if it is not."""
     without_claim: Array
     """The logarithm of the weights that no claim has changed, relative to `log_weights`."""
 
@@ -76,7 +97,7 @@ class Posterior:
 
     Attributes:
         zero: Probability that m is 0.
-        weights: Weights of the Student-t distributions of m if it is not 0, shape (k,); their sum is 1 - zero.
+        weights: Weights of the Student-t distributions of m if it is not 0, the largest first, shape (k,); their sum is 1 - zero.
         centres: Centres of these distributions, of m² where `squares` is true.
         widths: Scales of these distributions.
         squares: Whether each is a distribution of m².
@@ -111,13 +132,15 @@ class Posterior:
         roots = np.where(self.squares, np.sqrt(np.abs(self.centres) + 1e4 * self.widths), np.abs(self.centres) + 1e4 * self.widths)
         unit, reach = float(np.min(np.where(self.squares, np.sqrt(self.widths), self.widths))), float(np.max(roots))
         outside, other = 0.5 * (1.0 - credible), 1.0 - self.zero
-        low, median, high = _quantiles(self._below, (other * outside, other * 0.5, other * (1.0 - outside)), unit, reach)
+        likeliest = float(self.centres[0])
+        near = math.sqrt(max(likeliest, 0.0)) if self.squares[0] else likeliest
+        low, median, high = quantiles(self._below, (other * outside, other * 0.5, other * (1.0 - outside)), near, unit, reach)
         if self.has_sign:
             return median, low, high
         # A norm that extrapolates below 0 has a limit above 0, after a minimum at finer steps.
         lower = max(low, -high, 0.0)
         wanted = other * (credible if lower == 0.0 else 1.0 - outside)
-        [upper] = _quantiles(lambda x: self._below(x) - self._below(-x), (wanted,), unit, reach)
+        [upper] = quantiles(lambda x: self._below(x) - self._below(-x), (wanted,), abs(near), unit, reach)
         return abs(median), lower, upper
 
     def _below(self, x: Array) -> Array:
@@ -139,9 +162,9 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
     """
     h = dts / np.max(dts)
     forms = _forms(tuple(h), None if claimed is None or not math.isfinite(claimed) else float(claimed))
-    parts = [_fit(forms, h, errors, noise)]
+    parts = [_fit(forms, errors, noise)]
     if not signed:
-        squares = _fit(forms, h, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
+        squares = _fit(forms, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
         log_weights = squares.log_weights + np.sum(np.log(2.0 * np.maximum(np.abs(errors), noise)))
         log_weights[forms.orders < 2.0 * ORDERS[0], 0] = -np.inf  # the square of an error that vanishes has twice its order
         parts.append(squares._replace(log_weights=log_weights))
@@ -158,51 +181,74 @@ def _forms(h: tuple[float, ...], claimed: float | None) -> _Forms:
     if claimed is not None:
         nearest = np.argmin(np.abs(ORDERS - claimed))
         weights = 0.5 * weights + 0.5 * (np.arange(len(ORDERS)) == nearest)
-    covariances, orders, logs, ratios = [], [], [], []
+    covariances, leading, orders, logs, ratios = [], [], [], [], []
     for order, weight, ratio_of_weights in zip(ORDERS, weights, unclaimed / weights, strict=True):
-        for distance, chance in {**TERM_DISTANCES, 0.0: LOGARITHM}.items():
-            for ratio in TERM_RATIOS:
-                powers = np.array([ratio**k * steps ** (k * distance) for k in range(4)])
-                if distance == 0.0:
-                    powers = np.array([np.ones_like(steps), np.log(steps), ratio * steps, ratio * steps * np.log(steps)])
-                powers[1:] *= LATER_TERMS
-                for discrepancy, share in DISCREPANCIES.items():
-                    covariances.append(powers.T @ powers + discrepancy**2 * np.eye(len(steps)))
-                    orders.append(order)
-                    ratios.append(math.log(ratio_of_weights))
-                    logs.append(math.log(weight * chance * share / len(TERM_RATIOS)))
-    return _Forms(np.array(covariances), np.array(orders), np.array(logs), np.array(ratios))
+        for terms, observed, chance in _series(steps, float(order)):
+            for discrepancy, share in DISCREPANCIES.items():
+                covariances.append(terms.T @ terms + discrepancy**2 * np.eye(len(steps)))
+                leading.append(steps**order)
+                orders.append(observed)
+                ratios.append(math.log(ratio_of_weights))
+                logs.append(np.log(weight * share * chance * np.ones(2)))
+    return _Forms(np.array(covariances), np.array(leading), np.array(orders), np.array(logs), np.array(ratios))
 
 
-def _fit(forms: _Forms, h: Array, e: Array, noise: Array) -> _Fit:
+def _series(steps: Array, order: float) -> Iterator[tuple[Array, float, Array | float]]:
+    """The series that have a leading order: terms divided by the leading power, order observed at the finest step, probability.
+
+    The probability is one number, or two if it is another beside an asymptotic error.
+    """
+    powers = np.arange(4.0)[:, None]
+    finest, sizes = float(np.min(steps)), np.where(powers > 0.0, LATER_TERMS, 1.0)
+    for ratio in TERM_RATIOS:
+        for distance, chance in TERM_DISTANCES.items():
+            yield sizes * ratio**powers * steps ** (distance * powers), order, chance / len(TERM_RATIOS)
+        logarithms = np.array([np.ones_like(steps), np.log(steps), ratio * steps, ratio * steps * np.log(steps)])
+        yield sizes * logarithms, order, LOGARITHM / len(TERM_RATIOS)
+    # Where a second order competes, the terms of the series itself are small, or they would be taken for it.
+    plain = sizes * (min(TERM_RATIOS) * steps) ** powers
+    are_multiples = np.allclose(steps / finest, np.round(steps / finest), rtol=1e-9, atol=0.0)
+    of_remainder = finest * REMAINDER
+    remainder = finest / steps / math.sqrt(12.0)
+    if order == 1.0 and are_multiples:
+        yield np.vstack([plain, remainder]), order, of_remainder
+    lower = [order - distance for distance in LOWER_BY if order - distance >= ORDERS[0]]
+    for other in lower:
+        for crossing in CROSSINGS:
+            term, chance = (crossing / steps) ** (order - other), COMPETING / len(lower) / len(CROSSINGS)
+            observed = other if crossing > finest else order
+            yield np.vstack([plain, term]), observed, chance
+            if other == 1.0 and are_multiples:
+                yield np.vstack([plain, term, term * remainder]), observed, chance * of_remainder
+
+
+def _fit(forms: _Forms, e: Array, noise: Array) -> _Fit:
     """The weight of every form at every scale of m, and its Student-t distribution of m."""
     size = float(np.max(np.abs(e)))
     scale = max(float(np.ptp(e)), 1e-9 * size, float(np.min(noise)))
-    leading = h ** forms.orders[:, None]
+    leading = forms.leading
     relative = (np.hypot(noise, 8.0 * np.finfo(float).eps * size) / scale / leading) ** 2
-    covariances = forms.covariances + relative[:, :, None] * np.eye(len(h))
-    inverses = np.linalg.inv(covariances)
+    covariances = forms.covariances + relative[:, :, None] * np.eye(len(e))
     series, ones = e / scale / leading, 1.0 / leading
-    weighted = np.einsum("fij,fj->fi", inverses, series)
-    residual = np.sum(weighted * series, axis=1)[:, None]
-    along = np.sum(weighted * ones, axis=1)[:, None]
-    information = np.einsum("fi,fij,fj->f", ones, inverses, ones)[:, None]
+    weighted = np.linalg.solve(covariances, np.stack([series, ones], axis=2))
+    residual, along = (np.sum(weighted[:, :, 0] * values, axis=1)[:, None] for values in (series, ones))
+    information = np.sum(weighted[:, :, 1] * ones, axis=1)[:, None]
     decades = math.log10(LARGEST_SCALE * size / scale / SMALLEST_SCALE)
-    scales = np.geomspace(SMALLEST_SCALE, LARGEST_SCALE * size / scale, 1 + math.ceil(SCALES_PER_DECADE * decades))
+    scales = np.geomspace(SMALLEST_SCALE, LARGEST_SCALE * size / scale, 1 + max(0, math.ceil(SCALES_PER_DECADE * decades)))
     variances = np.array([0.0, *scales**2])
     chances = np.array([NO_ASYMPTOTIC_ERROR, *np.full(len(scales), (1.0 - NO_ASYMPTOTIC_ERROR) / len(scales))])
     # Sherman and Morrison: m adds variances * 1 1ᵀ to the covariance.
     growth = 1.0 + variances * information
-    residuals = np.maximum(residual - variances * along**2 / growth, 1e-12 * residual)
+    residuals = np.maximum(residual - variances * along**2 / growth, np.maximum(1e-12 * residual, np.finfo(float).tiny))
     determinants = np.linalg.slogdet(covariances)[1] + 2.0 * np.sum(np.log(leading), axis=1)
     log_weights = (
-        forms.log_weights[:, None]
+        np.repeat(forms.log_weights, [1, len(scales)], axis=1)
         + np.log(chances)
         - 0.5 * (determinants[:, None] + np.log(growth))
-        - 0.5 * len(h) * (np.log(residuals) + 2.0 * math.log(scale))
+        - 0.5 * len(e) * (np.log(residuals) + 2.0 * math.log(scale))
     )
     shrunk = variances / growth
-    return _Fit(log_weights, scale * shrunk * along, scale * np.sqrt(shrunk * residuals / len(h)))
+    return _Fit(log_weights, scale * shrunk * along, scale * np.sqrt(shrunk * residuals / len(e)))
 
 
 def _posterior(parts: list[_Fit], forms: _Forms, freedom: int) -> Posterior:
@@ -220,30 +266,6 @@ def _posterior(parts: list[_Fit], forms: _Forms, freedom: int) -> Posterior:
     by_form = np.exp(forms.without_claim) * np.sum(weights[0], axis=1)
     order = _order_interval(by_form, forms.orders)
     return Posterior(zero / total, share * weight[kept], centre[kept], width[kept], is_square[kept], freedom, len(parts) == 1, *order)
-
-
-def student_t(freedom: int, x: Array) -> Array:
-    """The distribution function of Student's t with 3, 4 or 5 degrees of freedom: closed forms, twenty times faster than the general one.
-
-    Source: M. Abramowitz & I. A. Stegun, Handbook of Mathematical Functions (1964), 26.7.3 and 26.7.4.
-    """
-    tangent = x / math.sqrt(freedom)
-    cosine2 = 1.0 / (1.0 + tangent**2)
-    if freedom == 4:
-        return 0.5 + 0.5 * tangent * np.sqrt(cosine2) * (1.0 + 0.5 * cosine2)
-    more = 1.0 + (0.0 if freedom == 3 else 2.0 / 3.0) * cosine2
-    return 0.5 + (np.arctan(tangent) + tangent * cosine2 * more) / math.pi
-
-
-def _quantiles(below: Callable[[Array], Array], wanted: tuple[float, ...], unit: float, reach: float) -> list[float]:
-    """Quantiles of a distribution between ± reach, by bisection in asinh(x / unit), because they may span many powers of ten."""
-    high = np.full(len(wanted), math.asinh(reach / unit))
-    low = -high
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        under = below(unit * np.sinh(middle)) < np.array(wanted)
-        low, high = np.where(under, middle, low), np.where(under, high, middle)
-    return [float(x) for x in unit * np.sinh(0.5 * (low + high))]
 
 
 def _order_interval(weights: Array, orders: Array) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from support import engine_coverage, interval_coverage
 
 import dropspin as ds
 from comparisons.judging.error_budget import error_budget
-from comparisons.judging.extrapolation import student_t
+from comparisons.judging.mixtures import student_t
 
 H = np.array([4e-3, 2e-3, 1e-3])
 FIVE = 1e-3 * 2.0 ** np.arange(4, -1, -1)
@@ -176,6 +176,7 @@ def test_too_few_steps_are_unresolved(errors, h, reason):
         (([4e-3, 2e-3, 2e-3], [0.1, 0.2, 0.3]), "positive and different"),
         (([4e-3, 2e-3, -1e-3], [0.1, 0.2, 0.3]), "positive and different"),
         (([4e-3, 2e-3, 1e-3], [0.1, -0.2, 0.3]), "an error without a sign cannot be negative; got -0.2"),
+        (([4e-3, 2e-3, 1e-3], ["a", 0.2, 0.3]), "errors must be numbers"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments, message):
@@ -267,7 +268,7 @@ def test_hidden_part_of_a_maximum_is_within_the_interval():
     assert found.upper >= 0.9e-3
 
 
-@pytest.mark.parametrize("freedom", [3, 4, 5])
+@pytest.mark.parametrize("freedom", [3, 4, 5, 6, 9])
 @pytest.mark.parametrize("x", [-30.0, -1.5, 0.0, 0.2, 4.0])
 def test_student_t_is_the_integral_of_its_density(freedom, x):
     """To 1e-15, by mpmath."""

@@ -1,0 +1,129 @@
+"""The series of errors that an error budget is made from: verified numbers, the time steps that are used, and the fitted order."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from comparisons.judging.extrapolation import ORDERS
+from scenarios import DropspinError
+
+Array = NDArray[np.float64]
+
+FEWEST_TIME_STEPS = 3
+MOST_TIME_STEPS = 5
+"""Largest number of time steps used; more contain little further information about dt → 0."""
+WIDEST_RATIO = 15.99
+"""The ratio of five halved time steps: coarser ones are left out if more than five reach as far; else the most crowded ones are."""
+SMALLEST_RATIO = 3.99
+"""Extrapolation needs three time steps that span a factor of four."""
+ABOVE_NOISE = 3.0
+"""An order is fitted to errors larger than this multiple of their noise."""
+SAME_SLOPE = 0.5
+"""Slopes between neighbouring time steps that differ by less than this count as one power of the time step."""
+BY_CHANCE = 1e-3
+"""Errors within rounding follow a power of the time step if independent errors look like it with less than this probability."""
+TWO_DIGITS = 0.01
+"""Logarithms of errors that differ by less than this are equal, because errors near rounding have few digits."""
+
+
+def verified(dts: ArrayLike, errors: ArrayLike, resolution: ArrayLike, rounding: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    """The series as arrays of one shape.
+
+    Raises:
+        DropspinError: A number or a shape is invalid.
+    """
+    h, e, noise, floor = (
+        _numbers(name, values)
+        for name, values in {"time steps": dts, "errors": errors, "resolution": resolution, "rounding": rounding}.items()
+    )
+    h, e = np.atleast_1d(h, e)
+    if h.ndim != 1 or h.shape != e.shape:
+        raise DropspinError(f"an error budget takes one error for each time step; got {h.shape} time steps and {e.shape} errors.")
+    if not ((h > 0.0) & np.isfinite(h)).all() or len(np.unique(h)) < len(h):
+        raise DropspinError(f"time steps must be positive and different; got {_listed(h)}.")
+    for name, values in (("resolution", noise), ("rounding", floor)):
+        if values.shape not in ((), (1,), h.shape):
+            raise DropspinError(f"{name} takes one number, or one for each of {len(h)} time steps; got the shape {values.shape}.")
+    noise, floor = np.broadcast_to(noise, h.shape), np.broadcast_to(floor, h.shape)
+    for name, values in (("resolution", noise), ("rounding", floor)):
+        invalid = values[np.isfinite(e) & ~((values >= 0.0) & np.isfinite(values))]
+        if len(invalid):
+            raise DropspinError(f"{name} must be finite and not negative; got {_listed(np.unique(invalid))}.")
+    return h, e, noise, floor
+
+
+def verify_options(errors: Array, claimed_order: float | None, signed: bool, negligible: float, judged_together: int) -> None:
+    """Raise `DropspinError` if an argument that is one number, or the sign of an error, is invalid."""
+    if not signed and (errors < 0.0).any():
+        raise DropspinError(f"an error without a sign cannot be negative; got {np.nanmin(errors):g}. Pass signed=True if it has a sign.")
+    if claimed_order is not None and not claimed_order > 0.0:
+        raise DropspinError(f"claimed_order must be positive, or None; got {claimed_order!r}.")
+    if not (negligible >= 0.0 and math.isfinite(negligible)):
+        raise DropspinError(f"negligible must be finite and not negative; got {negligible!r}.")
+    if not (judged_together >= 1 and judged_together % 1 == 0):
+        raise DropspinError(f"judged_together must be a whole number from 1; got {judged_together!r}.")
+
+
+def _numbers(name: str, values: Any) -> Array:
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise DropspinError(f"{name} must be numbers; got {values!r}.") from None
+
+
+def _listed(values: Array) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
+def most_informative(h: Array) -> list[int]:
+    """The indices of at most `MOST_TIME_STEPS` of these time steps, which are ordered from the coarsest to the finest."""
+    kept = list(range(len(h)))
+    while len(kept) > MOST_TIME_STEPS:
+        gaps = [h[before] / h[after] for before, after in zip(kept, kept[2:], strict=False)]
+        del kept[0 if h[kept[1]] / h[kept[-1]] >= WIDEST_RATIO else 1 + int(np.argmin(gaps))]
+    return kept
+
+
+def start_of_finest(h: Array) -> int:
+    """The index of the first of the finest time steps that are at least three and span a factor of four; 0 if there are none."""
+    coarse = np.flatnonzero(h >= SMALLEST_RATIO * h[-1])
+    return int(min(coarse[-1], len(h) - FEWEST_TIME_STEPS)) if len(coarse) and len(h) > FEWEST_TIME_STEPS else 0
+
+
+def is_clear_power(h: Array, e: Array) -> bool:
+    """Whether the errors follow a power of the time step more closely than independent errors do.
+
+    For independent errors, the probability that the logarithm of one is within r of the line through those of its neighbours is below r,
+    and the probability that the last one is smaller than the first by a factor f is below 1/f.
+    """
+    if not _have_one_sign(e):
+        return False
+    x, y = np.log(h), np.log(np.abs(e))
+    slopes = np.diff(y) / np.diff(x)
+    off_line = y[1:-1] - y[:-2] - (y[2:] - y[:-2]) * (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
+    chance = max(float(np.max(np.abs(off_line))), TWO_DIGITS) ** len(off_line) * math.exp(y[-1] - y[0])
+    return bool(np.min(slopes) > 0.5 * ORDERS[0] and chance < BY_CHANCE)
+
+
+def fitted_order(h: Array, rest: Array, small: Array) -> tuple[float, tuple[float, ...]]:
+    """The slope of the error without the asymptotic error, over the finest steps above the noise, and these steps.
+
+    Errors that noise or rounding could have caused do not count as noise if they follow a power of the time step.
+    """
+    clear = np.flatnonzero(np.abs(rest) > ABOVE_NOISE * small)
+    if len(clear) < 2 and (rest != 0.0).all():
+        slopes = np.diff(np.log(np.abs(rest))) / np.diff(np.log(h))
+        clear = np.arange(len(h)) if np.ptp(slopes) < SAME_SLOPE and np.min(slopes) > 0.0 else clear
+    if len(clear) < 2:
+        return math.nan, ()
+    clear = clear[start_of_finest(h[clear]) :]
+    if not _have_one_sign(rest[clear]):
+        return math.nan, ()
+    slope = float(np.polyfit(np.log(h[clear]), np.log(np.abs(rest[clear])), 1)[0])
+    return (slope, tuple(float(step) for step in h[clear])) if slope > 0.5 * ORDERS[0] else (math.nan, ())
+
+
+def _have_one_sign(e: Array) -> bool:
+    return abs(float(np.sign(e).sum())) == len(e)

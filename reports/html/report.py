@@ -113,10 +113,11 @@ def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, str]]:
     trends = {}
     for (metric, engine), rows in studies.groupby(["metric", "engine"]):
         order, asymptotic = (rows[rows["kind"] == kind] for kind in STUDIES)
-        p, m = (float(part["value"].iloc[0]) if len(part) else float("nan") for part in (order, asymptotic))
+        m = float(asymptotic["value"].iloc[0]) if len(asymptotic) else float("nan")
+        p = numbers.observed_order(*order[["value", "lower", "upper"]].iloc[0]) if len(order) else ""
         cause = str(rows["cause"].iloc[0])
         verdict = "failed" if (rows["verdict"] == "failed").any() else str(rows["verdict"].iloc[-1])
-        trends[str(metric), str(engine)] = {"text": numbers.trend(p, m, cause), "cause": cause, "verdict": verdict}
+        trends[str(metric), str(engine)] = {"text": numbers.trend(m, cause, p), "cause": cause, "verdict": verdict}
     return trends
 
 

@@ -78,14 +78,10 @@ def _print_trends(results: Results, name: str, out: Console) -> None:
     for engine in results.engines:
         mine = frame[frame["engine"] == engine]
         found = orders(results, name, engine)
-        trends = (
-            []
-            if found is None
-            else [f"order {found[0]:.2f}" if found[1] - found[0] < 0.005 else f"orders {found[0]:.2f} to {found[1]:.2f}"]
-        )
+        trends = [found] if found else []
         wrong = mine[(mine["kind"] == "asymptotic_error") & mine["cause"].isin(["model", "setting"])]
         trends += [
-            f"{metric.replace('_', ' ')} {trend(math.nan, value, cause)}"
+            f"{metric.replace('_', ' ')} {trend(value, cause)}"
             for metric, value, cause in zip(wrong["metric"], wrong["value"], wrong["cause"], strict=True)
         ]
         if trends:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from comparisons.judging.convergence import ARTEFACTS, SATURATION
 from comparisons.results.results import NEGLIGIBLE, Results, is_undecided
-from reports.views.numbers import formatted
+from reports.views.numbers import formatted, observed_order
 
 OF = ["metric", "engine"]
 EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
@@ -69,7 +69,7 @@ def _row(row: Mapping[Hashable, Any]) -> BudgetRow:
 
 
 def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:
-    value, limit, order = float(row["value"]), float(row["value_of_limit"]), float(row["value_of_order"])
+    value, limit = float(row["value"]), float(row["value_of_limit"])
     if cause == "unresolved":
         return _why_undecided(row)
     if cause == "rounding":
@@ -78,7 +78,9 @@ def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:
         reach = max(-float(row["lower_of_limit"]), float(row["upper_of_limit"]))
         if reach > abs(value):
             return f"Discretisation error down to {formatted(reach)}; the time steps do not resolve smaller ones."
-        halved = "" if math.isnan(order) else f" of order {order:.2f}: halving dt gives about {formatted(value * 0.5**order)}"
+        ends = (float(row[f"{end}_of_order"]) for end in ("lower", "upper"))
+        order = observed_order(float(row["value_of_order"]), *ends)
+        halved = f" of {order}: halving dt gives about {formatted(value * 0.5 ** row['value_of_order'])}" if order else ""
         return f"Discretisation error{halved}."
     if cause not in ("model", "setting"):
         return f"Set by {cause}, which is the engine's own: it {row['reason_of_limit']}."

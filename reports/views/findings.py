@@ -11,7 +11,7 @@ import numpy as np
 
 from comparisons.engines.base import calibrated_label
 from comparisons.judging.convergence import ARTEFACTS, JUMPING
-from comparisons.judging.error_budget import is_sufficient
+from comparisons.judging.error_budget import is_determined, is_sufficient
 from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, SEVERITY
 from comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
 from comparisons.running.measured import UNDECIDED_BY_STARTS
@@ -154,12 +154,19 @@ def profile_comparisons(results: Results) -> list[ProfileComparison]:
     return found
 
 
-def orders(results: Results, scene: str, engine: str) -> tuple[float, float] | None:
-    """The smallest and the largest observed order of an engine's errors in a scene; None if there is none."""
+def orders(results: Results, scene: str, engine: str) -> str:
+    """The observed orders of an engine's errors in a scene, with the interval that contains the 95 % intervals of all; empty if none is."""
     frame = results.table
     mine = frame[(frame["kind"] == "order") & (frame["scene"] == scene) & (frame["engine"] == engine)]
-    found = mine.loc[mine["cause"] == "discretisation", "value"].dropna()
-    return (float(found.min()), float(found.max())) if len(found) else None
+    found = mine[(mine["cause"] == "discretisation") & mine["value"].notna()]
+    known = found[[is_determined(*ends) for ends in zip(found["lower"], found["upper"], strict=True)]]
+    vague = counted(len(found) - len(known), "order") + " not determined"
+    if known.empty:
+        return vague if len(found) else ""
+    least, most = float(known["value"].min()), float(known["value"].max())
+    values = f"order {least:.2f}" if most - least < 0.005 else f"orders {least:.2f} to {most:.2f}"
+    interval = f"({known['lower'].min():.2f} to {known['upper'].max():.2f})"
+    return f"{values} {interval}" + (f", {vague}" if len(found) > len(known) else "")
 
 
 def verdict_sentence(results: Results, tally: Counts) -> str:

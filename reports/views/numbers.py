@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from functools import cache
 
+from comparisons.judging.error_budget import is_determined
 from comparisons.judging.verdicts import WORDS
 from comparisons.measuring.symmetries import kind_of
 from scenarios.text import counted, rounded
@@ -89,8 +90,13 @@ def _accepted_kinds() -> dict[str, str]:
     return {text: kind for kind, text in ACCEPTED.items()}
 
 
-def trend(order: float, asymptotic_error: float, cause: str) -> str:
-    """The behaviour of an error as dt → 0, in a few words."""
+def observed_order(order: float, lower: float, upper: float) -> str:
+    """An order with its interval; empty if the time steps do not determine it."""
+    return f"order {order:.2f} ({lower:.2f} to {upper:.2f})" if is_determined(lower, upper) else ""
+
+
+def trend(asymptotic_error: float, cause: str, order: str = "") -> str:
+    """The behaviour of an error as dt → 0, in a few words; the order is that of `observed_order`."""
     if cause == "discretisation":
-        return "→ 0" if math.isnan(order) else f"order {order:.2f}"
+        return order or "→ 0"
     return {"model": f"→ {formatted(asymptotic_error)}", "setting": f"→ {formatted(asymptotic_error)}, a setting"}.get(cause, cause)

@@ -17,8 +17,8 @@ class Made:
     table: pd.DataFrame
 
 
-def made(value, unit="1", asymptotic=None, order=None, judged="measured"):
-    """A run with this error; `asymptotic` is its asymptotic error, the interval's ends and the cause."""
+def made(value, unit="1", asymptotic=None, order=None, spread=0.5, judged="measured"):
+    """A run with this error; `asymptotic` is its asymptotic error, the interval's ends and the cause; `spread` is the order's."""
     metric = "orientation_error" if unit == "rad" else "energy_error"
 
     def row(metric=metric, **content):
@@ -31,7 +31,7 @@ def made(value, unit="1", asymptotic=None, order=None, judged="measured"):
         reason = "the time steps leave it open"
         rows.append(row(kind="asymptotic_error", value=error, lower=lower, upper=upper, cause=cause, reason=reason, verdict=judged))
     if order is not None:
-        rows.append(row(kind="order", value=order))
+        rows.append(row(kind="order", value=order, lower=order - spread, upper=order + spread))
     return Made(as_table(rows))
 
 
@@ -45,9 +45,10 @@ def budget(results):
     [
         (
             made(8e-3, asymptotic=(1e-5, -1e-4, 1e-4, "discretisation"), order=2.0),
-            "Discretisation error of order 2.00: halving dt gives about 2.00e-03.",
+            "Discretisation error of order 2.00 (1.50 to 2.50): halving dt gives about 2.00e-03.",
         ),
         (made(8e-3, asymptotic=(1e-5, -1e-4, 1e-4, "discretisation")), "Discretisation error."),
+        (made(8e-3, asymptotic=(1e-5, -1e-4, 1e-4, "discretisation"), order=3.9, spread=2.5), "Discretisation error."),
         (
             made(8e-3, asymptotic=(1e-5, -1e-4, 2e-2, "discretisation"), order=4.0),
             "Discretisation error down to 0.0200; the time steps do not resolve smaller ones.",

@@ -17,6 +17,10 @@ class SceneError(DropspinError):
     """A scene that cannot be loaded."""
 
 
+class SceneWarning(UserWarning):
+    """A scene has values that are possible, but probably not meant."""
+
+
 class UnknownName(DropspinError):
     """A name that is not in the list of known names.
 

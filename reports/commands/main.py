@@ -4,6 +4,7 @@ import io
 import os
 import sys
 import traceback
+import warnings
 from importlib import import_module
 from typing import Any
 
@@ -51,6 +52,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a character gets a question mark, not a traceback
     handle_interrupts()
+    warnings.showwarning = lambda message, *_: _say(f"warning: {message}")
     try:
         sys.exit(_run())
     except (click.Abort, KeyboardInterrupt) as interrupt:

@@ -36,6 +36,8 @@ def scene_rows(scene: Scenario) -> Rows:
     }
     if truth and truth.events:
         facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
+    if truth and not truth.covers_all(scene.duration):
+        facts["valid until"] = f"{truth.horizon:.6f} s: {truth.ends}"
     for expectation in scene.expect:
         facts[f"expect {expectation.metric} ({_applies_to(expectation)})"] = f"{_allowed(expectation)}: {expectation.reason}"
     return [{"what": key, "is": value} for key, value in facts.items() if value]

@@ -1,15 +1,15 @@
 """A body falls and strikes the floor repeatedly, as a ball or with a corner or an edge: flight, impulse, flight, and so on.
 
-The impulse is that of `impact_laws`: normal without friction, eq 17 of Wang's lecture note with infinite friction, Coulomb's for a ball; or
-that of a given law.
+The impulse is that of `impact_laws`: normal without friction, eq 17 of Wang's lecture note with infinite friction, else that of the floor's
+`impact_law`; or that of a given law.
 
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
 Valid for: impacts of one corner, or of the two corners of an edge that strike the floor at once and have equal velocities before and after;
-a ball with any spin; a Coulomb coefficient for a ball of equal moments only, or by a given law; no damping. The solution ends, and gives
-the reason, at the first of these events: the hundredth impact; an impact that is not of this kind, or in which the floor would have to pull
-(as eq 17 may demand of a corner that slides fast), or after which the body stays on the floor; a flight that is short relative to the
-longest, as before impacts accumulate; a time at which rounding determines whether the body touches the floor or when it turns over; growth
-of an initial disturbance of 1e-10 rad/s to 1e-6.
+a ball with any spin; no damping. The solution ends, and gives the reason, at the first of these events: the hundredth impact; an impact
+that is not of this kind, or for which the law has no solution or several, or in which the floor would have to pull (as eq 17 may demand of
+a corner that slides fast), or after which the body stays on the floor; a flight that is short relative to the longest, as before impacts
+accumulate; a time at which rounding determines whether the body touches the floor or when it turns over; growth of an initial disturbance
+of 1e-10 rad/s to 1e-6.
 """
 
 from collections.abc import Iterator
@@ -44,6 +44,10 @@ LAW_NAMES = {
     "poisson": "Poisson's restitution",
     "clamped": "restitution that adds no energy",
     "coulomb": "Coulomb's friction",
+    "cone": "Coulomb's friction against the slip that is left",
+    "integrated-newton": "Coulomb's friction at each instant, Newton's restitution",
+    "integrated-poisson": "Coulomb's friction at each instant, Poisson's restitution",
+    "integrated-energy": "Coulomb's friction at each instant, Stronge's restitution",
 }
 
 
@@ -57,9 +61,7 @@ def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
     floor = scene.floor
     if floor is None or scene.damping is not None:
         return None
-    if law is None and not isinstance(floor.friction, str) and not _slides_one_way(scene):
-        return None
-    law = law or law_of(floor)
+    law = law or law_of(scene)
     flights = _until_sensitive(scene, law)
     events = tuple(flight.impact for flight in flights if flight.impact is not None)
     horizon, ends = flights[-1].end, flights[-1].reason
@@ -74,11 +76,6 @@ def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
     count = "one" if len(events) == 1 else str(len(events))
     statement = f"free rotor and parabola, {count} {where} impact{'s' if len(events) > 1 else ''} ({impulse})"
     return Truth(f"{where}-impact", statement, states, events, horizon, ends)
-
-
-def _slides_one_way(scene: Scenario) -> bool:
-    """Whether the direction of sliding cannot change during an impact, as for a ball of three equal moments."""
-    return isinstance(scene.body, Sphere) and float(np.ptp(np.linalg.eigvalsh(scene.body.inertia_tensor))) == 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +129,12 @@ def _flights(scene: Scenario, start: Array, law: Law) -> Iterator[_Flight]:
             return
         now, longest, before = end, max(longest, contact.time), motion(np.array([contact.time]))[0]
         touching = _touching(scene, before)
+        rates = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor, law)
+        if rates is None:
+            yield _Flight(motion, now, reason="the impact law has no solution, or several", is_other_impact=True)
+            return
         after = before.copy()
-        after[RATES] = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor, law)
+        after[RATES] = rates
         if after[VELOCITY] @ UP <= before[VELOCITY] @ UP:
             yield _Flight(motion, now, reason="the impact law would have the floor pull", is_other_impact=True)
             return

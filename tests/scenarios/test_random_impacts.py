@@ -40,7 +40,7 @@ def random_drop(seed, largest_restitution=0.3):
             "gravity": {"acceleration": [0.0, -rng.uniform(1.6, 12.0), 0.0]},
             "floor": {
                 "restitution": rng.uniform(0.0, largest_restitution) * (rng.random() > 0.05),
-                "friction": ["none", "infinite"][rng.integers(2)],
+                "friction": ["none", "infinite", rng.uniform(0.05, 1.0)][rng.integers(3)],
             },
         }
     )

@@ -16,6 +16,7 @@ import numpy as np
 TERMS = 22
 ANGLE = 0.2  # rad, turned at most within one series
 SAMPLES = 24  # of a height within one series, between which it has at most one minimum
+SECTORS = 720  # of the directions of the slip that an impact leaves
 LOWEST = 1e-9  # of the size: points at most this much higher than the lowest one have been struck too
 NO_FRICTION, STICKING, COULOMB = range(3)
 
@@ -169,10 +170,33 @@ def _impulse(response, u, e, kind, friction):
     sticking = np.linalg.solve(response, target)
     if kind == STICKING or np.hypot(sticking[0], sticking[2]) <= friction * sticking[1]:
         return sticking
-    slip = np.hypot(u[0], u[2])
-    direction = np.array([-friction * u[0] / slip, 1.0, -friction * u[2] / slip])
-    normal = response[1, 0] * direction[0] + response[1, 1] + response[1, 2] * direction[2]
-    return -(1.0 + e) * u[1] / normal * direction
+    # The cone law, by bisection of the direction of the slip that is left: of all directions, the one that it has itself.
+    before, last = 0.0, np.nan
+    for n in range(SECTORS + 1):
+        now = 2.0 * np.pi * n / SECTORS
+        turned, _ = _slip(response, u, e, friction, now)
+        if n > 0 and (turned > 0.0) != (last > 0.0):
+            low, high = before, now
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                if (_slip(response, u, e, friction, middle)[0] > 0.0) == (last > 0.0):
+                    low = middle
+                else:
+                    high = middle
+            if _slip(response, u, e, friction, high)[1] > 0.0:
+                direction = np.array([-friction * np.cos(high), 1.0, -friction * np.sin(high)])
+                return -(1.0 + e) * u[1] / (response[1] @ direction) * direction
+        before, last = now, turned
+    return np.full(3, np.nan)
+
+
+@numba.njit(cache=True)
+def _slip(response, u, e, friction, angle):
+    """The slip that friction in a direction leaves: its parts across this direction and along it."""
+    c, s = np.cos(angle), np.sin(angle)
+    direction = np.array([-friction * c, 1.0, -friction * s])
+    left = u - (1.0 + e) * u[1] / (response[1] @ direction) * (response @ direction)
+    return c * left[2] - s * left[0], c * left[0] + s * left[2]
 
 
 @numba.njit(cache=True)

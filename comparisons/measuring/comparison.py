@@ -177,15 +177,17 @@ class Comparison:
         None if the exact body rises after its first impact by more than `LOW` of the drop.
 
         Raises:
-            Unresolved: The first contact lasts longer than the exact solution.
+            Unresolved: The first contact begins after the end of the exact solution.
         """
         fallen = self.exact[self.exact.t > self.impacts[0]] if self.impacts else self.exact[:0]
         exact = apex(self.scene, fallen)
         if not len(fallen) or exact.max() - fallen.position[0, 1] > LOW * self.scene.clearance:
             return None
-        first = len(self.compared) - len(fallen) if self.first_contact is None else self.first_contact[1]
-        if first >= len(self.compared):
-            raise Unresolved("the first contact lasts longer than the exact solution")
+        last = len(self.compared) - 1
+        before, after = self.first_contact or (0, last + 1 - len(fallen))
+        if before >= last:
+            raise Unresolved("the first contact begins after the end of the exact solution")
+        first = min(after, last)  # a body that stays in contact rises no more at the end
         return float(apex(self.scene, self.compared[first:]).max()), float(exact.max())
 
     @cached_property

@@ -143,7 +143,7 @@ def _errors(motion: ExtendedMotion, own: Comparison, within: float) -> Iterator[
         except Unresolved:
             continue
         if metric.name == "restitution_error" and math.isnan(size):
-            continue  # so has an exact motion at the coarsest steps; a body without an impact has other errors
+            continue  # undefined for an exact motion at the coarsest steps too; a body without an impact has other errors
         allowed = within + (_between_rows(own) if metric.name == "restitution_error" else 0.0)
         if size <= allowed:
             yield Diagnosis("sound", metric.name, size, "")

@@ -27,7 +27,7 @@ def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Seq
     results = checked.results
     return page(
         "check.md",
-        sentences=check.sentences(checked, file),
+        sentences=[check.scope(file), *check.sentences(checked, file)],
         groups=grouped(results, found, None if file is None else file.path),
         most=MOST_SENTENCES,
         engines=results.engines,

@@ -55,6 +55,30 @@ def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, 
         assert "If the changes are intended" not in output
 
 
+def test_check_reads_by_default_the_baseline_that_accept_writes_by_default(repository, tmp_path):
+    """And the output says whether there was one."""
+    assert dropspin("check", "out/failing", cwd=repository).stdout == dropspin("check", "out/failing", *BASELINE, cwd=repository).stdout
+    with_baseline = dropspin("check", "out/good", cwd=repository).stdout
+    assert "Checked: the expectations of the scenes, and the accepted results in dropspin-baseline.toml." in with_baseline
+    without = dropspin("check", repository / "out/failing", "--summary", "summary.md", cwd=tmp_path)
+    assert "Checked: the expectations of the scenes only, without a baseline." in without.stdout
+    assert "without a baseline" in (tmp_path / "summary.md").read_text()
+    left_out = dropspin("check", "out/failing", "--no-baseline", cwd=repository)
+    assert (left_out.returncode, left_out.stdout) == (without.returncode, without.stdout)
+
+
+def test_run_that_the_default_baseline_does_not_cover_is_refused_with_the_remedy(repository, tmp_path):
+    for extra, reason in ((), "none of the "), (("--quick",), "a quick run has too few starts"):
+        dropspin("run", "fall-spin", "-e", "document", "--dt", "0.01", *extra, "-o", tmp_path / "run", cwd=repository)
+        done = dropspin("check", tmp_path / "run", cwd=repository)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"dropspin: dropspin-baseline.toml: {reason}")
+        assert "With --no-baseline, only the expectations of the scenes are checked." in done.stderr
+        assert dropspin("check", tmp_path / "run", "--no-baseline", cwd=repository).returncode == 0
+    both = dropspin("check", tmp_path / "run", *BASELINE, "--no-baseline", cwd=repository)
+    assert (both.returncode, "give only one of them" in both.stderr) == (2, True)
+
+
 def test_the_command_that_reproduces_a_failure_measures_the_same_value(repository, tmp_path):
     """It is one command and ends as the check did."""
     found = json.loads(dropspin("check", "out/failing", *BASELINE, "--json", cwd=repository).stdout)

@@ -7,10 +7,11 @@ piece of work; each leads a process group, with which the engine's own children 
 """
 
 import ctypes
+import math
 import os
 import signal
+import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import TimeoutError as OutOfTime
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
@@ -151,8 +152,8 @@ class EngineProcesses:
         self._counts[entry.label][:] = [0, 0]
         allowed = self._resources.processor_time + (COMPILATION if entry.engine is not None and entry.engine.compiles else 0.0)
         with interrupts_deferred():
-            task = self._pools[entry.label].schedule(call, args=[work, given, allowed], timeout=WALL_TIME_FACTOR * allowed)
-        largest = 0
+            task = self._pools[entry.label].schedule(call, args=[work, given, allowed])
+        largest, start = 0, math.inf
         try:
             while not finished([task], POLL):
                 if self._closed:
@@ -160,12 +161,15 @@ class EngineProcesses:
                 if self._has_exited(entry.label) and not finished([task], GRACE):
                     self.renew(entry)
                     raise Failed("crashed", "its process exited with code 0 before the work was done")
+                if self._processes[entry.label].value:
+                    start = min(start, time.monotonic())  # the pool's own limits are of a clock that may be set
+                if time.monotonic() - start > WALL_TIME_FACTOR * allowed:
+                    self._end_group(entry.label)
+                    self.renew(entry)
+                    raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * allowed:g} s of wall time")
                 largest = max(largest, self._memory(entry.label))
                 while_waiting()
             result: Result = task.result()
-        except OutOfTime:
-            self._end_group(entry.label)
-            raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * allowed:g} s of wall time") from None
         except ProcessExpired as end:
             self._end_group(entry.label)
             verdict, reason = _verdict(end.exitcode, allowed)

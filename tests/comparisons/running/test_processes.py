@@ -68,6 +68,19 @@ def test_sleeping_engine_is_ended_by_the_wall_clock():
     assert (row["verdict"], row["reason"]) == ("timed_out", "not done after 1 s of wall time")
 
 
+def _work_for_two_seconds(entry):
+    time.sleep(2.0)
+    return "done"
+
+
+def test_wall_clock_that_is_set_times_no_engine_out(monkeypatch):
+    """By two hours, as by a time service or after a standby, while an engine works that may use 1000 s."""
+    real, start = time.time, time.monotonic()
+    monkeypatch.setattr(time, "time", lambda: real() + (7200.0 if time.monotonic() > start + 0.7 else 0.0))
+    with EngineProcesses(ResourceLimits(processor_time=100.0)) as processes:
+        assert processes.call(engine_entry("mujoco"), _work_for_two_seconds) == "done"
+
+
 def test_output_of_an_engine_is_dropped(capfd):
     """An engine that prints is measured like any other."""
     found = ds.run([BALL], [breaking.breaking(breaking.shout)], [4e-3]).table

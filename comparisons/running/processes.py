@@ -161,12 +161,7 @@ class EngineProcesses:
                 if self._has_exited(entry.label) and not finished([task], GRACE):
                     self.renew(entry)
                     raise Failed("crashed", "its process exited with code 0 before the work was done")
-                if self._processes[entry.label].value:
-                    start = min(start, time.monotonic())  # the pool's own limits are of a clock that may be set
-                if time.monotonic() - start > WALL_TIME_FACTOR * allowed:
-                    self._end_group(entry.label)
-                    self.renew(entry)
-                    raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * allowed:g} s of wall time")
+                start = self._start_in_time(entry, start, WALL_TIME_FACTOR * allowed)
                 largest = max(largest, self._memory(entry.label))
                 while_waiting()
             result: Result = task.result()
@@ -181,6 +176,20 @@ class EngineProcesses:
         except Exception as error:  # what the adapter returns cannot be sent to this process
             raise Failed("crashed", f"its result cannot be returned: {described(error)}") from None
         return result
+
+    def _start_in_time(self, entry: EngineEntry, start: float, limit: float) -> float:
+        """The time at which the work of an engine began, which was `start` if that is finite; by a clock that nobody sets [s].
+
+        Raises:
+            Failed: The limit of wall time [s] is exceeded; the process is ended.
+        """
+        if self._processes[entry.label].value:
+            start = min(start, time.monotonic())
+        if time.monotonic() - start > limit:
+            self._end_group(entry.label)
+            self.renew(entry)
+            raise Failed("timed_out", f"not done after {limit:g} s of wall time")
+        return start
 
     def _memory(self, label: str) -> int:
         """The memory that an engine's process has for data [bytes], which is limited; 0 where the system does not say."""

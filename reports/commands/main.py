@@ -1,5 +1,6 @@
 """The command line: the group of commands, and the exit code of every error."""
 
+import os
 import sys
 import traceback
 from importlib import import_module
@@ -7,6 +8,7 @@ from typing import Any
 
 import click
 
+from reports.commands import surroundings
 from reports.commands.interrupts import handle_interrupts, stop_if_interrupted
 from reports.terminal.streams import error_of, unfailing
 
@@ -57,6 +59,10 @@ def main() -> None:
 
 def _run_and_report_errors() -> int:
     """Run the command, print its error if it has one, and return the exit code."""
+    if problem := surroundings.problem():
+        click.echo(f"dropspin: {problem}.", err=True)
+        return 2
+    os.environ.pop("MPLBACKEND", None)  # plots become files; the backend of a notebook need not be installed here
     try:
         return _run()
     except (click.Abort, KeyboardInterrupt) as interrupt:
@@ -66,7 +72,11 @@ def _run_and_report_errors() -> int:
     except OSError as error:
         _say(_text(error))
         return 2
-    except Exception:
+    except Exception as error:
+        limit = surroundings.limited_to()
+        if limit is not None or isinstance(error, MemoryError):
+            click.echo(f"dropspin: {surroundings.shortage(limit)} ({type(error).__name__}: {' '.join(str(error).split())}).", err=True)
+            return 2
         click.echo("dropspin: internal error; please report the following output.", err=True)
         traceback.print_exc()
         return INTERNAL_ERROR

@@ -11,8 +11,8 @@ import math
 import os
 import signal
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
 from types import TracebackType
@@ -117,8 +117,8 @@ class EngineProcesses:
     def start(self, entries: Sequence[EngineEntry]) -> None:
         """Start the processes of engines: a process that is forked while another thread compiles or imports may wait for it forever."""
         for entry in entries:
-            self._pools[entry.label] = self._pool(entry)
-            with interrupts_deferred():
+            with _system_errors_named(entry), interrupts_deferred():
+                self._pools[entry.label] = self._pool(entry)
                 started = self._pools[entry.label].schedule(int)
             while not finished([started], POLL):
                 pass
@@ -147,11 +147,12 @@ class EngineProcesses:
         if entry.label in self._pools and not self._pools[entry.label].active:  # the engine broke its process after its last work
             self.renew(entry)
         if entry.label not in self._pools:
-            self._pools[entry.label] = self._pool(entry)
+            with _system_errors_named(entry):
+                self._pools[entry.label] = self._pool(entry)
         self._processes[entry.label].value = 0
         self._counts[entry.label][:] = [0, 0]
         allowed = self._resources.processor_time + (COMPILATION if entry.engine is not None and entry.engine.compiles else 0.0)
-        with interrupts_deferred():
+        with _system_errors_named(entry), interrupts_deferred():
             task = self._pools[entry.label].schedule(call, args=[work, given, allowed])
         largest, start = 0, math.inf
         try:
@@ -244,6 +245,18 @@ class EngineProcesses:
         self._closed = True
         for label in list(self._processes):
             self._end_group(label)
+
+
+@contextmanager
+def _system_errors_named(entry: EngineEntry) -> Iterator[None]:
+    """Raise `DropspinError` for an error of the system while a process is started, which is none of a file that is being written."""
+    try:
+        yield
+    except OSError as error:
+        raise DropspinError(
+            f"the system cannot start a process for {entry.label}: {error.strerror or error}; shared memory (/dev/shm) must be writable "
+            "and not full, and the limits of processes and open files must not be reached (ulimit -u, ulimit -n)."
+        ) from None
 
 
 def _verdict(exit_code: int | None, allowed: float) -> tuple[Verdict, str]:

@@ -99,7 +99,7 @@ def tradeoff(
     if truth is None:
         raise DropspinError(f"{scene.name} has no exact solution to compare with; choose a scene that has one (see dropspin list).")
     of_the_motion = leading_metric(scene)
-    chosen = metric or of_the_motion
+    chosen = of_the_motion if metric is None else metric
     known = [one.name for one in metrics_for(scene, truth)]
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)

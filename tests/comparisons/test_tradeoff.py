@@ -395,3 +395,8 @@ def test_memory_per_world_is_the_peak_of_a_batch(worlds):
 
 def test_memory_of_an_engine_without_batches_is_unknown():
     assert np.isnan(costs.memory_per_world(EngineEntry("exact", Exact()), SPIN, 1e-3, 1024))
+
+
+def test_empty_name_of_a_metric_is_refused_before_anything_runs():
+    with pytest.raises(DropspinError, match="spin-principal's metric '' is unknown"):
+        tradeoff("spin-principal", "no_such_module:Engine", "")

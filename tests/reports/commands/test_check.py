@@ -133,6 +133,17 @@ def test_a_crash_cannot_be_accepted(repository, tmp_path):
     assert not (tmp_path / "none.toml").exists()
 
 
+@pytest.mark.parametrize("fault", ["raise RuntimeError('no')", "import no_such_library"], ids=["broken", "missing"])
+def test_summary_counts_an_engine_that_could_not_be_used(fault, tmp_path):
+    (tmp_path / "my_engine.py").write_text(fault)
+    (tmp_path / "spin.toml").write_text('duration = 0.1\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
+    assert dropspin("run", "spin.toml", "-e", ENGINE, "-e", "document", "--dt", "0.01", "-o", "out", cwd=tmp_path).returncode == 3
+    assert dropspin("check", "out", "--summary", "summary.md", cwd=tmp_path).returncode == 3
+    rows = [line.split("|")[1:-1] for line in (tmp_path / "summary.md").read_text().splitlines() if line.startswith("| ")]
+    assert [cell.strip() for cell in rows[0]] == ["engine", "passed", "failed", "known", "limited", "broke down or missing"]
+    assert {row[0].strip().replace("\\", ""): int(row[-1]) for row in rows[1:]} == {ENGINE: 1, "document": 0}
+
+
 def test_an_engine_that_can_no_longer_be_imported_loses_its_accepted_results(repository, junit_schema, tmp_path):
     """CI learns of it in every form."""
     (tmp_path / "my_engine.py").write_text("import no_such_library")

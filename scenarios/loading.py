@@ -1,5 +1,6 @@
 """Loading of a `Scenario` by the name or number of a catalogue scene, the name of a random scene, from a TOML file, or from a mapping."""
 
+import json
 import os
 import re
 import sys
@@ -149,20 +150,38 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = MAX_FI
     Raises:
         SceneError: The path is not a TOML file, or cannot be read.
     """
+    text, remedy = "", f"a {what} is a TOML file in UTF-8"
     try:
-        content = tomllib.loads(read_file(path, given, what, largest).decode("utf-8-sig"))
+        raw = read_file(path, given, what, largest)
+        text = raw.decode("utf-8-sig")
+        content = tomllib.loads(text)
     except DropspinError as error:
         raise SceneError(str(error)) from None
     except UnicodeDecodeError as error:
-        raise SceneError(f"{given}: byte {error.start} is not UTF-8 text; a {what} is a TOML file in UTF-8.") from None
+        reason = "is a binary file, which is not UTF-8 text" if b"\0" in raw else f"byte {error.start} is not UTF-8 text"
+        raise SceneError(f"{given}: {reason}; {remedy}.") from None
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{given}: not TOML: {error}.") from None
+        if found := _format(text):
+            raise SceneError(f"{given}: is {found}; {remedy}.") from None
+        raise SceneError(f"{given}: not TOML: {error}{'' if path.suffix == '.toml' else f'; {remedy}'}.") from None
     except RecursionError:
         raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
     except ValueError:  # of Python's limit for converting decimal digits
         raise SceneError(f"{given}: has a whole number {TOO_LARGE}.") from None
     _verify_sizes(content, given, what)
     return content
+
+
+def _format(text: str) -> str:
+    """What a text that is not TOML is, such as a robot's model; empty if that is not recognised."""
+    if element := re.match(r"(?:\s|<\?.*?\?>|<!--.*?-->|<![^->]*>)*+<([A-Za-z]+)", text, re.DOTALL):
+        model = {"mujoco": "an MJCF model", "robot": "a URDF model", "sdf": "an SDF model"}
+        return f"{model.get(element[1], 'a file')} in XML"
+    try:
+        json.loads(text)
+    except (ValueError, RecursionError):
+        return ""
+    return "a file in JSON"
 
 
 TOO_LARGE = "that exceeds the range of floating-point numbers"

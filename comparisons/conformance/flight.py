@@ -57,6 +57,9 @@ def _permuted_moments(order: tuple[int, ...]) -> Simulated:
 
 
 def _as_a_ball(scene: Scenario) -> Scenario:
+    """In flight, in which this is the motion without the gyroscopic term; in an impact it is another one."""
+    if scene.floor is not None:
+        return scene
     mean = float(np.trace(scene.body.inertia_tensor)) / 3.0
     return changed_table("body", inertia=(mean, mean, mean))(scene)
 

@@ -14,11 +14,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.conventions import CONVENTIONS
-from comparisons.conformance.fault_model import Exact, FaultModel
-from comparisons.conformance.flight import FLIGHT
-from comparisons.conformance.impact import IMPACT
 from comparisons.conformance.probes import PROBES, Probe
+from comparisons.faults.conventions import CONVENTIONS
+from comparisons.faults.fault_model import Exact, FaultModel
+from comparisons.faults.flight import FLIGHT
+from comparisons.faults.impact import IMPACT
 from scenarios import Scenario
 from scenarios.body import Sphere
 
@@ -63,9 +63,9 @@ def _best(candidates: Iterable[FaultModel], probes: Iterable[Probe], motion_of: 
     explained = dict.fromkeys(candidates, 0)
     for probe in probes:
         known: Exact = {}
-        exact = NO_FAULT.motion(probe, known)
+        exact = NO_FAULT.motion(probe.scene, probe.times, known)
         assert exact is not None
-        motions = {fault: states for fault in explained if (states := fault.motion(probe, known)) is not None}
+        motions = {fault: states for fault in explained if (states := fault.motion(probe.scene, probe.times, known)) is not None}
         changed = {fault: states for fault, states in motions.items() if probe.off(states, exact) > 1.0}
         found = motion_of(probe) if changed else None
         if found is None:
@@ -83,7 +83,11 @@ def _motions_with_faults(probe: Probe, count: int) -> tuple[list[FaultModel], Ar
     """All faults, or pairs of them, whose motion of a probe is known, and these motions, shape (faults, 2, 13)."""
     singly = [fault for fault in FAULT_MODELS if fault.about != "start"]  # the start has a check of its own
     known: Exact = {}
-    found = [(fault, motion) for fault in (singly if count == 1 else _pairs()) if (motion := fault.motion(probe, known)) is not None]
+    found = [
+        (fault, motion)
+        for fault in (singly if count == 1 else _pairs())
+        if (motion := fault.motion(probe.scene, probe.times, known)) is not None
+    ]
     return [fault for fault, _ in found], np.array([motion for _, motion in found])
 
 

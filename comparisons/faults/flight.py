@@ -6,7 +6,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.fault_model import FaultModel, Simulated, axis_names, changed_table, faults_of, moments_of_inertia
+from comparisons.faults.fault_model import FaultModel, Simulated, axis_names, changed_table, faults_of, moments_of_inertia
 from scenarios import Scenario
 from scenarios.model import Gravity
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from comparisons.conformance.fault_model import Simulated, axis_names, changed_table, faults_of, moments_of_inertia
-from comparisons.conformance.flight import ORDERS
+from comparisons.faults.fault_model import Simulated, axis_names, changed_table, faults_of, moments_of_inertia
+from comparisons.faults.flight import ORDERS
 from scenarios import Scenario
 from scenarios.body import Box
 

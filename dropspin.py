@@ -10,6 +10,7 @@ Names are imported on first use, so that `import dropspin` and `dropspin --help`
 
 import os
 import sys
+from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -150,13 +151,18 @@ def main() -> None:
     Neither the working directory nor a user's folder on PYTHONPATH can hide dropspin's modules or installed packages. The working directory
     is on Python's path only in the processes of the user's own engines, and folders on PYTHONPATH come last.
     """
+    with suppress(FileNotFoundError):  # of a working directory that was removed, which the command line reports
+        _arrange_path()
+    from reports.commands.main import main as command_line
+
+    command_line()
+
+
+def _arrange_path() -> None:
     home, here = os.path.dirname(os.path.abspath(__file__)), os.getcwd()
     named = [os.path.abspath(place) for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
     own = [place for place in sys.path if os.path.abspath(place) not in {*named, here} - {home}]
     sys.path[:] = own + [place for place in dict.fromkeys(named) if place not in {home, here}]
-    from reports.commands.main import main as command_line
-
-    command_line()
 
 
 if __name__ == "__main__":

@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 
-import pandas as pd
-
 from comparisons.regressions.checking import Checked
 from comparisons.regressions.comparing import Changes
 from comparisons.results.provenance import versions_behind
@@ -27,11 +25,11 @@ def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Seq
     results = checked.results
     return page(
         "check.md",
-        sentences=check.sentences(checked, file),
+        sentences=[check.scope(file), *check.sentences(checked, file)],
         groups=grouped(results, found, None if file is None else file.path),
         most=MOST_SENTENCES,
         engines=results.engines,
-        tallies={engine: _tally(results.table[results.table["engine"] == engine]) for engine in results.engines},
+        tallies={engine: _tally(results, engine) for engine in results.engines},
         versions=versions_behind(results.provenance),
         cpu=results.provenance["cpu"],
     )
@@ -47,6 +45,8 @@ def history_markdown(runs: int, sentences: Sequence[str], pictures: Mapping[str,
     return page("history.md", runs=runs, sentences=sentences, pictures=pictures)
 
 
-def _tally(rows: pd.DataFrame) -> dict[str, int]:
-    """The number of checks of an engine with each verdict."""
-    return {str(verdict): int(count) for verdict, count in rows["verdict"].value_counts().items()}
+def _tally(results: Results, engine: str) -> dict[str, int]:
+    """The number of checks of an engine with each verdict, and of those in which it broke down or is missing."""
+    mine = results.table["engine"] == engine
+    verdicts = results.table.loc[mine, "verdict"].value_counts()
+    return {str(verdict): int(count) for verdict, count in verdicts.items()} | {"broke down": int(results.breakdowns[mine].sum())}

@@ -84,6 +84,17 @@ class _Body(Table):
         """Lowest possible height of the centre of mass on a floor [m]."""
         raise NotImplementedError
 
+    @cached_property
+    def largest_spread(self) -> Array:
+        """Bounds of the mean squares of x, y and z of the mass, in the body frame, if no mass is outside of the body [m²], shape (3,).
+
+        The mean of x² is at most a b for a mass between -a and b whose centre is at 0.
+
+        Source: R. Bhatia & C. Davis, A better bound on the variance, Amer. Math. Monthly 107 (2000).
+        """
+        squares: Array = (self.rounding + self.vertices.max(axis=0)) * (self.rounding - self.vertices.min(axis=0))
+        return squares
+
 
 class Sphere(_Body):
     """A ball."""

@@ -5,7 +5,7 @@ imports SciPy, so the list of scenes does not use it.
 """
 
 _SCENES = {
-    "ball-impact": ("drop-ball-backspin", "drop-ball-grip"),
+    "ball-impact": ("drop-ball-slipping", "drop-ball-backspin", "drop-ball-grip"),
     "bounce-ladder": (
         "bounce-95",
         "bounce-99",
@@ -19,7 +19,16 @@ _SCENES = {
         "drop-box-flat",
         "turn-box-flat",
     ),
-    "corner-impact": ("drop-box-anyhow", "drop-box-corner", "drop-box-heavy", "drop-box-sticking", "drop-box-tumble"),
+    "corner-impact": (
+        "drop-box-anyhow",
+        "drop-box-corner",
+        "drop-box-heavy",
+        "drop-box-sticking",
+        "drop-box-tumble",
+        "drop-box-turning",
+        "drop-box-turning-slippery",
+        "drop-tetrahedron-turning",
+    ),
     "coulomb-slide": ("slide-box", "slide-box-askew", "slope-box-hold", "slope-box-slide"),
     "coulomb-turn": ("turn-box-rough",),
     "damped-free-rotor": ("spin-damped",),

@@ -17,6 +17,10 @@ class SceneError(DropspinError):
     """A scene that cannot be loaded."""
 
 
+class SceneWarning(UserWarning):
+    """A scene has values that are possible, but probably not meant."""
+
+
 class UnknownName(DropspinError):
     """A name that is not in the list of known names.
 
@@ -33,5 +37,10 @@ class UnknownName(DropspinError):
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:
     """' Did you mean …?' with the nearest known name, or an empty string."""
-    nearest = difflib.get_close_matches(given, list(known), n=1, cutoff=0.55)
-    return f" Did you mean {nearest[0]!r}?" if nearest else ""
+    meant = nearest(given, known)
+    return f" Did you mean {meant!r}?" if meant else ""
+
+
+def nearest(given: str, known: Iterable[str]) -> str | None:
+    """The nearest known name; None if none is near."""
+    return next(iter(difflib.get_close_matches(given, list(known), n=1, cutoff=0.55)), None)

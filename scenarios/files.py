@@ -19,7 +19,7 @@ def read_file(path: Path, given: str, what: str, largest: int) -> bytes:
     """
     try:
         if path.is_dir():
-            raise DropspinError(f"{given}: is a directory; a {what} is one file.")
+            raise DropspinError(f"{given}: is a directory; a {what} is one file, so give its path.")
         path.stat()  # raises the error of an absent file
         if not path.is_file():
             raise DropspinError(f"{given}: is a pipe or a device; a {what} is a regular file.")

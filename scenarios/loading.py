@@ -1,17 +1,20 @@
 """Loading of a `Scenario` by the name or number of a catalogue scene, the name of a random scene, from a TOML file, or from a mapping."""
 
+import json
 import os
 import re
 import sys
 import tomllib
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from scenarios.errors import DropspinError, SceneError, did_you_mean
+from scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
 from scenarios.files import read_file
 from scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
 from scenarios.problems import scene_name
@@ -21,6 +24,8 @@ CATALOGUE = Path(__file__).parent / "catalogue"
 DRAWN = r"draw-([0-9]{1,20})-([0-9]{1,4})"
 """The name of a random scene of `draw`, with its seed and its number."""
 MAX_FILE_SIZE = 1_000_000  # bytes; a scene of ten thousand vertices is smaller
+INERTIA_ROUNDING = 1.001  # moments are often given with four digits
+ALONG_FLOOR = 1e-6  # of gravity, across a floor to which it is parallel
 DEEPEST = 30
 """Largest depth of nested tables and lists in a file; a baseline has six."""
 FEATURES: dict[str, type[BaseModel]] = {
@@ -55,13 +60,13 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
             with the same keys. A mapping may have arrays instead of lists, and a key `name`, which is `scene` by default.
 
     Returns:
-        The scene; all values are in SI units.
+        The scene; all values are in SI units. A warning is given of values that are possible, but probably not meant.
 
     Raises:
         SceneError: The scene is not valid. The message gives the file or mapping, the key, the value and the allowed values.
     """
     if isinstance(scene, Mapping):
-        return _from_mapping(scene)
+        return _plausible(from_mapping(scene), "scene")
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
@@ -75,7 +80,49 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         str(path).encode()
     except UnicodeEncodeError:
         raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
-    return from_table(path.stem, str(scene), read_toml(path, str(scene)))
+    loaded = from_table(path.stem, str(scene), read_toml(path, str(scene)))
+    return loaded if path.parent == CATALOGUE else _plausible(loaded, str(scene))
+
+
+def _plausible(scene: Scenario, where: str) -> Scenario:
+    """A scene that a user gives, with a warning of each value that is probably not meant.
+
+    Raises:
+        SceneError: A body that strikes a floor has moments of inertia that no body of its size has.
+    """
+    body, g = scene.body, scene.acceleration
+    if not isinstance(body.inertia, str):
+        spread = (0.5 * sum(body.inertia) - np.array(body.inertia)) / body.mass  # mean squares of x, y and z
+        largest = body.largest_spread
+        if np.any(spread > INERTIA_ROUNDING * largest) or spread.sum() > INERTIA_ROUNDING * body.size**2:
+            moments = body.mass * np.minimum(largest.sum() - largest, body.size**2)
+            message = (
+                f"{where}: body.inertia: got {list(body.inertia)} kg m², which needs mass outside of the body: a root mean square of "
+                f"x, y and z of {_digits(np.sqrt(spread))} m, of which this shape allows {_digits(np.sqrt(largest))} m, and moments of "
+                f"inertia of up to {_digits(moments)} kg m² for {body.mass:g} kg. Correct the inertia, the mass or the size."
+            )
+            if scene.floor is not None:
+                raise SceneError(message)
+            warnings.warn(f"{message} Without a floor, the size has no effect.", SceneWarning, stacklevel=3)
+    if body.shape == "vertices" and not {"inertia", "masses"} & body.model_fields_set:
+        warnings.warn(
+            f"{where}: body: without inertia and masses, the mass is at the {len(body.points)} points; a solid body has other moments of "
+            "inertia. Give inertia = [Ixx, Iyy, Izz], or inertia = 'vertices' if this is meant.",
+            SceneWarning,
+            stacklevel=3,
+        )
+    if scene.floor is not None and g.any() and abs(g[1]) <= ALONG_FLOOR * np.linalg.norm(g):
+        warnings.warn(
+            f"{where}: gravity.acceleration: got {g.tolist()}, along the floor, so that the body does not fall onto it; "
+            "y is up and the floor is y = 0: in a file with z up, exchange y and z of all vectors.",
+            SceneWarning,
+            stacklevel=3,
+        )
+    return scene
+
+
+def _digits(values: NDArray[np.float64]) -> str:
+    return f"[{', '.join(f'{value:.3g}' for value in values)}]"
 
 
 def _find(scene: str | Path) -> Path:
@@ -103,20 +150,38 @@ def read_toml(path: Path, given: str, what: str = "scene", largest: int = MAX_FI
     Raises:
         SceneError: The path is not a TOML file, or cannot be read.
     """
+    text, remedy = "", f"a {what} is a TOML file in UTF-8"
     try:
-        content = tomllib.loads(read_file(path, given, what, largest).decode("utf-8-sig"))
+        raw = read_file(path, given, what, largest)
+        text = raw.decode("utf-8-sig")
+        content = tomllib.loads(text)
     except DropspinError as error:
         raise SceneError(str(error)) from None
     except UnicodeDecodeError as error:
-        raise SceneError(f"{given}: byte {error.start} is not UTF-8 text; a {what} is a TOML file in UTF-8.") from None
+        reason = "is a binary file, which is not UTF-8 text" if b"\0" in raw else f"byte {error.start} is not UTF-8 text"
+        raise SceneError(f"{given}: {reason}; {remedy}.") from None
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{given}: not TOML: {error}.") from None
+        if found := _format(text):
+            raise SceneError(f"{given}: is {found}; {remedy}.") from None
+        raise SceneError(f"{given}: not TOML: {error}{'' if path.suffix == '.toml' else f'; {remedy}'}.") from None
     except RecursionError:
         raise SceneError(f"{given}: nested too deeply to be a {what}.") from None
     except ValueError:  # of Python's limit for converting decimal digits
         raise SceneError(f"{given}: has a whole number {TOO_LARGE}.") from None
     _verify_sizes(content, given, what)
     return content
+
+
+def _format(text: str) -> str:
+    """What a text that is not TOML is, such as a robot's model; empty if that is not recognised."""
+    if element := re.match(r"(?:\s|<\?.*?\?>|<!--.*?-->|<![^->]*>)*+<([A-Za-z]+)", text, re.DOTALL):
+        model = {"mujoco": "an MJCF model", "robot": "a URDF model", "sdf": "an SDF model"}
+        return f"{model.get(element[1], 'a file')} in XML"
+    try:
+        json.loads(text)
+    except (ValueError, RecursionError):
+        return ""
+    return "a file in JSON"
 
 
 TOO_LARGE = "that exceeds the range of floating-point numbers"
@@ -134,7 +199,7 @@ def _verify_sizes(content: dict[str, Any], given: str, what: str) -> None:
         raise SceneError(f"{given}: nested too deeply to be a {what}.")
 
 
-def _from_mapping(scene: Mapping[str, Any]) -> Scenario:
+def from_mapping(scene: Mapping[str, Any]) -> Scenario:
     """The scene of a mapping, whose values may be NumPy arrays and scalars."""
     if "origin" in scene:
         raise SceneError(f"scene['origin']: got {shown(scene['origin'])}; the key is not allowed.")

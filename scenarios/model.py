@@ -46,11 +46,15 @@ class Gravity(Table):
 
 
 class Floor(Table):
-    """The plane y = 0, facing up."""
+    """The plane y = 0, facing up.
+
+    `impact_law` is the model of an impact with a coefficient of friction: see `scenarios.truths.friction_impact`.
+    """
 
     restitution: Annotated[Number, Field(ge=0, le=1)]
     friction: Literal["none", "infinite"] | NotNegative
     rest_speed: NotNegative = 0.0
+    impact_law: Literal["cone", "integrated-newton", "integrated-poisson", "integrated-energy"] = "cone"
 
     @property
     def coefficient(self) -> float:
@@ -61,6 +65,12 @@ class Floor(Table):
     def _no_friction_is_none(self) -> Self:
         if self.friction == 0.0:
             object.__setattr__(self, "friction", "none")
+        return self
+
+    @model_validator(mode="after")
+    def _law_has_friction(self) -> Self:
+        if self.impact_law != "cone" and isinstance(self.friction, str):
+            raise ValueError(f"impact_law is {self.impact_law!r}, which needs a coefficient of friction; friction is {self.friction!r}")
         return self
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.body import Vertices
-from scenarios.loading import load
+from scenarios.loading import from_mapping
 from scenarios.mechanics import is_diagonal
 from scenarios.model import Scenario
 from scenarios.rotations import conjugate, multiply, rotate
@@ -29,7 +29,7 @@ def changed(scene: Scenario, duration: float | None = None, **tables: Mapping[st
     content = scene.model_dump(exclude={"expect", "ensemble"}, exclude_none=True)
     for table, keys in tables.items():
         content[table] = {**content[table], **keys}
-    return load({**content, "duration": scene.duration if duration is None else duration})
+    return from_mapping({**content, "duration": scene.duration if duration is None else duration})
 
 
 def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Scenario:

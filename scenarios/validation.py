@@ -8,7 +8,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from scenarios.body import LARGEST
-from scenarios.errors import DropspinError, did_you_mean
+from scenarios.errors import DropspinError, did_you_mean, nearest
 
 Kind = TypeVar("Kind", bound=BaseModel)
 Problem = Mapping[str, Any]
@@ -51,9 +51,13 @@ def first_problem(kind: type[BaseModel], error: ValidationError, alternatives: A
     problems = error.errors(include_url=False)
     # A key that takes a word or something else is reported once for each; for a value that is not a word, the word's problem is irrelevant.
     relevant = [problem for problem in problems if problem["type"] != "literal_error" or isinstance(problem["input"], str)]
-    others = len({tuple(_located(kind, problem)[0][:2]) for problem in problems}) - 1
+    # An unknown key comes first: if it is misspelt, the key that is meant is missing, which is the same problem.
+    unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
+    meant = [_meant(kind, problem, root) for problem in unknown]
+    places = [_located(kind, problem)[0] for problem in problems if problem["type"] != "missing" or _located(kind, problem)[0] not in meant]
+    others = len({tuple(place[:2]) for place in places}) - 1
     more = f" (and {others} more {'problem' if others == 1 else 'problems'})" if others else ""
-    return f"{_described(kind, (relevant or problems)[0], alternatives or {}, root)}{more}"
+    return f"{_described(kind, (unknown or relevant or problems)[0], alternatives or {}, root)}{more}"
 
 
 def shown(value: Any) -> str:
@@ -80,7 +84,7 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
     given = shown(problem["input"])
     match problem["type"]:
         case "extra_forbidden":
-            allowed = [field.alias or name for name, field in table.model_fields.items() if not _is_hidden(field, root)]
+            allowed = _keys(table, root)
             return f"{prefix}unknown key. Allowed: {', '.join(allowed)}.{did_you_mean(str(path[-1]), allowed)}"
         case "missing":
             return f"{prefix}missing; it has no default."
@@ -109,6 +113,17 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
 
 def _items(count: int) -> str:
     return f"{count} item{'' if count == 1 else 's'}"
+
+
+def _keys(table: type[BaseModel], root: str) -> list[str]:
+    """The keys that a table may have."""
+    return [field.alias or name for name, field in table.model_fields.items() if not _is_hidden(field, root)]
+
+
+def _meant(kind: type[BaseModel], unknown: Problem, root: str) -> list[str | int | None]:
+    """The place of the key that is probably meant by an unknown one."""
+    path, table = _located(kind, unknown)
+    return [*path[:-1], nearest(str(path[-1]), _keys(table, root))]
 
 
 def _is_hidden(field: Any, root: str) -> bool:

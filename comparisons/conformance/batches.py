@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.fault_model import changed_table
 from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
 from comparisons.conformance.probes import DT
 from comparisons.conformance.protocol import ROUNDING, relative_difference
 from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, RICHEST, accepted_scene
 from comparisons.engines.base import BatchSimulation, Engine, numpy_array
+from comparisons.faults.fault_model import changed_table
 from comparisons.running.inputs import EngineEntry
 from comparisons.running.recording import record
 from comparisons.running.start_phases import START_PHASES

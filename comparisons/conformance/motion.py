@@ -1,23 +1,18 @@
 """The check of a probe: the engine's motion equals the exact solution; if not, which fault or symptom explains the difference."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.conformance.explanations import explain_motion
 from comparisons.conformance.outcomes import CheckResult, Declined
 from comparisons.conformance.probes import DT, PROBES, Probe, differences
+from comparisons.conformance.symptoms import symptoms
 from comparisons.engines.base import Engine, KnownLimitation
-from comparisons.running.recording import record
+from comparisons.running.recording import Breakdown, record, try_record
 from scenarios import truth_for
-from scenarios.state import RATES, SPIN, VELOCITY
 from scenarios.truths import LAWS, Law
 
 Array = NDArray[np.float64]
-
-HEIGHT, UPWARD = 1, 8
-"""The vertical position and velocity in a state."""
 
 
 def check_motion(engine: Engine, check: str) -> CheckResult:
@@ -40,10 +35,16 @@ def check_motion(engine: Engine, check: str) -> CheckResult:
     law = _own_law(engine, probe, found)
     if law is not None:
         return CheckResult(check, "noted", f"impacts follow the {law} law, as the engine states")
-    fault = explain_motion(probe, found)
+    fault = explain_motion(probe, found, lambda other: _states(engine, other))
     if fault is not None:
         return CheckResult(check, "noted" if fault.is_peculiarity else "failed", fault.message)
-    return CheckResult(check, "failed", "; ".join([*_symptoms(probe, rows, exact), _errors(found, exact)]))
+    return CheckResult(check, "failed", "; ".join(symptoms(probe, recording.motion)))
+
+
+def _states(engine: Engine, probe: Probe) -> Array | None:
+    """The engine's states of a probe, shape (2, 13); None if it declines the scene or breaks down, which the check of that probe states."""
+    recording = try_record(engine, probe.scene, DT, verify=False)
+    return None if isinstance(recording, Breakdown) else recording.motion.states[probe.rows]
 
 
 def _own_law(engine: Engine, probe: Probe, found: Array) -> Law | None:
@@ -67,32 +68,5 @@ def _explains(limitation: KnownLimitation, found: Array, exact: Array, probe: Pr
 
 
 def _errors(found: Array, exact: Array) -> str:
-    if not np.isfinite(found).all():
-        return "the state is not finite"
     position, attitude, velocity, spin = differences(found, exact)
     return f"errors: {position:.2g} m, {attitude:.2g} rad, {velocity:.2g} m/s, {spin:.2g} rad/s"
-
-
-def _symptoms(probe: Probe, rows: Array, exact: Array) -> Iterator[str]:
-    """Symptoms of a motion that no known fault explains."""
-    scene, end = probe.scene, rows[-1]
-    if not np.any(end[RATES]) and np.any(exact[-1, RATES]):
-        yield "the body stops: the engine puts it to sleep"
-        return
-    if scene.floor is None and scene.gravity is None:
-        for what, unit, part in (("speed", "m/s", VELOCITY), ("angular velocity", "rad/s", SPIN)):
-            final, expected = (float(np.linalg.norm(state[part])) for state in (end, exact[-1]))
-            if abs(final - expected) > 1e-3 * expected:
-                too_fast, too_slow = "", "damping or a clamp that the scene does not have: "
-                if scene.damping is not None:
-                    too_fast, too_slow = "damping is missing or too weak: ", "damping is too strong, or a clamp: "
-                cause = too_slow if final < expected else too_fast
-                yield f"{cause}the final {what} is {final:.4g} {unit}, expected {expected:.4g}"
-    rises = np.flatnonzero((rows[1:, UPWARD] > 0.0) & (rows[:-1, UPWARD] <= 0.0))
-    truth = truth_for(scene)
-    assert truth is not None
-    if scene.floor is not None and truth.events and len(rises):
-        first = int(rises[0])
-        rebound = float(rows[first:, UPWARD].max() / -rows[: first + 1, UPWARD].min())
-        yield f"the rebound begins at a height of {rows[first, HEIGHT]:.4g} m, expected {truth.events[0].before[HEIGHT]:.4g} m"
-        yield f"the rebound speed is {rebound:.3g} of the impact speed; the scene's restitution is {scene.floor.restitution:g}"

@@ -28,7 +28,8 @@ REASONS = {
     "restitutionVelocityThreshold": "the scene's rest speed, by default 0; Bullet drops restitution below 0.2 m/s",
     "useSplitImpulse": "keeps corrections of depth out of the velocities",
     "splitImpulsePenetrationThreshold": "at any depth",
-    "enableConeFriction": "the same friction in every direction; a pyramid's is up to 1.41 times larger",
+    "enableConeFriction": "the same friction in every direction, for a multibody; maximal coordinates ignore it, and limit friction along "
+    "the initial slip and across it separately, so that friction is up to 1.41 times larger where the slip turns in an impact",
     "lateralFriction": f"the scene's coefficient; {STRONGEST_FRICTION:g}, the most that Bullet allows, where the floor grips",
     "contactProcessingThreshold": "contacts begin at touch; at the default, restitution 0.5 becomes 0.248 at 1 ms and 0.024 at 0.25 ms",
     "linearDamping": "1 - exp(-rate), 0 without damping; a multibody's default is 0.04",

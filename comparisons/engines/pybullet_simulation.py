@@ -20,8 +20,9 @@ from comparisons.engines.pybullet_settings import (
     damping_properties,
     world_parameters,
 )
-from scenarios import Scenario
+from scenarios import Scenario, Trajectory
 from scenarios.body import Box, Sphere, Vertices
+from scenarios.mechanics import angular_momentum, kinetic_energy
 from scenarios.state import SPIN, VELOCITY
 from scenarios.transformations import heavy_neighbour
 
@@ -71,6 +72,7 @@ class PyBulletSimulation(Simulation):
         self._bullet = _import_quietly()
         self._dt, self._fall, self.velocity_lag = dt, dt * scene.acceleration, 0.5 * dt
         self._grips = scene.floor is not None and scene.floor.friction == "infinite"
+        self._turning_slip_of = scene if scene.floor is not None and 0.0 < scene.floor.coefficient < np.inf and not form.multibody else None
         self._idle = _idle.setdefault(form.default, [])
         self._client = self._idle.pop() if self._idle else self._bullet.connect(self._bullet.DIRECT)
         if self._client < 0:
@@ -175,6 +177,8 @@ class PyBulletSimulation(Simulation):
     def record(self, steps: int, every: int = 1) -> Array:
         rows = super().record(steps, every)
         self.known_limitations = list(_limitations_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
+        if every == 1 and self._turning_slip_of is not None:
+            self.known_limitations += _turning_slip(self._turning_slip_of, rows, self._dt)
         return rows
 
     def as_built(self) -> AsBuilt:
@@ -213,6 +217,44 @@ def _limitations_met(rows: Array, dt: float, fall: Array | None) -> Iterator[Kno
         yield KnownLimitation(
             f"a contact needs more than {STRONGEST_FRICTION:g} times its normal force to stick; Bullet clamps friction there, so it slips"
         )
+
+
+def _turning_slip(scene: Scenario, rows: Array, dt: float) -> Iterator[KnownLimitation]:
+    """The limitation of friction in maximal coordinates, for a motion with states at every step, shape (n, 13).
+
+    Bullet limits friction along the first direction of the slip and across it, each by µ times the normal force. Where the slip turns in an
+    impact with the normal impulse J, the impulse along the floor is wrong by up to µ J, and the velocity at the floor by a = µ J/M.
+    """
+    assert scene.floor is not None
+    pushes = np.diff(rows[:, VELOCITY], axis=0) - dt * scene.acceleration
+    along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
+    struck = (up > NO_PUSH * np.abs(up).max()) & (along > (1.0 + NO_PUSH) * scene.floor.coefficient * up)
+    if not struck.any():
+        return
+    ratio = float((along[struck] / up[struck]).max()) / scene.floor.coefficient
+    wrong = scene.floor.coefficient * float(up[struck].max())
+    body, motion, left = scene.body, Trajectory.from_states(dt * np.arange(len(rows), dtype=float), rows), dt * len(rows)
+    fastest = float(np.max(np.linalg.norm(motion.velocity, axis=1) + body.size * np.linalg.norm(motion.angular_velocity, axis=1)))
+    height = scene.clearance if scene.starts_above_floor else body.size
+    g, kinetic = abs(float(scene.acceleration[1])), float(kinetic_energy(scene, motion)[0])
+    energy = max(body.mass * g * height, kinetic)
+    turned = body.mass * body.size * wrong / float(np.linalg.norm(angular_momentum(scene, motion), axis=1).max())
+    sizes = {
+        "position_error": wrong * left,
+        "orientation_error": min(np.pi, body.mass * body.size * wrong / float(np.linalg.eigvalsh(body.inertia_tensor)[0]) * left),
+        "energy_error": body.mass * wrong * (fastest + 0.5 * wrong) / energy,
+        "angular_momentum_error": turned,
+        "angular_momentum_direction_error": min(np.pi, 0.5 * np.pi * turned),
+        "friction_cone_excess": (np.sqrt(2.0) - 1.0) * wrong / np.sqrt(2.0 * energy / body.mass),
+        "friction_push": body.mass * wrong * fastest / energy,
+    }
+    if g > 0.0 and scene.starts_above_floor:
+        sizes["bounce_height_error"] = wrong * (fastest + 0.5 * wrong) / (g * height)
+    yield KnownLimitation(
+        "in maximal coordinates Bullet limits friction along the initial slip and across it separately: the slip turns, and the impulse "
+        f"along the floor is up to {ratio:.3g} µ times the normal one; coordinates=multibody keeps the cone",
+        sizes,
+    )
 
 
 @cache

@@ -18,5 +18,5 @@ def with_horizon(judgement: Judgement, scene: Scenario, metric: Metric, truth: T
         return replace(judgement, verdict="no_truth")
     if truth is None or metric.kind != "truth" or metric.first_flight or unresolved or truth.covers_all(scene.duration):
         return judgement
-    limit = f"compared up to t = {truth.horizon:.3g} s: the exact solution is valid until then"
+    limit = f"compared up to t = {truth.horizon:.3g} s, where the exact solution ends: {truth.ends}"
     return replace(judgement, reason="; ".join(filter(None, [judgement.reason, limit])))

@@ -14,13 +14,14 @@ from scenarios import mechanics
 from scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
 
 REACH = 1.0 + 1e-9
-"""Height of the centre of mass, relative to the size of the body, above which the body cannot touch the floor."""
+"""Height of the centre of mass, relative to the size of the body, above which no point of it is below the floor."""
 
 
 class _States(NamedTuple):
     """`StateQuantities` of many motions."""
 
     height: Array
+    vertical_velocity: Array
     kinetic_energy: Array
     energy: Array
     lowest_height: Array
@@ -52,7 +53,7 @@ def motions_side_by_side(
     _kernel()(
         height, kinetic, energy, lowest, touching, valid, rows, unit_tolerance, np.ascontiguousarray(last_row, dtype=np.int64), *given
     )
-    return Motions(setup, _States(height, kinetic, energy, lowest, touching), dt, last_row), valid
+    return Motions(setup, _States(height, states[..., 8], kinetic, energy, lowest, touching), dt, last_row), valid
 
 
 def _for_each(values: Array, size: int) -> NDArray[np.float64]:
@@ -108,15 +109,18 @@ def _fill(
             height[body, row] = s[1]
             kinetic[body, row] = kinetic_energy_of(mass[body], tensor, q, v, w)
             energy[body, row] = energy_of(kinetic[body, row], mass[body], x, v, o, pull, lag[body])
-            lowest[body, row] = np.inf
-            if s[1] <= REACH * size[body]:
-                offset = np.inf
-                for k in range(vertices.shape[1]):
-                    offset = min(offset, offset_of(q, (vertices[body, k, 0], vertices[body, k, 1], vertices[body, k, 2])))
-                lowest[body, row] = s[1] + offset - rounding[body]
             if row < last:
                 n = states[body, row + 1]
                 after = (n[7], n[8], n[9])
                 touching[body, row] = is_touching(v, after, dt[body], pull, strength[body], damping_share[body])
+        for row in range(last + 1):
+            near_step = touching[body, max(row - 1, 0) : row + 2].any()
+            lowest[body, row] = np.inf
+            if near_step or states[body, row, 1] <= REACH * size[body]:
+                s, offset = states[body, row], np.inf
+                q = (s[3], s[4], s[5], s[6])
+                for k in range(vertices.shape[1]):
+                    offset = min(offset, offset_of(q, (vertices[body, k, 0], vertices[body, k, 1], vertices[body, k, 2])))
+                lowest[body, row] = s[1] + offset - rounding[body]
         for quantity in (height, kinetic, energy, lowest):
             quantity[body, last + 1 :] = quantity[body, last]

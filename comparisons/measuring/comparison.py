@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from comparisons.measuring.contacts import ContactResiduals, contact_residuals
 from comparisons.measuring.motions import Motions
 from scenarios import Scenario, Trajectory, Truth
-from scenarios.mechanics import angular_momentum, energy, kinetic_energy
+from scenarios.mechanics import angular_momentum, apex, energy, kinetic_energy
 from scenarios.model import TOUCHING
 from scenarios.rotations import rotate
 
@@ -28,6 +28,8 @@ Rows = NDArray[np.intp]
 SHORTEST_FLIGHT = 16  # steps; a shorter flight is not resolved, and not judged
 SHORT = 0.2
 """A flight is much shorter than the longest if it lasts less than this share of it; its apex is then 25 times lower."""
+LOW = 0.01
+"""A body that rises after an impact by less than this share of its drop stays down: its flight is shorter than `SHORT` of its fall."""
 
 
 class Unresolved(Exception):
@@ -169,6 +171,26 @@ class Comparison:
         return inner
 
     @cached_property
+    def greatest_apexes(self) -> tuple[float, float] | None:
+        """The greatest apex height of the motion after its first contact, and that of the exact body after its first impact [m].
+
+        None if the exact body rises after its first impact by more than `LOW` of the drop.
+
+        Raises:
+            Unresolved: The first contact begins after the end of the exact solution.
+        """
+        fallen = self.exact[self.exact.t > self.impacts[0]] if self.impacts else self.exact[:0]
+        exact = apex(self.scene, fallen)
+        if not len(fallen) or exact.max() - fallen.position[0, 1] > LOW * self.scene.clearance:
+            return None
+        last = len(self.compared) - 1
+        before, after = self.first_contact or (0, last + 1 - len(fallen))
+        if before >= last:
+            raise Unresolved("the first contact begins after the end of the exact solution")
+        first = min(after, last)  # a body that stays in contact rises no more at the end
+        return float(apex(self.scene, self.compared[first:]).max()), float(exact.max())
+
+    @cached_property
     def desynchronised_from(self) -> float:
         """Time at which the flight begins in which the body is desynchronised [s]; infinite if there is no such flight."""
         times = self.motion.t[: len(self.exact)]
@@ -208,14 +230,14 @@ class Comparison:
 
     @cached_property
     def first_contact(self) -> tuple[int, int] | None:
-        """The last row before and the first row after the floor first changes the velocity; None without a contact."""
+        """The last row before and the first row after the first contact; None without a contact."""
         before, after = self.motions.first_contact
         return None if before < 0 else (int(before), int(after))
 
     @property
-    def touching(self) -> NDArray[np.bool_]:
-        """For each step, whether the floor changes the velocity in it, shape (n - 1,)."""
-        return self.motions.states.touching
+    def in_contact(self) -> NDArray[np.bool_]:
+        """For each step, whether it is in a contact, shape (n - 1,)."""
+        return self.motions.in_contact
 
     def contact_point(self, row: int) -> Array:
         """The vector from the centre of mass to the lowest point at a row [m], shape (3,); the mean if several points are equally low."""

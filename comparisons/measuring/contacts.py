@@ -13,6 +13,9 @@ The laws of time-stepping methods hold for any number of contact points in the p
 with the velocity u = v + ω × (-h Y) of the body at the floor, at the distance h below its centre of mass, after the step. The fourth law
 is that the floor acts only where it touches (complementarity): the lowest point is on the floor.
 
+A pull has no contact by which to tell it from a wrong acceleration, so `pull` is that of any step; the other laws are those of contacts
+(`contact_runs`).
+
 In an impact with friction these laws permit a gain of energy (T. R. Kane, 1984), so that energy is measured separately. Where the slip
 reverses within an impact, Coulomb's law at each instant (E. J. Routh, 1860) may leave a slip along F, against the third law.
 """
@@ -40,10 +43,11 @@ RESIDUALS = ("pull", "cone_excess", "push", "gap")
 
 @dataclass(frozen=True, eq=False)
 class ContactResiduals:
-    """The violations of the laws of contact in each time step in which the floor acts; each is 0 where its law holds.
+    """The violations of the laws of contact in each time step in which the velocity changes otherwise than by gravity; 0 where a law holds.
 
     Attributes:
         steps: The numbers of these time steps, the first step being 0, shape (n,).
+        in_contact: Whether they are in a contact, shape (n,); only `pull` is not 0 in others.
         pull: Impulse with which the floor pulls, over M v, shape (n,), with the speed v at which the kinetic energy is the scene's energy.
         cone_excess: Impulse along the floor beyond the friction coefficient times the normal impulse, over M v, shape (n,); NaN if
             friction is infinite.
@@ -52,6 +56,7 @@ class ContactResiduals:
     """
 
     steps: NDArray[np.intp]
+    in_contact: NDArray[np.bool_]
     pull: Array
     cone_excess: Array
     push: Array
@@ -69,6 +74,7 @@ def contact_residuals(scene: Scenario, motion: Trajectory, motions: Motions | No
     assert scene.floor is not None
     found = motions or Motions.of(scene, motion)
     steps = np.flatnonzero(found.states.touching)
+    in_contact = found.in_contact[steps]
     before, after, lowest = motion[steps], motion[steps + 1], found.lowest_height
     energy = float(found.energy_scale) or 1.0  # a body at rest without gravity violates nothing
     momentum = scene.body.mass * np.sqrt(2.0 * energy / scene.body.mass)
@@ -82,13 +88,14 @@ def contact_residuals(scene: Scenario, motion: Trajectory, motions: Motions | No
     if np.isinf(scene.floor.coefficient):
         excess = np.full_like(normal, np.nan)
     else:
-        excess = np.maximum(length(along) - scene.floor.coefficient * np.maximum(normal, 0.0), 0.0)
+        excess = in_contact * np.maximum(length(along) - scene.floor.coefficient * np.maximum(normal, 0.0), 0.0)
     return ContactResiduals(
         steps,
+        in_contact,
         pull=np.maximum(-normal, 0.0) / momentum,
         cone_excess=excess / momentum,
-        push=np.maximum(along_slip, 0.0) / energy,
-        gap=np.maximum(np.minimum(lowest[steps], lowest[steps + 1]), 0.0),
+        push=in_contact * np.maximum(along_slip, 0.0) / energy,
+        gap=np.where(in_contact, np.maximum(np.minimum(lowest[steps], lowest[steps + 1]), 0.0), 0.0),
     )
 
 
@@ -100,9 +107,9 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
         motion: Its motion, such as `simulate` returns it.
 
     Returns:
-        One row for each contact, which is a sequence of time steps in which the floor acts: `start` and `end` [s], the impulse along the
-        normal `impulse` [N s], the change of energy `energy_change` [J], and the largest `pull`, `cone_excess`, `push` and `gap` of its
-        steps, as in `ContactResiduals`.
+        One row for each contact, which is a sequence of time steps in which the floor acts (`contact_runs`): `start` and `end` [s], the
+        impulse along the normal `impulse` [N s], the change of energy `energy_change` [J], and the largest `pull`, `cone_excess`, `push`
+        and `gap` of its steps, as in `ContactResiduals`.
 
     Raises:
         DropspinError: The scene has no floor, or it has damping.
@@ -113,10 +120,11 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
         raise DropspinError(f"{scene.name}: the forces of the floor need a scene with a floor and without damping.")
     motions = Motions.of(scene, motion)
     found = contact_residuals(scene, motion, motions)
-    first = np.flatnonzero(np.diff(found.steps, prepend=-2) > 1)
-    starts, ends = found.steps[first], found.steps[np.append(first[1:], len(found.steps))[: len(first)] - 1] + 1
+    starts, ends = motions.contacts.before, motions.contacts.after
+    first = np.cumsum(ends - starts) - (ends - starts)  # the number of the first step of each contact among those in contact
     falling = (motion.t[ends] - motion.t[starts]) * scene.acceleration[1]
-    residuals = {name: np.maximum.reduceat(getattr(found, name), first) if len(first) else np.empty(0) for name in RESIDUALS}
+    largest = {name: getattr(found, name)[found.in_contact] for name in RESIDUALS}
+    residuals = {name: np.maximum.reduceat(values, first) if len(first) else values for name, values in largest.items()}
     return pd.DataFrame(
         {
             "start": motion.t[starts],

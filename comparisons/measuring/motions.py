@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.measuring.contact_runs import ContactRuns, contact_runs
 from scenarios import Scenario, Trajectory
 from scenarios.mechanics import Components, energy, energy_origin, kinetic_energy, lowest_height, scalar_product
 from scenarios.model import TOUCHING
@@ -29,6 +30,10 @@ class StateQuantities(Protocol):
         """Height of the centre of mass [m], shape (..., n)."""
 
     @property
+    def vertical_velocity(self) -> Array:
+        """Of the centre of mass [m/s], shape (..., n)."""
+
+    @property
     def kinetic_energy(self) -> Array:
         """[J], shape (..., n)."""
 
@@ -38,11 +43,14 @@ class StateQuantities(Protocol):
 
     @property
     def lowest_height(self) -> Array:
-        """Height of the body's lowest point above the floor [m], shape (..., n); inf is allowed where no point can be below the floor."""
+        """Height of the body's lowest point above the floor [m], shape (..., n).
+
+        It may be inf where no point is below the floor, except at the rows of a step in `touching` and of the step before it.
+        """
 
     @property
     def touching(self) -> Mask:
-        """For each step, whether the floor changes the velocity (`is_touching`), shape (..., n - 1)."""
+        """For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (..., n - 1)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,19 +170,36 @@ class Motions:
         return np.maximum(setup.mass * setup.gravity_strength * height, self.states.kinetic_energy[..., 0])
 
     @cached_property
+    def fall(self) -> Array:
+        """The speed of fall that gravity adds in a time step [m/s], shape (...)."""
+        return np.maximum(-self.setup.gravity[..., 1], 0.0) * self.dt
+
+    @cached_property
+    def contacts(self) -> ContactRuns:
+        """The contacts of all motions; none without a floor."""
+        states = self.states
+        touching = np.atleast_2d(states.touching & self.setup.floor)
+        on_floor = np.atleast_2d(states.lowest_height <= TOUCHING * self.setup.size[..., np.newaxis])
+        return contact_runs(touching, np.atleast_2d(states.vertical_velocity), on_floor, np.broadcast_to(self.fall, len(touching)))
+
+    @cached_property
+    def in_contact(self) -> Mask:
+        """For each step, whether it is in a contact, shape (..., n - 1)."""
+        found = np.zeros(np.atleast_2d(self.states.touching).shape, dtype=bool)
+        motion, step, _ = self.contacts.steps
+        found[motion, step] = True
+        return found.reshape(self.states.touching.shape)
+
+    @cached_property
     def first_contact(self) -> tuple[RowNumbers, RowNumbers]:
-        """The last row before and the first row after the floor first changes the velocity, each of shape (...); -1 if there is no contact.
+        """The last row before and the first row after the first contact, each of shape (...); -1 if there is no contact.
 
         If the contact lasts to the end, the second is the last row.
         """
-        if not self.setup.floor:
-            return np.full(self.last_row.shape, -1), np.full(self.last_row.shape, -1)
-        touching = self.states.touching
-        before = touching.argmax(axis=-1)
-        is_free = ~touching & (np.arange(touching.shape[-1]) > before[..., None])
-        after = np.where(is_free.any(axis=-1), is_free.argmax(axis=-1), self.last_row)
-        touches = touching.any(axis=-1)
-        return np.where(touches, before, -1), np.where(touches, after, -1)
+        before, after = (np.full(self.last_row.shape, -1).reshape(-1) for _ in range(2))
+        motions, first = np.unique(self.contacts.motion, return_index=True)
+        before[motions], after[motions] = self.contacts.before[first], self.contacts.after[first]
+        return before.reshape(self.last_row.shape), after.reshape(self.last_row.shape)
 
     @cached_property
     def first_flight_end(self) -> RowNumbers:
@@ -201,11 +226,11 @@ class Motions:
 
 
 def is_touching(before: Components, after: Components, dt: float, gravity: Components, strength: float, damping_share: float) -> Any:
-    """Whether the floor changes the velocity in a step, from the velocities before and after it.
+    """Whether the velocity changes otherwise than by gravity and damping in a step, from the velocities before and after it.
 
-    Without contact, only gravity and damping change the velocity. A remaining change counts as a contact if it exceeds 1e-3 of the change
-    by gravity, 1e-6 of the speed (for engines in single precision) and twice the change by damping (because engines use different laws of
-    damping). The arithmetic is plain, as in `scenarios.mechanics`, for one step or for arrays of steps.
+    Without contact, only gravity and damping change the velocity. A remaining change counts if it exceeds 1e-3 of the change by gravity,
+    1e-6 of the speed (for engines in single precision) and twice the change by damping (because engines use different laws of damping). The
+    arithmetic is plain, as in `scenarios.mechanics`, for one step or for arrays of steps.
     """
     x = after[0] - before[0] - dt * gravity[0]
     y = after[1] - before[1] - dt * gravity[1]
@@ -224,6 +249,10 @@ class _StatesOfOne:
     @property
     def height(self) -> Array:
         return self.motion.position[:, 1]
+
+    @property
+    def vertical_velocity(self) -> Array:
+        return self.motion.velocity[:, 1]
 
     @cached_property
     def kinetic_energy(self) -> Array:

@@ -26,7 +26,10 @@ FEWEST_STEPS_WITHOUT_GRAVITY = 1000
 """Smallest number of steps of a run without gravity, to test its stability; with gravity, a longer run would be another motion."""
 BROKEN = frozenset({"declined", "diverged", "crashed", "timed_out"})
 """Failure modes without a motion to compare."""
-MOST_ROWS = 20_000
+MOST_STEPS_PER_START = 20_000
+"""A longer run has one start phase only."""
+MOST_ROWS = 400_000
+"""Of a longer run, only evenly spaced states are recorded."""
 STARTS = 4
 """Number of start phases of a scene with an impact, evenly spaced within a step, because a single one may be accurate by chance."""
 OTHER_START = 1.25
@@ -66,7 +69,7 @@ class Runner:
         """The most severe diagnosis of a scene at a time step, over its start phases, and beyond its end if `extend`."""
         scene, dt = point
         phases = start_phases(scene, truth_for(scene), dt)
-        starts = STARTS if scene.steps(dt) <= MOST_ROWS else 1
+        starts = STARTS if scene.steps(dt) <= MOST_STEPS_PER_START else 1
         some = phases[:: max(1, len(phases) // starts)]
         recordings = self.record([phase.scene for phase in some], dt, extend)
         if isinstance(recordings, Diagnosis):

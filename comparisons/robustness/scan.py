@@ -7,7 +7,7 @@ from itertools import pairwise
 from comparisons.robustness.axes import AXES, Axis
 from comparisons.robustness.failure_modes import Diagnosis, FailureMode
 from comparisons.robustness.operating_point import OperatingPoint
-from comparisons.robustness.runner import MOST_ROWS, Runner
+from comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
 from comparisons.running.inputs import MOST_STEPS
 from scenarios import Scenario
 
@@ -84,7 +84,7 @@ def refine(runner: Runner, nominal: OperatingPoint, on_progress: Callable[[float
     With a floor every step is recorded, because impacts can only be judged from all steps.
     """
     diagnose = runner.along(nominal, AXES["step"])
-    most = MOST_STEPS if nominal.scene.floor is None else MOST_ROWS
+    most = MOST_STEPS if nominal.scene.floor is None else MOST_STEPS_PER_START
     points: list[ScanPoint] = []
     for dt in (nominal.dt / 2**halving for halving in range(1 + MOST_HALVINGS)):
         if points and (nominal.scene.duration / dt > most or points[-1].mode in FINAL):

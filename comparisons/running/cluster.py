@@ -1,6 +1,7 @@
 """The connection to a Dask cluster, on which studies run."""
 
 import re
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -11,6 +12,7 @@ from scenarios import DropspinError
 
 CONNECT_TIMEOUT, WORKER_TIMEOUT = 30.0, 120.0
 """How long to wait for a scheduler, and for its first worker [s]."""
+POLL = 0.1  # s
 
 
 @contextmanager
@@ -27,16 +29,27 @@ def connected(scheduler: str) -> Iterator[Any]:
         )
     if find_spec("distributed") is None:
         raise EngineMissing("--scheduler needs Dask, which is not installed: pip install 'dropspin[cluster]'.")
-    from distributed import Client
+    from distributed import Client, Security
+    from distributed.comm.core import connect
+    from distributed.utils import LoopRunner
+
+    async def greet() -> None:
+        """Exchange greetings, for which `Client` would wait without end."""
+        comm = await connect(scheduler, timeout=CONNECT_TIMEOUT, **Security().get_connection_args("client"))  # type: ignore[no-untyped-call]  # distributed has no types
+        await comm.close()
 
     try:
-        client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)  # type: ignore[no-untyped-call]  # distributed has no types
-    except (OSError, ValueError) as error:
-        raise DropspinError(f"--scheduler {scheduler}: no scheduler answers ({error}); start one with: dask scheduler.") from None
+        LoopRunner(asynchronous=False).run_sync(greet, callback_timeout=2.0 * CONNECT_TIMEOUT)  # type: ignore[no-untyped-call]
+    except Exception as error:  # whatever distributed makes of the answer of another program
+        is_connected = isinstance(error, TimeoutError) or not isinstance(error, OSError | ValueError)
+        reason = "what listens there does not answer as a scheduler" if is_connected else f"no scheduler answers ({error})"
+        raise DropspinError(f"--scheduler {scheduler}: {reason}; start one with: dask scheduler.") from None
+    client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)  # type: ignore[no-untyped-call]
     with client, client.as_current():
-        try:
-            client.wait_for_workers(1, timeout=WORKER_TIMEOUT)
-        except TimeoutError:
-            reason = f"no worker has connected for {WORKER_TIMEOUT:g} s; start one with: dask worker {scheduler}"
-            raise DropspinError(f"--scheduler {scheduler}: {reason}.") from None
+        end = time.monotonic() + WORKER_TIMEOUT
+        while not client.nthreads():  # type: ignore[no-untyped-call]
+            if time.monotonic() > end:
+                reason = f"no worker has connected for {WORKER_TIMEOUT:g} s; start one with: dask worker {scheduler}"
+                raise DropspinError(f"--scheduler {scheduler}: {reason}.")
+            time.sleep(POLL)
         yield client

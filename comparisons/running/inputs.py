@@ -92,10 +92,10 @@ def verify_time_step(scene: Scenario, dt: float) -> None:
     """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s]."""
     if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):
         raise DropspinError(f"dt: got {described_value(dt)}; a time step is a number of seconds.")
-    if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 <= MOST_STEPS):
+    if not (np.isfinite(dt) and dt > 0.0 and FEWEST_STEPS <= scene.duration / dt + 1e-9 < MOST_STEPS + 1):
         raise DropspinError(
             f"dt: got {dt!r} s; scene {scene.name!r} lasts {scene.duration:g} s, so a step must be "
-            f"at least {scene.duration / MOST_STEPS:g} s and at most {scene.duration / FEWEST_STEPS:g} s."
+            f"at least {scene.duration / MOST_STEPS:.10g} s and at most {scene.duration / FEWEST_STEPS:.10g} s."
         )
 
 

@@ -7,11 +7,12 @@ piece of work; each leads a process group, with which the engine's own children 
 """
 
 import ctypes
+import math
 import os
 import signal
-from collections.abc import Callable, Sequence
-from concurrent.futures import TimeoutError as OutOfTime
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
 from types import TracebackType
@@ -116,8 +117,8 @@ class EngineProcesses:
     def start(self, entries: Sequence[EngineEntry]) -> None:
         """Start the processes of engines: a process that is forked while another thread compiles or imports may wait for it forever."""
         for entry in entries:
-            self._pools[entry.label] = self._pool(entry)
-            with interrupts_deferred():
+            with _system_errors_named(entry), interrupts_deferred():
+                self._pools[entry.label] = self._pool(entry)
                 started = self._pools[entry.label].schedule(int)
             while not finished([started], POLL):
                 pass
@@ -146,13 +147,14 @@ class EngineProcesses:
         if entry.label in self._pools and not self._pools[entry.label].active:  # the engine broke its process after its last work
             self.renew(entry)
         if entry.label not in self._pools:
-            self._pools[entry.label] = self._pool(entry)
+            with _system_errors_named(entry):
+                self._pools[entry.label] = self._pool(entry)
         self._processes[entry.label].value = 0
         self._counts[entry.label][:] = [0, 0]
         allowed = self._resources.processor_time + (COMPILATION if entry.engine is not None and entry.engine.compiles else 0.0)
-        with interrupts_deferred():
-            task = self._pools[entry.label].schedule(call, args=[work, given, allowed], timeout=WALL_TIME_FACTOR * allowed)
-        largest = 0
+        with _system_errors_named(entry), interrupts_deferred():
+            task = self._pools[entry.label].schedule(call, args=[work, given, allowed])
+        largest, start = 0, math.inf
         try:
             while not finished([task], POLL):
                 if self._closed:
@@ -160,12 +162,10 @@ class EngineProcesses:
                 if self._has_exited(entry.label) and not finished([task], GRACE):
                     self.renew(entry)
                     raise Failed("crashed", "its process exited with code 0 before the work was done")
+                start = self._start_in_time(entry, start, WALL_TIME_FACTOR * allowed)
                 largest = max(largest, self._memory(entry.label))
                 while_waiting()
             result: Result = task.result()
-        except OutOfTime:
-            self._end_group(entry.label)
-            raise Failed("timed_out", f"not done after {WALL_TIME_FACTOR * allowed:g} s of wall time") from None
         except ProcessExpired as end:
             self._end_group(entry.label)
             verdict, reason = _verdict(end.exitcode, allowed)
@@ -177,6 +177,20 @@ class EngineProcesses:
         except Exception as error:  # what the adapter returns cannot be sent to this process
             raise Failed("crashed", f"its result cannot be returned: {described(error)}") from None
         return result
+
+    def _start_in_time(self, entry: EngineEntry, start: float, limit: float) -> float:
+        """The time at which the work of an engine began, which was `start` if that is finite; by a clock that nobody sets [s].
+
+        Raises:
+            Failed: The limit of wall time [s] is exceeded; the process is ended.
+        """
+        if self._processes[entry.label].value:
+            start = min(start, time.monotonic())
+        if time.monotonic() - start > limit:
+            self._end_group(entry.label)
+            self.renew(entry)
+            raise Failed("timed_out", f"not done after {limit:g} s of wall time")
+        return start
 
     def _memory(self, label: str) -> int:
         """The memory that an engine's process has for data [bytes], which is limited; 0 where the system does not say."""
@@ -231,6 +245,18 @@ class EngineProcesses:
         self._closed = True
         for label in list(self._processes):
             self._end_group(label)
+
+
+@contextmanager
+def _system_errors_named(entry: EngineEntry) -> Iterator[None]:
+    """Raise `DropspinError` for an error of the system while a process is started, which is none of a file that is being written."""
+    try:
+        yield
+    except OSError as error:
+        raise DropspinError(
+            f"the system cannot start a process for {entry.label}: {error.strerror or error}; shared memory (/dev/shm) must be writable "
+            "and not full, and the limits of processes and open files must not be reached (ulimit -u, ulimit -n)."
+        ) from None
 
 
 def _verdict(exit_code: int | None, allowed: float) -> tuple[Verdict, str]:

@@ -168,13 +168,15 @@ def record_batch(
     return [Recording(motion, none, of_one, seconds=seconds) for motion, of_one in zip(motions, met or [()] * size, strict=True)]
 
 
-def try_record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0) -> Recording | Breakdown:
+def try_record(
+    engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0, verify: bool = True
+) -> Recording | Breakdown:
     """Drive an engine through a scene; a refusal, a divergence or an exception is returned, not raised."""
     try:
         refusal = verified_refusal(engine.declines(scene))
         if refusal is not None:
             return Breakdown("declined", refusal)
-        return record(engine, scene, dt, every, extra_steps=extra_steps)
+        return record(engine, scene, dt, every, extra_steps=extra_steps, verify=verify)
     except Exception as error:
         return classify(error)
 

@@ -202,7 +202,7 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[_Parameters, NDArray[np.bo
     )
     with np.errstate(all="ignore"):  # of values that are not ordinary
         ratio = columns.get(("duration",), scene.duration) / jobs.dts
-        is_ordinary = is_built & (ratio + 1e-9 >= FEWEST_STEPS) & (ratio + 1e-9 <= MOST_STEPS)
+        is_ordinary = is_built & (ratio + 1e-9 >= FEWEST_STEPS) & (ratio + 1e-9 < MOST_STEPS + 1)
     if scene.floor is not None:
         is_ordinary &= setup.clearance >= -0.5 * TOUCHING * setup.size  # a start nearer to the limit is left to the scene's own check
     steps = np.where(is_ordinary, np.floor(np.where(is_ordinary, ratio, 0.0) + 1e-9), 0).astype(np.int64)

@@ -171,7 +171,8 @@ class SweepFolder:
                 unfinished.replace(target)
         except OSError as error:
             raise DropspinError(
-                f"{self.where}: is not writable: {error.strerror or error}; the parts written so far are complete."
+                f"{self.where}: is not writable: {error.strerror or error}; "
+                "the parts written so far are complete: --resume continues the sweep."
             ) from None
 
 

@@ -44,7 +44,7 @@ def run_sweep(
     folder = SweepFolder(where, work.identity)
     earlier = folder.description()
     kept = 0
-    if earlier is not None:
+    if earlier is not None and folder.groups():  # a sweep that was refused or interrupted before its first job may be given again
         _verify_same_sweep(where, earlier, work)
         kept = count(where)
         if not resume:

@@ -5,6 +5,7 @@ And the memory that a batch takes.
 
 import ctypes
 import math
+import os
 import re
 import time
 from collections.abc import Sequence
@@ -24,13 +25,24 @@ MUCH_LONGER = 10.0
 MOST_RUNS = 200
 WORLDS = (256,)
 """Numbers of worlds in a batch."""
-BATCH_ROUNDS = 3
+TIMINGS = 3
+"""The least of so many timings in free flight counts in a round: other load can only add to a time."""
 BATCH_SECONDS = 0.02
 """The smallest wall time of a timing of a batch in free flight [s]."""
 LONGEST_BATCH = 4.0
 """The largest wall time of a timing of a batch on a floor [s]."""
 MEMORY_STEPS = 10
 PROCESS = Path("/proc/self")
+LOAD = Path("/proc/loadavg")
+
+
+def load() -> float:
+    """The number of threads of the machine that run or wait for a processor beside this one, per processor; NaN if not known."""
+    try:
+        running = LOAD.read_text().split()[3].partition("/")[0]
+    except OSError:  # of a system other than Linux
+        return math.nan
+    return (float(running) - 1.0) / (os.cpu_count() or 1)
 
 
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
@@ -44,14 +56,20 @@ def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
         steps = 16
         while (timed := _timed(entry, scene, dt, steps)) is not None and steps < MOST_STEPS:
             if timed.stepping >= (enough := max(LONG_ENOUGH, MUCH_LONGER * timed.call)):
-                return timed.per_step / dt
+                again = (_timed(entry, scene, dt, steps) for _ in range(TIMINGS - 1))
+                return _least([timed, *filter(None, again)]) / dt
             steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * enough / timed.stepping))))
     steps, runs = scene.steps(dt), list[TimedSteps]()
     while sum(run.stepping for run in runs) < LONG_ENOUGH and len(runs) < MOST_RUNS:
         if (timed := _timed(entry, scene, dt, steps)) is None:
             return math.nan
         runs.append(timed)
-    return float(np.mean([run.per_step for run in runs])) / dt
+    return _least(runs) / dt
+
+
+def _least(runs: Sequence[TimedSteps]) -> float:
+    """The time of a step [s] by the least times of simulations of as many steps: other load on the machine can only add to each of them."""
+    return time_per_step(min(run.call for run in runs), min(run.stepping for run in runs), runs[0].steps)
 
 
 def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> TimedSteps | None:
@@ -74,20 +92,19 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
         return [_cost_on_a_floor(entry.adapter, members, dt) / (dt * worlds) for dt in dts]
     dt = dts[-1]
     _timed_batch(entry.adapter, members, dt, 1)  # compiles
-    steps, one = 4, min(_timed_batch(entry.adapter, members, dt, 1) for _ in range(BATCH_ROUNDS))
+    steps, one = 4, _timed_batch(entry.adapter, members, dt, 1)
     while (taken := _timed_batch(entry.adapter, members, dt, steps)) < max(BATCH_SECONDS, MUCH_LONGER * one) and steps < MOST_STEPS:
         steps *= 4
-    taken = min([taken, *(_timed_batch(entry.adapter, members, dt, steps) for _ in range(BATCH_ROUNDS - 1))])
     return [time_per_step(one, taken, steps) / (each * worlds) for each in dts]
 
 
 def _cost_on_a_floor(engine: Engine, members: Sequence[Scenario], dt: float) -> float:
-    """The smallest wall time of a step of a batch [s] over a whole run; NaN if the run is too long, judged by its first steps."""
+    """The wall time of a step of a batch [s] over a whole run; NaN if the run is too long, judged by its first steps."""
     steps, few = members[0].steps(dt), 16
     _timed_batch(engine, members, dt, 1)  # compiles
     if not _timed_batch(engine, members, dt, few) * steps <= LONGEST_BATCH * few:
         return math.nan
-    return min(_timed_batch(engine, members, dt, steps) for _ in range(BATCH_ROUNDS)) / steps
+    return _timed_batch(engine, members, dt, steps) / steps
 
 
 def _timed_batch(engine: Engine, members: Sequence[Scenario], dt: float, steps: int) -> float:

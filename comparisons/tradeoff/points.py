@@ -17,6 +17,11 @@ LEVEL = 1.25
 """Two costs count as equal if their ratio is below this, or if their order differs between rounds."""
 
 
+def spread(costs: Array) -> float:
+    """How far timings of the same work differ: the median over the least, 1 without other load on the machine."""
+    return float(np.median(costs) / np.min(costs))
+
+
 @dataclass(frozen=True, eq=False)
 class CostPoint:
     """A configuration: an engine at a time step, with its error and its cost.
@@ -28,6 +33,7 @@ class CostPoint:
         cost: Wall time per simulated second in each round [s/s], shape (rounds,).
         costs_per_world: By number of worlds in a batch, the smallest wall time per simulated second and world [s/s]; empty for an engine
             that cannot simulate batches.
+        spreads_per_world: By number of worlds, the `spread` of these timings.
     """
 
     engine: str
@@ -35,6 +41,7 @@ class CostPoint:
     error: float
     cost: Array
     costs_per_world: Mapping[int, float] = field(default_factory=dict)
+    spreads_per_world: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def typical_cost(self) -> float:
@@ -72,6 +79,7 @@ class TradeOff:
         ladders: The time steps tried for every requested engine, and the reason why no smaller one was tried.
         worlds: The numbers of worlds in a batch.
         memory_per_world: By engine, the memory that the largest batch takes per world [bytes]; empty below 1,024 worlds.
+        load: Threads per processor that were running or waiting for one beside the timed one, on average; NaN if not known.
     """
 
     scene: Scenario
@@ -80,6 +88,12 @@ class TradeOff:
     ladders: tuple[Ladder, ...]
     worlds: tuple[int, ...] = WORLDS
     memory_per_world: Mapping[str, float] = field(default_factory=dict)
+    load: float = math.nan
+
+    @property
+    def spread(self) -> float:
+        """The median of the spreads of all configurations."""
+        return float(np.median([spread(point.cost) for point in self.points]))
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -90,6 +104,17 @@ class TradeOff:
     def pareto_front(self) -> list[CostPoint]:
         """The configurations for which no other one is both more accurate and cheaper; cheapest first."""
         return _pareto_front(self.points, lambda point: point.typical_cost)
+
+    @property
+    def undecided(self) -> list[CostPoint]:
+        """The configurations that are on the Pareto front or not, depending on which of the rounds' costs is taken; cheapest first."""
+
+        def front_at(share: float) -> frozenset[CostPoint]:
+            return frozenset(_pareto_front(self.points, lambda point: float(np.quantile(point.cost, share))))
+
+        fronts = [front_at(share) for share in (0.0, 0.5, 0.75)]
+        differing = frozenset().union(*fronts) - fronts[0].intersection(*fronts)
+        return sorted(differing, key=lambda point: point.typical_cost)
 
     def batch_pareto_front(self, worlds: int) -> list[CostPoint]:
         """The Pareto front by cost per world in batches of a size, for engines that can simulate them."""

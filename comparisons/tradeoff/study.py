@@ -18,10 +18,10 @@ from comparisons.running.entries import engine_entry
 from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
 from comparisons.running.parallel import as_jobs, results_in_parallel
 from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, memory_per_world
+from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, load, memory_per_world
 from comparisons.tradeoff.errors import BUDGET, errors_over_steps
 from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import CostPoint, TradeOff
+from comparisons.tradeoff.points import CostPoint, TradeOff, spread
 from scenarios import DropspinError, Scenario, truth_for
 from scenarios.errors import UnknownName
 
@@ -46,7 +46,7 @@ ON_A_FLOOR = (
     "pybullet",
     "pybullet[coordinates=multibody]",
 )
-ROUNDS = 9
+ROUNDS, BATCH_ROUNDS = 9, 3
 MOST_WORLDS = 1 << 20
 LARGE_BATCH = 1024
 """The smallest batch of which the memory is measured: that of fewer worlds is a few pages."""
@@ -99,7 +99,7 @@ def tradeoff(
     if truth is None:
         raise DropspinError(f"{scene.name} has no exact solution to compare with; choose a scene that has one (see dropspin list).")
     of_the_motion = leading_metric(scene)
-    chosen = metric or of_the_motion
+    chosen = of_the_motion if metric is None else metric
     known = [one.name for one in metrics_for(scene, truth)]
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
@@ -116,11 +116,12 @@ def tradeoff(
         # Each engine has one process, in which it has compiled when its costs are measured.
         crews = [processes] * min(as_jobs(jobs), len(entries))
         ladders = results_in_parallel(list(entries.values()), errors, crews, lambda what, share: report(what, 0.5 * share))
-        points = _with_costs([(entries[one.engine], one) for one in ladders if not one.left_out], scene, sizes, processes, report)
+        compared = [(entries[one.engine], one) for one in ladders if not one.left_out]
+        points, others = _with_costs(compared, scene, sizes, processes, report)
         memory = _memory([entries[one.engine] for one in ladders], points, scene, sizes[-1], processes)
     measured = {point.engine for point in points}
     ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
-    found = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory)
+    found = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
     if not points:
         reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in found.left_out.items())
         raise DropspinError(f"no engine runs {scene.name}: {reasons}.")
@@ -139,25 +140,35 @@ def _with_costs(
     worlds: Sequence[int],
     processes: EngineProcesses,
     on_progress: OnProgress,
-) -> tuple[CostPoint, ...]:
-    """The configurations of the ladders that have a finite error and a finite cost, with the cost in every round and in batches."""
+) -> tuple[tuple[CostPoint, ...], float]:
+    """The configurations of the ladders that have a finite error and a finite cost, with the cost in every round and in batches.
+
+    And the mean `load` of the machine.
+    """
     steps = [(entry, dt, error) for entry, ladder in ladders for dt, error in ladder.steps if np.isfinite(error)]
     costs: list[list[float]] = [[] for _ in steps]
+    loads = []
     for number in range(ROUNDS):
         for rounds, (entry, dt, _) in zip(costs, steps, strict=True):
+            loads.append(load())
             rounds.append(math.nan if rounds and math.isnan(rounds[-1]) else _cost(entry, scene, dt, processes))
         on_progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
-    per_world: list[dict[int, float]] = []
-    for number, (entry, _) in enumerate(ladders):
-        dts = [dt for mine, dt, _ in steps if mine is entry]
-        by_size = {size: _costs_per_world(entry, scene, dts, size, processes) for size in worlds}
-        per_world += [{size: found[row] for size, found in by_size.items() if np.isfinite(found[row])} for row in range(len(dts))]
-        on_progress(f"batches of {entry.label}", 0.9 + 0.1 * (number + 1) / len(ladders))
-    return tuple(
-        CostPoint(entry.label, dt, error, np.array(rounds), batches)
-        for (entry, dt, error), rounds, batches in zip(steps, costs, per_world, strict=True)
-        if np.isfinite(rounds).all()
-    )
+    batches: list[dict[int, list[float]]] = [{size: [] for size in worlds} for _ in steps]
+    for number in range(BATCH_ROUNDS):
+        for entry, ladder in ladders:
+            rows = [row for row, (owner, _, _) in enumerate(steps) if owner is entry]
+            for size in worlds:
+                found = _costs_per_world(entry, scene, [steps[row][1] for row in rows], size, processes)
+                for row, value in zip(rows, found, strict=True):
+                    batches[row][size].append(value)
+            on_progress(f"batches of {ladder.engine}", 0.9 + 0.1 * (number + 1) / BATCH_ROUNDS)
+    points = []
+    for (entry, dt, error), rounds, by_size in zip(steps, costs, batches, strict=True):
+        timed = {size: np.array(values) for size, values in by_size.items() if np.isfinite(values).all()}
+        least, spreads = ({size: of(values) for size, values in timed.items()} for of in (lambda values: float(values.min()), spread))
+        if np.isfinite(rounds).all():
+            points.append(CostPoint(entry.label, dt, error, np.array(rounds), least, spreads))
+    return tuple(points), float(np.mean(loads)) if loads else math.nan
 
 
 def _memory(

@@ -2,17 +2,19 @@
 
 import click
 
-from reports.commands.options import as_json
+from reports.commands.options import BASELINE, as_json
 from reports.terminal.safe import echo
-
-BASELINE = "dropspin-baseline.toml"
 
 
 @click.command("accept")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True)
 @click.option("--reason", required=True, metavar="TEXT", help="The reason why these results are accepted; it is written to the file.")
 @click.option(
-    "--baseline", default=BASELINE, show_default=True, metavar="FILE", help="The baseline; the file is created if it does not exist."
+    "--baseline",
+    default=BASELINE,
+    show_default=True,
+    metavar="FILE",
+    help="The baseline; the file is created if it does not exist. dropspin check has the same default.",
 )
 @click.option(
     "--known-failures",

@@ -1,11 +1,12 @@
 """`dropspin check`."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from reports.commands.options import as_json, baseline_option, summary_option, write_text
+from reports.commands.options import BASELINE, as_json, summary_option, write_text
 from reports.terminal.safe import echo
 
 if TYPE_CHECKING:
@@ -16,14 +17,15 @@ if TYPE_CHECKING:
 
 @click.command("check")
 @click.argument("run", metavar="RUN")
-@baseline_option
+@click.option("--baseline", metavar="FILE", help=f"The baseline. [default: {BASELINE}, which dropspin accept writes, if it exists]")
+@click.option("--no-baseline", is_flag=True, help=f"Check the expectations of the scenes only, even if there is a {BASELINE}.")
 @click.option("--junit", metavar="FILE", help="Write a test case for every check as JUnit XML, the format that CI servers read.")
 @summary_option
 @as_json
-def check_command(run: str, baseline: str | None, junit: str | None, summary: str | None, json_output: bool) -> int:
+def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str | None, summary: str | None, json_output: bool) -> int:
     """Check a run: compare it with the expectations of its scenes, and with the accepted results of a baseline.
 
-    RUN is the folder that dropspin run -o wrote.
+    RUN is the folder that dropspin run -o wrote. The output says which baseline was used.
 
     Exit code: 0 nothing failed, 1 a check failed or an accepted result is worse, 2 bad input, 3 an engine broke down or is missing.
     """
@@ -35,10 +37,18 @@ def check_command(run: str, baseline: str | None, junit: str | None, summary: st
     from reports.terminal.rows import json_rows
     from reports.views import check as view
     from reports.views.failures import failures
+    from scenarios import DropspinError
 
+    if baseline is not None and no_baseline:
+        raise click.UsageError("--baseline names a baseline and --no-baseline leaves it out; give only one of them.")
+    if baseline is None and not no_baseline and os.path.lexists(BASELINE):
+        baseline = BASELINE
     results = load_results(Path(run), arrays=False)
     file = None if baseline is None else view.BaselineFile(load_baseline(baseline), baseline, run)
-    checked = check(results, None if file is None else file.baseline)
+    try:
+        checked = check(results, None if file is None else file.baseline)
+    except DropspinError as error:
+        raise DropspinError(f"{baseline}: {error} With --no-baseline, only the expectations of the scenes are checked.") from None
     found = failures(checked.results, baseline)
     if junit is not None:
         write_text(junit, junit_xml(checked.results, baseline).decode())
@@ -59,6 +69,6 @@ def print_checked(checked: "Checked", file: "BaselineFile | None", found: "list[
     from reports.views.failures import grouped
 
     print_failures(grouped(checked.results, found, None if file is None else file.path))
-    print_sentences(view.sentences(checked, file))
+    print_sentences([view.scope(file), *view.sentences(checked, file)])
     for command in view.annotations(found):
         echo(command)

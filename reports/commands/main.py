@@ -1,15 +1,17 @@
 """The command line: the group of commands, and the exit code of every error."""
 
-import io
 import os
 import sys
 import traceback
+import warnings
 from importlib import import_module
 from typing import Any
 
 import click
 
+from reports.commands import surroundings
 from reports.commands.interrupts import handle_interrupts, stop_if_interrupted
+from reports.terminal.streams import error_of, unfailing
 
 COMMANDS = {
     "accept": "Accept a run's results as the new baseline.",
@@ -47,26 +49,39 @@ INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: neither a verdict nor a usage 
 
 def main() -> None:
     """Run the command line; every expected error ends with one line and exit code 2."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that lacks a character gets a question mark, not a traceback
+    sys.stdout, sys.stderr = map(unfailing, (sys.stdout, sys.stderr))
     handle_interrupts()
+    warnings.showwarning = lambda message, *_: _say(f"warning: {message}")
+    code = _run_and_report_errors()
+    if (error := error_of(sys.stdout)) is not None and not isinstance(error, BrokenPipeError):
+        _say(f"standard output cannot be written: {error.strerror}; what was printed is lost.")
+        code = code or 2
+    sys.exit(code)
+
+
+def _run_and_report_errors() -> int:
+    """Run the command, print its error if it has one, and return the exit code."""
+    if problem := surroundings.problem():
+        click.echo(f"dropspin: {problem}.", err=True)
+        return 2
+    os.environ.pop("MPLBACKEND", None)  # plots become files; the backend of a notebook need not be installed here
     try:
-        sys.exit(_run())
+        return _run()
     except (click.Abort, KeyboardInterrupt) as interrupt:
         details = (interrupt.__cause__ or interrupt).args  # click wraps the interrupts of commands in its own
         click.echo(f"dropspin: interrupted; {details[0] if details else 'nothing was written'}.", err=True)
-        sys.exit(INTERRUPTED)
-    except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # Python would flush into the closed pipe at exit
-        sys.exit(INTERRUPTED)
+        return INTERRUPTED
     except OSError as error:
-        _say(str(error))
-        sys.exit(2)
-    except Exception:
+        _say(_text(error))
+        return 2
+    except Exception as error:
+        limit = surroundings.limited_to()
+        if limit is not None or isinstance(error, MemoryError):
+            click.echo(f"dropspin: {surroundings.shortage(limit)} ({type(error).__name__}: {' '.join(str(error).split())}).", err=True)
+            return 2
         click.echo("dropspin: internal error; please report the following output.", err=True)
         traceback.print_exc()
-        sys.exit(INTERNAL_ERROR)
+        return INTERNAL_ERROR
 
 
 def _run() -> int:
@@ -82,18 +97,23 @@ def _run() -> int:
         return 2
     except click.Abort:  # an interrupt of a command, with its message
         raise
-    except SystemExit:  # click and Rich exit here only on a closed pipe, with code 1, which would mean a failed check
-        raise BrokenPipeError from None
+    except SystemExit:  # click exits here only on a closed pipe, to a process, with code 1, which would mean a failed check
+        raise OSError("a process has closed the pipe to it") from None
     except Exception as error:
         stop_if_interrupted()  # compiled code, such as the import of an engine, may turn an interrupt into another exception
         from scenarios import DropspinError
 
         if not isinstance(error, DropspinError):
             raise
-        _say(str(error))
+        _say(_text(error))
         from comparisons.engines.base import EngineBroken, EngineMissing
 
         return 3 if isinstance(error, EngineBroken | EngineMissing) else 2
+
+
+def _text(error: Exception) -> str:
+    """The message of an error, and the notes that were added to it."""
+    return " ".join([str(error), *getattr(error, "__notes__", [])])
 
 
 def _say(message: str) -> None:

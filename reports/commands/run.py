@@ -96,15 +96,19 @@ def run_command(
         loaded += draw(count, drawn["seed"])
         echo(f"Drawn with --seed {drawn['seed']}", err=json_output)
     file = None if baseline is None else BaselineFile(load_baseline(baseline), baseline, output)
-    show = None if json_output else print_table if verbose else print_summary
-    results = _run(loaded, drawn, engines, dts, output, time_limit, jobs, resume, show, quick=quick, test_symmetries=test_symmetries)
-    checked = _checked(results, file, json_output)
-    if json_output:
-        echo(json_rows(checked.results.table))
-    else:
-        if file is not None:
-            print_checked(checked, file, [one for one in failures(checked.results, baseline) if one.accepted])
-        echo(f"Report: {os.path.join(output, 'report.html')}")
+    results = _run(loaded, drawn, engines, dts, output, time_limit, jobs, resume, quick=quick, test_symmetries=test_symmetries)
+    try:
+        if not json_output:
+            (print_table if verbose else print_summary)(results)
+        checked = _checked(results, file, json_output)
+        if json_output:
+            echo(json_rows(checked.results.table))
+        else:
+            if file is not None:
+                print_checked(checked, file, [one for one in failures(checked.results, baseline) if one.accepted])
+            echo(f"Report: {os.path.join(output, 'report.html')}")
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"the run is written: {output}") from None
     return checked.results.exit_code()
 
 
@@ -117,12 +121,11 @@ def _run(
     time_limit: float,
     jobs: int | None,
     resume: bool,
-    show: "Callable[[Results], None] | None",
     *,
     quick: bool,
     test_symmetries: bool,
 ) -> "Results":
-    """Run the scenes, print the results and write the run; an interrupted run keeps the scenes that were measured."""
+    """Run the scenes and write the run; a run that is interrupted or cannot be written keeps the scenes that were measured."""
     from comparisons.running.processes import ResourceLimits
     from comparisons.running.run import DEFAULT_DTS, run, what_changed
     from comparisons.symmetries.rows import with_symmetries
@@ -132,20 +135,25 @@ def _run(
     from scenarios.text import counted
 
     measured, chosen, steps = MeasuredScenes(output), engines or CORE_ENGINES, dts or DEFAULT_DTS
+    has_begun = False
     try:
         with run_folder(output) as folder:
             if not resume:
                 measured.clear()
-            earlier = measured.parts()
-            with progress_bar(len(scenes), len(chosen) * len(steps)) as (show_progress, show_line):
+            has_begun, earlier = True, measured.parts()
+            with progress_bar(len(scenes), len(chosen) * len(steps)) as shown:
 
                 def on_progress(progress: "Progress") -> None:
                     stop_if_interrupted()
-                    show_progress(progress)
+                    shown.on_progress(progress)
+
+                def keep(part: "Results") -> None:
+                    measured.keep(part)
+                    shown.on_finished(*part.scenes)
 
                 resources = ResourceLimits(processor_time=time_limit)
                 work = partial(run, scenes, chosen, steps, resources=resources, done=earlier, jobs=jobs, quick=quick)
-                results = work(on_progress=on_progress, keep=measured.keep, on_forecast=lambda found: _show_forecast(found, show_line))
+                results = work(on_progress=on_progress, keep=keep, on_forecast=lambda found: _show_forecast(found, shown.show_line))
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
                 echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)
@@ -153,15 +161,16 @@ def _run(
             if test_symmetries:
                 finest = min(steps)
                 results = with_symmetries(results, with_progress(scenes, chosen, finest, resources, jobs), finest)
-            if show is not None:
-                show(results)
             with status("writing the report"):
                 fill(results, folder)
-    except KeyboardInterrupt:
-        kept = len(measured)
-        are = f"{kept} of {counted(len(scenes), 'scene')} {'is' if kept == 1 else 'are'} kept"
-        message = f"{are}; --resume continues the run" if kept else "nothing was written"
-        raise KeyboardInterrupt(message) from None
+    except (KeyboardInterrupt, Exception) as stopped:
+        kept = len(measured) if has_begun else 0
+        are = f"{kept} of {counted(len(scenes), 'scene')} {'is' if kept == 1 else 'are'} kept; --resume continues the run"
+        if isinstance(stopped, KeyboardInterrupt):
+            raise KeyboardInterrupt(are if kept else "nothing was written") from None
+        if kept:
+            stopped.add_note(f"{are}.")
+        raise
     measured.clear()
     return results
 

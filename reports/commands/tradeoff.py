@@ -70,11 +70,11 @@ def tradeoff_command(
                     progress(what, share)
 
                 found.append(tradeoff(scene, engines, metric, budget=budget, worlds=worlds, on_progress=on_progress, jobs=jobs))
-            if not json_output:
-                print_rows(view.pareto_front_rows(found[-1]), json_output=False, left_out_first=view.left_out_first(found[-1]))
-                print_sentences(view.sentences(found[-1], within))
         write_tradeoff(found, within, folder)
     if json_output:
         echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
-    else:
-        echo(f"Written: {os.path.join(output, 'tradeoff.md')}")
+        return
+    for one in found:
+        print_rows(view.pareto_front_rows(one), json_output=False, left_out_first=view.left_out_first(one))
+        print_sentences(view.sentences(one, within))
+    echo(f"Written: {os.path.join(output, 'tradeoff.md')}")

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 def bounce_ladder(results: Results, scene_name: str) -> Chart:
     """The apex after each bounce relative to the drop height, logarithmic, for each engine at the finest time step, and the exact e²ᵏ.
 
-    A flight is the motion between two time steps in which the floor changes the velocity. The plot ends at the first flight shorter than 16
-    steps.
+    A flight is the motion between two contacts. The plot ends at the first flight shorter than 16 steps.
 
     Args:
         results: The run.
@@ -53,8 +52,8 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
 @np.errstate(all="ignore")  # an engine may return 1e300
 def apexes(scene: Scenario, motion: Trajectory) -> Array:
     """Apex above the floor [m] of the drop and of each later flight, averaged over the middle half of the flight, shape (flights,)."""
-    touching = Comparison(scene, motion).touching
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], touching, [True]])))
+    in_contact = Comparison(scene, motion).in_contact
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], in_contact, [True]])))
     found = []
     for start, end in edges.reshape(-1, 2):  # rows at which a flight begins and ends
         if end - start < SHORTEST_FLIGHT:

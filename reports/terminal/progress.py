@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -12,39 +13,76 @@ from rich.text import Text
 from comparisons.running.progress import OnProgress, Progress
 from reports.terminal.safe import echo, safe, styled
 from reports.views.numbers import in_ms
+from scenarios.text import counted
+
+
+class RunProgress(NamedTuple):
+    """The functions that show the progress of a run.
+
+    Attributes:
+        on_progress: To be called as `run` calls it.
+        on_finished: To be called with the name of each scene that is finished; scenes run in parallel.
+        show_line: Prints a line.
+    """
+
+    on_progress: OnProgress
+    on_finished: Callable[[str], None]
+    show_line: Callable[[str], None]
 
 
 @contextmanager
-def progress_bar(scenes: int, pieces: int) -> Iterator[tuple[OnProgress, Callable[[str], None]]]:
-    """A progress bar of scenes on a terminal; elsewhere, a line for each scene with the elapsed time. Also a function to print a line."""
+def progress_bar(scenes: int, pieces: int) -> Iterator[RunProgress]:
+    """A progress bar of scenes on a terminal; elsewhere, a line when a scene starts and when it is finished, with the elapsed time."""
     console, start = Console(stderr=True), time.monotonic()
+    started: dict[str, None] = {}
+    finished: set[str] = set()
+
+    def starts(progress: Progress) -> bool:
+        """Whether a scene starts; one of an interrupted run, of which only the end is reported, is finished."""
+        if progress.timing or progress.scene in started or progress.scene in finished:
+            return False
+        if progress.finished:
+            finished.add(progress.scene)
+        else:
+            started[progress.scene] = None
+        return not progress.finished
+
+    def of_all(number: int) -> str:
+        return f"{number} of {counted(scenes, 'scene')}"
+
     if not console.is_terminal:
-        seen: set[str] = set()
+        timed: list[str] = []
 
         def line(progress: Progress) -> None:
-            what = "" if progress.timing else progress.scene
-            if what not in seen:
-                seen.add(what)
-                if progress.timing:
-                    echo("timing the steps of each engine", err=True)
-                    return
+            if progress.timing and not timed:
+                timed.append("timing the steps of each engine")
+                echo(timed[0], err=True)
+            if starts(progress):
                 elapsed = _duration(time.monotonic() - start)
-                echo(f"running {progress.scene} (scene {len(seen - {''})} of {scenes}, {elapsed} elapsed)", err=True)
+                echo(f"running {progress.scene} ({of_all(len(finished))} finished, {elapsed} elapsed)", err=True)
 
-        yield line, lambda text: echo(text, err=True)
+        def finish(scene: str) -> None:
+            finished.add(scene)
+            running = ", ".join(one for one in list(started) if one not in finished)
+            elapsed = _duration(time.monotonic() - start)
+            echo(f"finished {scene} ({of_all(len(finished))}, {elapsed} elapsed{running and f'; still running: {running}'})", err=True)
+
+        yield RunProgress(line, finish, lambda text: echo(text, err=True))
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console, transient=True) as bar:
-        task, finished = bar.add_task("starting", total=float(scenes * pieces)), 0
+        task, done = bar.add_task("starting", total=float(scenes * pieces)), 0
         shares: dict[str, float] = {}  # of the pieces of work that are not finished, by scene
 
         def advance(progress: Progress) -> None:
-            nonlocal finished
-            finished += progress.finished
+            nonlocal done
+            starts(progress)
+            done += progress.finished
             shares[progress.scene] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
-            bar.update(task, completed=finished + sum(shares.values()), description=safe(_described(progress)))
+            description = f"{of_all(len(finished))} finished; {_described(progress)}"
+            bar.update(task, completed=done + sum(shares.values()), description=safe(description))
 
-        yield advance, lambda text: console.print(styled(text), soft_wrap=True)
+        yield RunProgress(advance, finished.add, lambda text: console.print(styled(text), soft_wrap=True))
 
 
 @contextmanager

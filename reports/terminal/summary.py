@@ -28,15 +28,15 @@ def print_summary(results: Results, console: Console | None = None) -> None:
 
 
 def print_failures(groups: Sequence[FailureGroup], console: Console | None = None) -> None:
-    """Print the failures of each engine, with one command that reproduces them."""
+    """Print the failures of each engine, what explains them first, with one command that reproduces them."""
     out = console or Console()
     for group in groups:
+        if group.consistent_with:
+            print_sentence(group.consistent_with, out, "red")
         for sentence in group.sentences[:MOST_SENTENCES]:
             print_sentence(f"✗ {sentence}", out, "red")
         if len(group.sentences) > MOST_SENTENCES:
             print_sentence(f"✗ {group.engine} has {counted(len(group.sentences) - MOST_SENTENCES, 'more failure')}.", out, "red")
-        if group.consistent_with:
-            print_sentence(group.consistent_with, out)
         out.print(styled(f"Reproduce: {group.reproduce}"), soft_wrap=True)  # a command is one line
 
 

@@ -37,6 +37,13 @@ class BaselineFile(NamedTuple):
         return shlex.join(["dropspin", "accept", self.run, "--baseline", self.path, "--reason"]) + ' "…"'
 
 
+def scope(file: BaselineFile | None) -> str:
+    """A sentence on what was checked."""
+    if file is None:
+        return "Checked: the expectations of the scenes only, without a baseline."
+    return f"Checked: the expectations of the scenes, and the accepted results in {file.path}."
+
+
 def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
     """The outcome of a check, the verdict last."""
     own = _without_baseline(checked.results)

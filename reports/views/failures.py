@@ -9,11 +9,11 @@ from typing import Any
 from comparisons.judging.convergence import STUDIES
 from comparisons.judging.verdicts import FAILURES
 from comparisons.measuring.symmetries import kind_of
-from comparisons.regressions.parameters import WrongParameter, wrong_parameters
+from comparisons.regressions.causes import WrongParameter, causes
 from comparisons.results.results import Results
 from comparisons.running.processes import ResourceLimits
 from reports.views.numbers import bound, formatted, step, subject, word
-from scenarios.text import counted
+from scenarios.text import counted, rounded
 
 Row = Mapping[Hashable, Any]
 MOST_NAMES = 4
@@ -62,8 +62,8 @@ class FailureGroup:
     Attributes:
         engine: Label of the engine.
         sentences: For each scene its first failure and the number of other failing results; for a breakdown, the scenes in which it occurs.
-        consistent_with: The parameters of which each, if wrong, explains all asymptotic errors of these scenes; empty if there is no
-            such parameter.
+        consistent_with: The causes of which each alone explains the asymptotic errors: wrong parameters, and known faults; empty if there
+            is no such cause.
         reproduce: The command, or the call, that reproduces them.
     """
 
@@ -119,24 +119,31 @@ def grouped(results: Results, found: Sequence[Failure], baseline: str | None = N
             continue  # its accepted results are gone because it broke down
         cause = one.what if one.broke_down else one.scene
         by_engine.setdefault(one.engine, {}).setdefault((one.broke_down, cause), []).append(one)
-    return [_group(results, engine, list(causes.values()), baseline) for engine, causes in by_engine.items()]
+    return [_group(results, engine, list(by_cause.values()), baseline) for engine, by_cause in by_engine.items()]
 
 
-def _group(results: Results, engine: str, causes: Sequence[Sequence[Failure]], baseline: str | None) -> FailureGroup:
-    scenes = list(dict.fromkeys(one.scene for some in causes for one in some))
-    accepted = any(one.accepted for some in causes for one in some)
-    symmetric = any(one.of_symmetry for some in causes for one in some)
+def _group(results: Results, engine: str, by_cause: Sequence[Sequence[Failure]], baseline: str | None) -> FailureGroup:
+    scenes = list(dict.fromkeys(one.scene for some in by_cause for one in some))
+    accepted = any(one.accepted for some in by_cause for one in some)
+    symmetric = any(one.of_symmetry for some in by_cause for one in some)
     command = reproduce_scenes(results, scenes, engine, baseline=baseline if accepted else None, symmetries=symmetric)
-    parameters = dict.fromkeys(map(_described, wrong_parameters(results, engine)))
-    consistent_with = f"Consistent with {' or '.join(parameters)}." if parameters else ""
-    return FailureGroup(engine, [_of_one_cause(some) for some in causes], consistent_with, command)
+    return FailureGroup(engine, [_of_one_cause(some) for some in by_cause], _consistent_with(results, engine), command)
 
 
-def _described(parameter: WrongParameter) -> str:
-    size = f"{100.0 * abs(parameter.share):.2g} %"
-    if not parameter.signed:
-        return f"{parameter.name} wrong by {size}"
-    return f"{parameter.name} {size} too {'high' if parameter.share > 0.0 else 'low'}"
+def _consistent_with(results: Results, engine: str) -> str:
+    """The causes with which the errors of an engine are consistent, in a sentence; empty if there are none."""
+    parameters, faults = causes(results, engine)
+    found = [" or ".join(dict.fromkeys(map(_described, parameters))), *(f"this fault: {fault.message}" for fault in faults)]
+    listed = ", or with ".join(filter(None, found))
+    return f"Consistent with {listed}." if listed else ""
+
+
+def _described(wrong: WrongParameter) -> str:
+    name, unit, _ = wrong.parameter
+    size = f"{rounded(100.0 * abs(wrong.size), 2)} %" if unit == "1" else f"{rounded(abs(wrong.size), 2)} {unit}"
+    if not wrong.signed or unit == "rad":
+        return f"{name} wrong by {size}"
+    return f"{name} {size} too {'high' if wrong.size > 0.0 else 'low'}"
 
 
 def _of_one_cause(some: Sequence[Failure]) -> str:

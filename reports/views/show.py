@@ -2,13 +2,17 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from comparisons.engines.base import EngineBroken
 from comparisons.judging.verdicts import verify_expectations
 from reports.views.numbers import bound
 from reports.views.scene import left_out, modelled
-from scenarios import Scenario, truth_for
+from scenarios import Scenario, Truth, truth_for
 from scenarios.model import Expectation
 from scenarios.problems import identifier
+from scenarios.state import VELOCITY
+from scenarios.truths.impact_laws import FRICTION_LAWS, law_of
 
 if TYPE_CHECKING:
     from comparisons.running.inputs import EngineEntry
@@ -36,9 +40,23 @@ def scene_rows(scene: Scenario) -> Rows:
     }
     if truth and truth.events:
         facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
+    if truth and not truth.covers_all(scene.duration):
+        facts["valid until"] = f"{truth.horizon:.6f} s: {truth.ends}"
+    if truth and truth.events and law_of(scene) in FRICTION_LAWS:
+        facts["other laws"] = _other_laws(scene, truth)
     for expectation in scene.expect:
         facts[f"expect {expectation.metric} ({_applies_to(expectation)})"] = f"{_allowed(expectation)}: {expectation.reason}"
     return [{"what": key, "is": value} for key, value in facts.items() if value]
+
+
+def _other_laws(scene: Scenario, truth: Truth) -> str:
+    """By how much the velocity after the first impact differs under the other laws of impacts with friction."""
+    after, found = truth.events[0].after[VELOCITY], []
+    for law in FRICTION_LAWS:
+        other = None if law == law_of(scene) else truth_for(scene, law)
+        if other is not None and other.events:
+            found.append(f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s")
+    return f"velocity after the first impact differs by: {', '.join(found)}; these are other models, not errors"
 
 
 def _applies_to(expectation: Expectation) -> str:

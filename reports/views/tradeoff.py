@@ -8,9 +8,12 @@ import numpy as np
 
 from comparisons.measuring.metrics import METRICS
 from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff
+from comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
 from reports.views.numbers import duration, formatted, left_out
-from scenarios.text import rounded
+from scenarios.text import counted, rounded
+
+BUSY = 0.5
+"""Other threads per processor from which on a machine counts as busy: on one with two processors, one other thread."""
 
 
 def columns(found: Sequence[TradeOff]) -> list[str]:
@@ -30,11 +33,11 @@ def _per_world(worlds: int) -> str:
 def rows(found: TradeOff) -> list[dict[str, Any]]:
     """A row for every engine and time step tried, and a row without a time step for each engine that was not run.
 
-    A row has the error, the median, minimum and quartiles over the rounds of the wall time per simulated second [s], and the reason why the
-    engine's ladder ended.
+    A row has the error, the median, minimum, quartiles and spread over the rounds of the wall time per simulated second [s], and the reason
+    why the engine's ladder ended. Where the rounds do not decide whether a configuration is on the Pareto front, that is None.
     """
     points = {(point.engine, point.dt): point for point in found.points}
-    front = found.pareto_front
+    front, undecided = ([(point.engine, point.dt) for point in points] for points in (found.pareto_front, found.undecided))
     dominated_by = {point.engine: other.engine for point, other in found.dominated.items()}
     return [
         {
@@ -45,7 +48,7 @@ def rows(found: TradeOff) -> list[dict[str, Any]]:
             "error": _finite(error),
             **_costs(points.get((ladder.engine, dt)), found.worlds),
             "memory_per_world": found.memory_per_world.get(ladder.engine),
-            "on_pareto_front": any(point.engine == ladder.engine and point.dt == dt for point in front),
+            "on_pareto_front": None if (ladder.engine, dt) in undecided else (ladder.engine, dt) in front,
             "dominated_by": dominated_by.get(ladder.engine),
             "ladder_ended": ladder.ended,
             "ladder_reason": ladder.reason,
@@ -62,20 +65,24 @@ def _finite(value: float) -> float | None:
 
 def _costs(point: CostPoint | None, worlds: Sequence[int]) -> dict[str, Any]:
     per_world = {f"cost_per_world_{size}": None if point is None else point.costs_per_world.get(size) for size in worlds}
+    per_world |= {f"spread_per_world_{size}": None if point is None else point.spreads_per_world.get(size) for size in worlds}
     if point is None:
-        return dict.fromkeys(("cost", "cost_best", "cost_quartiles")) | per_world
+        return dict.fromkeys(("cost", "cost_best", "cost_quartiles", "cost_spread")) | per_world
     return {
         "cost": point.typical_cost,
         "cost_best": float(point.cost.min()),
         "cost_quartiles": [float(value) for value in np.quantile(point.cost, [0.25, 0.75])],
+        "cost_spread": spread(point.cost),
         **per_world,
     }
 
 
 def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
     """The Pareto front, cheapest first, then the most accurate time step of each dominated engine, then the engines left out."""
-    on_front = [_row(found, point, "yes") for point in found.pareto_front]
-    dominated = [_row(found, point, f"dominated by {other.engine}") for point, other in found.dominated.items()]
+    undecided = found.undecided
+    shown = sorted({*found.pareto_front, *undecided}, key=lambda point: point.typical_cost)
+    on_front = [_row(found, point, "undecided" if point in undecided else "yes") for point in shown]
+    dominated = [_row(found, point, f"dominated by {other.engine}") for point, other in found.dominated.items() if point not in undecided]
     left_out = [
         dict(zip(on_front[0], (label, *["–"] * (len(on_front[0]) - 2), "left out, see below"), strict=True)) for label in found.left_out
     ]
@@ -101,6 +108,7 @@ def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
             ended.setdefault(_reason(ladder), []).append(f"{ladder.engine} at {_step(ladder.steps[-1][0])}")
     return [
         *(_recommendation(found, tolerance) for tolerance in within),
+        *_timings(found),
         *_memory(found),
         *(f"No smaller time step was tried because {reason}: {', '.join(labels)}." for reason, labels in ended.items()),
         *left_out(found.left_out),
@@ -143,6 +151,29 @@ def _recommendation(found: TradeOff, tolerance: float) -> str:
                 f" In a batch of {size}, {_named(batched)}: {duration(batched.costs_per_world[size])} per world and simulated second."
             )
     return sentence
+
+
+def _timings(found: TradeOff) -> list[str]:
+    """Sentences on timings that differ between rounds, what they leave undecided, and other load on the machine."""
+    listed = []
+    undecided = found.undecided
+    if undecided:
+        are = counted(len(undecided), "configuration is", "configurations are")
+        those = ", ".join(map(_named, undecided))
+        listed.append(f"{are} on the Pareto front in some of the rounds only, so that the timings do not decide it: {those}.")
+    batches = [(value, size, point) for point in found.points for size, value in point.spreads_per_world.items()]
+    typical = found.spread
+    if typical >= LEVEL:
+        listed.append(f"Timings vary: the median of the rounds is typically {typical:.2g} times the least (column cost_spread).")
+    if batches and (worst := max(batches, key=lambda one: one[0]))[0] >= LEVEL:
+        value, size, point = worst
+        listed.append(f"Timings of batches vary by a factor of up to {value:.2g}, that of {_named(point)} in a batch of {size}.")
+    if found.load >= BUSY:
+        listed.append(
+            f"The machine was busy while costs were measured: {found.load:.1f} other threads per processor were running, on average; "
+            "measure again on an idle machine."
+        )
+    return listed
 
 
 def _memory(found: TradeOff) -> list[str]:

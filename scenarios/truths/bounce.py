@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scenarios.body import Sphere
 from scenarios.model import TOUCHING, Floor, Scenario
 from scenarios.rotations import rotate, unrotate
-from scenarios.truths.flight import flight_states
+from scenarios.truths.flight import TURNS_OVER, flight_states
 from scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
     statement = "bounce ladder h_k = e^(2k) H with impact times by geometric sums (Newton's restitution)"
     if u0 == 0.0:
         statement = "rest on the floor, angular velocity about the vertical constant, angle ωt"
-    return Truth("bounce-ladder", statement, states, events, until)
+    return Truth("bounce-ladder", statement, states, events, until, TURNS_OVER if until < scene.duration else "")
 
 
 def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array | None:

@@ -8,7 +8,10 @@ that a body can have, because |(I_j - I_k)/I_i| <= 1. So from its height h and i
 and there is no contact before the first zero of the right-hand side. The zeros approach a contact quadratically from before. Without
 rotation c = 0, and the first zero is the contact.
 
-Source: interval exclusion by Taylor's theorem with Lagrange's remainder; Euler's equations for |α|.
+The height of a corner that is on the floor at the start is the integral of its upward velocity, at first by Gauss–Legendre quadrature, so
+that it is as accurate as the velocity is, relative to the height: flights that last a millionth of those before lose no digits.
+
+Source: interval exclusion by Taylor's theorem with Lagrange's remainder; Euler's equations for |α|; C. F. Gauss (1814) for the quadrature.
 Valid for: undamped flight. The search ends without a contact time in two cases: a corner comes within rounding of the floor without clearly
 crossing it, so that double precision does not determine whether it touches the floor; or the search would take too many steps.
 """
@@ -40,6 +43,8 @@ FIRST_CHUNK = 32  # intervals at a time, doubled up to
 LARGEST_CHUNK = 50_000  # heights of corners at a time
 HEIGHT_ROUNDING = 1e-15  # of all terms of a height
 ATTITUDE_ROUNDING = 1e-15  # rad, for each rad turned
+SPEED_ROUNDING = 1e-14  # of all terms of the upward velocity of a corner
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)  # exact to rounding for a turn of 2 `FIRST_ANGLE`
 
 
 @dataclass(frozen=True)
@@ -152,12 +157,10 @@ class ContactSearch:
         for _ in range(MAX_STEPS):
             if now > end:
                 return None
-            heights, speeds = (values[0] for values in self._corners(np.array([now])))
-            tolerance = float(self._tolerance(np.array([now]))[0])
-            low = heights <= (tolerance if now > 0.0 else TOUCHING * self._size)
-            lands = low & (speeds <= 0.0)
+            heights, speeds, tolerance = self._corners_at(now)
+            lands = (heights <= tolerance if now > 0.0 else self._starts_on_floor) & (speeds <= 0.0)
             if now > 0.0 and lands.any():
-                return self._landing(now, lands, tolerance)
+                return self._landing(now, lands)
             if (lands & (self._curvature > self._gravity)).any():
                 return Contact(0.0, False)
             steps = _safe_steps(np.maximum(heights - 0.5 * tolerance, 0.0), speeds, self._gravity - self._curvature)
@@ -165,7 +168,7 @@ class ContactSearch:
             now += float(max(step, 4.0 * math.ulp(now)))
         return Contact(now, False)
 
-    def _landing(self, now: float, lands: NDArray[np.bool_], tolerance: float) -> Contact:
+    def _landing(self, now: float, lands: NDArray[np.bool_]) -> Contact:
         """The contact of descending corners within rounding of the floor; it is decided when one of them certainly crosses the floor.
 
         A step of |v| divided by the largest upward acceleration does not pass the lowest point of any corner.
@@ -173,15 +176,36 @@ class ContactSearch:
         upward = (self._gravity + self._curvature)[lands]
         later = now
         for _ in range(MAX_DESCENT):
-            heights, speeds = (values[0, lands] for values in self._corners(np.array([later])))
-            crosses = (speeds < 0.0) & (speeds**2 > 2.0 * upward * np.maximum(heights + tolerance, 0.0))
+            heights, speeds, tolerance = (values[lands] for values in self._corners_at(later))
+            crosses = (speeds < 0.0) & (speeds**2 > 2.0 * upward * (np.maximum(heights, 0.0) + tolerance))
             if crosses.any():
-                return Contact(later + float((heights / -speeds)[crosses].min()), True)  # Newton's last step
+                # Newton's last step; a corner that is below the floor, beyond rounding, passed through it since `now`.
+                steps = np.maximum(heights, -tolerance)[crosses] / -speeds[crosses]
+                return Contact(max(later + float(steps.min()), 0.0), True)
             steps = (-speeds / upward)[speeds < 0.0]
             if not len(steps) or later + steps.min() == later:
                 break
             later += float(steps.min())
         return Contact(now, False)
+
+    @cached_property
+    def _starts_on_floor(self) -> NDArray[np.bool_]:
+        """Whether each corner is on the floor at the start, shape (n,)."""
+        on_floor: NDArray[np.bool_] = self._corners(np.zeros(1))[0][0] <= TOUCHING * self._size
+        return on_floor
+
+    def _corners_at(self, now: float) -> tuple[Array, Array, Array]:
+        """Heights above the floor [m], upward velocities [m/s] and rounding errors of the heights [m] at a time [s], each of shape (n,)."""
+        largest_spin = self.flight.rotor.largest_spin
+        integrates = bool(self._starts_on_floor.any()) and now * largest_spin <= 2.0 * FIRST_ANGLE
+        heights, speeds = self._corners(np.append(0.5 * now * (1.0 + NODES), now) if integrates else np.array([now]))
+        rounding = np.full(len(self.points), self._tolerance(np.array([now]))[0])
+        if integrates:
+            risen = 0.5 * now * (WEIGHTS @ speeds[:-1])
+            fastest = abs(self.flight.start[VELOCITY][1]) + now * abs(self._gravity) + self._reach * largest_spin
+            heights[-1] = np.where(self._starts_on_floor, risen, heights[-1])
+            rounding = np.where(self._starts_on_floor, SPEED_ROUNDING * fastest * now, rounding)
+        return heights[-1], speeds[-1], rounding
 
     def _corners(self, times: Array) -> tuple[Array, Array]:
         """Heights above the floor [m] and upward velocities [m/s] of the corners, shapes (m, n), at times [s], shape (m,)."""

@@ -1,18 +1,20 @@
 """A body falls and strikes the floor repeatedly, as a ball or with a corner or an edge: flight, impulse, flight, and so on.
 
-The impulse is that of `impact_laws`: normal without friction, eq 17 of Wang's lecture note with infinite friction, Coulomb's for a ball; or
-that of a given law.
+The impulse is that of `impact_laws`: normal without friction, eq 17 of Wang's lecture note with infinite friction, else that of the floor's
+`impact_law`; or that of a given law.
 
 Source: E. T. Whittaker, Analytical Dynamics, section 95 (impact of smooth and of perfectly rough bodies); H. Wang, eq 17.
 Valid for: impacts of one corner, or of the two corners of an edge that strike the floor at once and have equal velocities before and after;
-a ball with any spin; a Coulomb coefficient for a ball of equal moments only, or by a given law; no damping. Valid up to the first of these
-events: the tenth impact; an impact that is not of this kind, in which the floor would have to pull (as eq 17 may demand of a corner that
-slides fast), or after which the body stays on the floor; a time at which rounding determines whether the body touches the floor or when it
-turns over; growth of an initial disturbance of 1e-10 rad/s to 1e-6.
+a ball with any spin; no damping. The solution ends, and gives the reason, at the first of these events: the hundredth impact; an impact
+that is not of this kind, or for which the law has no solution or several, or in which the floor would have to pull (as eq 17 may demand of
+a corner that slides fast), or after which the body stays on the floor; a flight that is short relative to the longest, as before impacts
+accumulate; a time at which rounding determines whether the body touches the floor or when it turns over; growth of an initial disturbance
+of 1e-10 rad/s to 1e-6.
 """
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,24 +24,30 @@ from scenarios.model import TOUCHING, Scenario
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY
 from scenarios.truths.contact_search import Contact, ContactSearch
-from scenarios.truths.flight import Flight, flight_states
+from scenarios.truths.flight import TURNS_OVER, Flight, flight_states
 from scenarios.truths.impact_laws import Law, law_of, velocities_after
 from scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 
 CORNER_TOLERANCE = 1e-9  # of the body's size; corners at most this much higher than the lowest touch too
-MAX_IMPACTS = 10
-MIN_FLIGHT_TIME = 1e-7  # s; faster impacts accumulate, as at Zeno's time
+MAX_IMPACTS = 100
+SHORTEST_FLIGHT = 1e-7
+"""A flight shorter than this share of the longest before it is not followed: its impact speed has lost half of the digits."""
 DISTURBANCE = 1e-10  # rad/s, of the start
 DISTURBED_DIRECTION = np.array([0.0] * 10 + [0.48, -0.6, 0.64])
 MAX_GROWTH = 1e4  # of the disturbance, to 1e-6; beyond it an engine's error cannot be distinguished from the growth of rounding
+TOO_SENSITIVE = "the impact amplifies small differences too much"
 
 LAW_NAMES = {
     "normal": "normal impulse",
     "poisson": "Poisson's restitution",
     "clamped": "restitution that adds no energy",
     "coulomb": "Coulomb's friction",
+    "cone": "Coulomb's friction against the slip that is left",
+    "integrated-newton": "Coulomb's friction at each instant, Newton's restitution",
+    "integrated-poisson": "Coulomb's friction at each instant, Poisson's restitution",
+    "integrated-energy": "Coulomb's friction at each instant, Stronge's restitution",
 }
 
 
@@ -53,41 +61,43 @@ def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
     floor = scene.floor
     if floor is None or scene.damping is not None:
         return None
-    if law is None and not isinstance(floor.friction, str) and not _slides_one_way(scene):
-        return None
-    law = law or law_of(floor)
-    course = _follow(scene, scene.initial_state, law)
-    if len(course.events) > 1:
-        course = _until_sensitive(scene, course, _follow(scene, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION, law))
-    if course.horizon == 0.0 or (not course.events and course.ends_at_impact):
+    law = law or law_of(scene)
+    flights = _until_sensitive(scene, law)
+    events = tuple(flight.impact for flight in flights if flight.impact is not None)
+    horizon, ends = flights[-1].end, flights[-1].reason
+    if horizon == 0.0 or (not events and flights[0].is_other_impact):
         return None  # the body stays in contact from the start, or the first impact is not of this kind
-    if not course.events:
-        return Truth("flight", "free flight above the floor", course.states, horizon=course.horizon)
+    states = _States(tuple(flight.motion for flight in flights), tuple(event.time for event in events))
+    if not events:
+        return Truth("flight", "free flight above the floor", states, horizon=horizon, ends=ends)
     impulse = LAW_NAMES[law] if law != "note" else "eq 15" if floor.friction == "none" else "sticking impulse, eq 17"
-    points = len(_touching(scene, course.events[0].before))
+    points = len(_touching(scene, events[0].before))
     where = "ball" if isinstance(scene.body, Sphere) else {1: "corner", 2: "edge"}.get(points, "face")
-    count = "one" if len(course.events) == 1 else str(len(course.events))
-    statement = f"free rotor and parabola, {count} {where} impact{'s' if len(course.events) > 1 else ''} ({impulse})"
-    return Truth(f"{where}-impact", statement, course.states, course.events, course.horizon)
-
-
-def _slides_one_way(scene: Scenario) -> bool:
-    """Whether the direction of sliding cannot change during an impact, as for a ball of three equal moments."""
-    return isinstance(scene.body, Sphere) and float(np.ptp(np.linalg.eigvalsh(scene.body.inertia_tensor))) == 0.0
+    count = "one" if len(events) == 1 else str(len(events))
+    statement = f"free rotor and parabola, {count} {where} impact{'s' if len(events) > 1 else ''} ({impulse})"
+    return Truth(f"{where}-impact", statement, states, events, horizon, ends)
 
 
 @dataclass(frozen=True, eq=False)
-class _Course:
-    """The flights between impacts, until `horizon` [s]."""
+class _Flight:
+    """One flight, which ends at the time `end` [s] with an impact, or with the scene, or with the solution for the `reason`."""
+
+    motion: Flight
+    end: float
+    impact: Impact | None = None
+    reason: str = ""
+    is_other_impact: bool = False  # one that the formula does not cover
+
+
+@dataclass(frozen=True, eq=False)
+class _States:
+    """The states at times [s]; the time of an impact belongs to the flight before it."""
 
     flights: tuple[Flight, ...]
-    events: tuple[Impact, ...]
-    horizon: float
-    ends_at_impact: bool = False  # of another kind
+    impacts: tuple[float, ...]
 
-    def states(self, t: Array) -> Array:
-        """The states at times [s]; the time of an impact belongs to the flight before it."""
-        begins = np.array([0.0, *(event.time for event in self.events)])
+    def __call__(self, t: Array) -> Array:
+        begins = np.array([0.0, *self.impacts])
         which = np.maximum(np.searchsorted(begins, t, side="left") - 1, 0)
         rows = np.empty((len(t), 13))
         for number, flight in enumerate(self.flights):
@@ -96,42 +106,64 @@ class _Course:
         return rows
 
 
-def _follow(scene: Scenario, start: Array, law: Law) -> _Course:
-    """The flights and impacts until the scene ends, the body stays on the floor, or an impact is not covered by the formula."""
+def _flights(scene: Scenario, start: Array, law: Law) -> Iterator[_Flight]:
+    """The flights from a state, until the scene ends, the body stays on the floor, or an impact is not covered by the formula."""
     assert scene.floor is not None
     inertia, g = scene.body.inertia_tensor, scene.acceleration
-    flights, now = [flight_states(start, inertia, g)], 0.0
-    events: list[Impact] = []
-    while True:
-        until = min(scene.duration, now + flights[-1].horizon)
-        contact = _next_impact(scene, flights[-1], until - now, leaves=bool(events))
+    motion, now, longest = flight_states(start, inertia, g), 0.0, 0.0
+    for number in range(MAX_IMPACTS + 1):
+        until = min(scene.duration, now + motion.horizon)
+        contact = _next_impact(scene, motion, until - now, leaves=number > 0)
         if contact is None:
-            return _Course(tuple(flights), tuple(events), until)
-        if not contact.is_decided or (events and (len(events) == MAX_IMPACTS or contact.time < MIN_FLIGHT_TIME)):
-            return _Course(tuple(flights), tuple(events), now + contact.time)
-        now, before = now + contact.time, flights[-1](np.array([contact.time]))[0]
+            yield _Flight(motion, until, reason="" if until == scene.duration else TURNS_OVER)
+            return
+        end = now + contact.time
+        if not contact.is_decided:
+            yield _Flight(motion, end, reason="rounding determines whether the body touches the floor")
+            return
+        if contact.time < SHORTEST_FLIGHT * longest:
+            yield _Flight(motion, end, reason="impacts follow one another ever faster")
+            return
+        if number == MAX_IMPACTS:
+            yield _Flight(motion, end, reason=f"impact {MAX_IMPACTS + 1} follows")
+            return
+        now, longest, before = end, max(longest, contact.time), motion(np.array([contact.time]))[0]
         touching = _touching(scene, before)
+        rates = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor, law)
+        if rates is None:
+            yield _Flight(motion, now, reason="the impact law has no solution, or several", is_other_impact=True)
+            return
         after = before.copy()
-        after[RATES] = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor, law)
-        pushes = after[VELOCITY] @ UP > before[VELOCITY] @ UP
-        if not (pushes and _have_one_velocity(touching, before) and _have_one_velocity(touching, after)):
-            return _Course(tuple(flights), tuple(events), now, ends_at_impact=True)
-        events.append(Impact(now, before, after))
-        flights.append(flight_states(after, inertia, g))
+        after[RATES] = rates
+        if after[VELOCITY] @ UP <= before[VELOCITY] @ UP:
+            yield _Flight(motion, now, reason="the impact law would have the floor pull", is_other_impact=True)
+            return
+        if not (_have_one_velocity(touching, before) and _have_one_velocity(touching, after)):
+            yield _Flight(motion, now, reason="several points strike the floor at once", is_other_impact=True)
+            return
+        yield _Flight(motion, now, Impact(now, before, after))
+        motion = flight_states(after, inertia, g)
         if not _leave(touching, after):
-            return _Course(tuple(flights), tuple(events), now)
+            yield _Flight(motion, now, reason="the body stays on the floor")
+            return
 
 
-def _until_sensitive(scene: Scenario, course: _Course, disturbed: _Course) -> _Course:
-    """The flights and impacts up to the impact after which a disturbance of the initial state has grown by more than `MAX_GROWTH`."""
+def _until_sensitive(scene: Scenario, law: Law) -> list[_Flight]:
+    """The flights up to the impact after which a disturbance of the initial state has grown by more than `MAX_GROWTH`."""
     per_radian = np.array([scene.body.size] * 3 + [1.0] * 3)  # speeds, m/s, to rates of rotation
-    for number, event in enumerate(course.events):
-        difference = math.inf
-        if number < len(disturbed.events):
-            difference = float(np.abs((disturbed.events[number].after[RATES] - event.after[RATES]) / per_radian).max())
-        if number > 0 and difference > MAX_GROWTH * DISTURBANCE:
-            return _Course(course.flights[: number + 1], course.events[:number], event.time)
-    return course
+    flights: list[_Flight] = []
+    disturbed = _flights(scene, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION, law)
+    others: list[_Flight] = []
+    for number, flight in enumerate(_flights(scene, scene.initial_state, law)):
+        flights.append(flight)
+        if number == 0 or flight.impact is None:
+            continue
+        others += islice(disturbed, number + 1 - len(others))
+        other = others[-1].impact if len(others) == number + 1 else None
+        if other is None or np.abs((other.after[RATES] - flight.impact.after[RATES]) / per_radian).max() > MAX_GROWTH * DISTURBANCE:
+            flights[-1] = _Flight(flight.motion, flight.end, reason=TOO_SENSITIVE)
+            break
+    return flights
 
 
 def _next_impact(scene: Scenario, flight: Flight, duration: float, leaves: bool) -> Contact | None:

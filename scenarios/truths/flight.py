@@ -30,6 +30,7 @@ from scenarios.truths.truth import Truth
 Array = NDArray[np.float64]
 
 UNDAMPED = Damping()
+TURNS_OVER = "rounding of the initial state determines when the body turns over"
 SERIES_TERMS = 22  # enough for 17 digits of φ₂ up to z = 1
 
 
@@ -95,7 +96,7 @@ def flight(scene: Scenario) -> Truth | None:
         name = f"damped-{name}"
         parabola = "" if scene.gravity is None else "path with resistance proportional to speed; "
         turning += ", at the time (1 - exp(-κt))/κ, with decaying rates"
-    return Truth(name, parabola + turning, states, horizon=states.horizon)
+    return Truth(name, parabola + turning, states, horizon=states.horizon, ends=TURNS_OVER if states.horizon < scene.duration else "")
 
 
 def _phi1(z: Array) -> Array:

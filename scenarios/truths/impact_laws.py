@@ -7,6 +7,7 @@ With u = v + ω × r the velocity of the point, K = 1/M - r* I⁻¹ r* (eq 15 of
     poisson    normal without friction; with infinite friction K j = s N - u,  s = e max(-N·K⁻¹u, 0) / (N·K⁻¹N)
     clamped    normal without friction; with infinite friction eq 17 with the largest restitution up to e that adds no energy
     coulomb    eq 17 while it stays within the cone of f, else j = j_n (N - f t), t along u's tangential part
+    cone, integrated-newton, integrated-poisson, integrated-energy    `friction_impact`
 
 An edge or a face whose points have equal velocities acts as one point at its middle.
 
@@ -21,22 +22,36 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import Floor
+from scenarios.body import Sphere
+from scenarios.model import Floor, Scenario
 from scenarios.rotations import rotate
 from scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from scenarios.truths.friction_impact import Restitution, cone_impulse, integrated_impulse
 
 Array = NDArray[np.float64]
-Law = Literal["note", "normal", "poisson", "clamped", "coulomb"]
+Law = Literal["note", "normal", "poisson", "clamped", "coulomb", "cone", "integrated-newton", "integrated-poisson", "integrated-energy"]
 LAWS: tuple[Law, ...] = get_args(Law)
+FRICTION_LAWS: tuple[Law, ...] = ("cone", "integrated-newton", "integrated-poisson", "integrated-energy")
+ENDS: dict[str, Restitution] = {"integrated-newton": "newton", "integrated-poisson": "poisson", "integrated-energy": "energy"}
 
 
-def law_of(floor: Floor) -> Law:
-    """The impact law of the exact solution: the normal impulse without friction, eq 17 with infinite friction, else Coulomb's law."""
-    return {"none": "normal", "infinite": "note"}.get(str(floor.friction), "coulomb")  # type: ignore[return-value]
+def law_of(scene: Scenario) -> Law:
+    """The impact law of the exact solution: the normal impulse without friction, eq 17 with infinite friction, else that of the floor.
+
+    All laws with a coefficient of friction are Coulomb's for a ball of equal moments, whose slip does not turn in an impact.
+    """
+    assert scene.floor is not None
+    if isinstance(scene.floor.friction, str):
+        return "normal" if scene.floor.friction == "none" else "note"
+    is_round = isinstance(scene.body, Sphere) and float(np.ptp(np.linalg.eigvalsh(scene.body.inertia_tensor))) == 0.0
+    return "coulomb" if is_round else scene.floor.impact_law
 
 
-def velocities_after(state: Array, point: Array, mass: float, inertia: Array, floor: Floor, law: Law) -> Array:
-    """Velocity and angular velocity, shape (6,), after the impact of one point, offset `point` from the centre in the world frame [m]."""
+def velocities_after(state: Array, point: Array, mass: float, inertia: Array, floor: Floor, law: Law) -> Array | None:
+    """Velocity and angular velocity, shape (6,), after the impact of one point, offset `point` from the centre in the world frame [m].
+
+    None if the law has no solution, or several.
+    """
     q, v, w = state[ORIENTATION], state[VELOCITY], state[SPIN]
     axes = rotate(q, np.eye(3))  # rows: the body's axes in the world
     inverse = axes.T @ np.linalg.inv(inertia) @ axes
@@ -45,18 +60,22 @@ def velocities_after(state: Array, point: Array, mass: float, inertia: Array, fl
     approach = v + np.cross(w, point)
     e = 0.0 if abs(approach[1]) < floor.rest_speed else floor.restitution
     impulse = _impulse(law, response, approach, e, floor.friction)
-    return np.concatenate([v + impulse / mass, w + inverse @ np.cross(point, impulse)])
+    return None if impulse is None else np.concatenate([v + impulse / mass, w + inverse @ np.cross(point, impulse)])
 
 
-def _impulse(law: Law, response: Array, u: Array, e: float, friction: str | float) -> Array:
+def _impulse(law: Law, response: Array, u: Array, e: float, friction: str | float) -> Array | None:
     if friction == "none" and law == "note":
         return np.linalg.solve(response, -(1.0 + e) * u[1] * UP)
     if friction == "none" or law == "normal":
         return -(1.0 + e) * u[1] / response[1, 1] * UP
-    if law == "note":
+    if law == "note" or (friction == "infinite" and law not in ("poisson", "clamped")):
         return np.linalg.solve(response, -u - e * u[1] * UP)
     if law == "coulomb":
-        return _coulomb(response, u, e, np.inf if friction == "infinite" else float(friction))
+        return _coulomb(response, u, e, float(friction))
+    if law == "cone":
+        return cone_impulse(response, u, e, float(friction))
+    if law in ENDS:
+        return integrated_impulse(response, u, e, float(friction), ENDS[law])
     stiffness = np.linalg.inv(response)
     if law == "poisson":
         leaving = e * max(-float(stiffness[1] @ u), 0.0) / stiffness[1, 1]

@@ -77,13 +77,14 @@ class _Fall(NamedTuple):
 class _Ladder(NamedTuple):
     """The successive motions, the poses with which each begins, and one more pose: that in which the last one ends; the final time [s].
 
-    `rests` is whether the body rests after the last motion.
+    `rests` is whether the body rests after the last motion, and `ends` why the motion is not known after the final time, if it is not.
     """
 
     falls: list[_Fall]
     poses: list[_Pose]
     rests: bool
     horizon: float
+    ends: str = ""
 
 
 def rocking(scene: Scenario) -> Truth | None:
@@ -115,13 +116,13 @@ def rocking(scene: Scenario) -> Truth | None:
     if falls[0].lands > scene.duration:
         return Truth("tipping", PENDULUM, states, horizon=scene.duration)
     if floor.restitution > 0.0:
-        return Truth("tipping", PENDULUM, states, horizon=falls[0].lands)
+        return Truth("tipping", PENDULUM, states, horizon=falls[0].lands, ends="the body lands on a face and rebounds")
     impacts = _impacts(scene, stand, ladder)
     if np.ptp([fall.edge for fall in falls]) > 1:
         statement = f"{PENDULUM}; angular momentum about the new edge is conserved at each edge (McGeer 1990)"
-        return Truth("rimless-wheel", statement, states, impacts, ladder.horizon)
+        return Truth("rimless-wheel", statement, states, impacts, ladder.horizon, ladder.ends)
     statement = f"{PENDULUM}; angular momentum about the new edge is conserved on landing (Housner 1963)"
-    return Truth("rocking", statement, states, impacts, ladder.horizon)
+    return Truth("rocking", statement, states, impacts, ladder.horizon, ladder.ends)
 
 
 def _pivots(scene: Scenario, stand: Stand) -> bool:
@@ -161,9 +162,11 @@ def _ladder(stand: Stand, duration: float) -> _Ladder:
     while now <= duration and len(falls) < MAX_LANDINGS:
         pose = poses[-1]
         fall = _fall(stand, pose, now)
+        if fall is None:
+            return _Ladder(falls, poses, False, now, "rounding determines to which side the body falls")
         # The first of several rocking motions between two edges is the widest about its edge.
-        if fall is None or (rocked < 2 and _would_lift_off(stand, pose, fall)):
-            return _Ladder(falls, poses, False, now)
+        if rocked < 2 and _would_lift_off(stand, pose, fall):
+            return _Ladder(falls, poses, False, now, "the body would lift off the floor")
         now, fastest = fall.lands, max(fastest, abs(fall.landing.speed))
         after, is_stable = _after(stand, fall.landing)
         falls.append(fall)
@@ -172,7 +175,7 @@ def _ladder(stand: Stand, duration: float) -> _Ladder:
         rocked = rocked + 1 if returns else 0
         if is_stable and (after.speed == 0.0 or (returns and after.speed**2 < MIN_ENERGY_SHARE * fastest**2)):
             return _Ladder(falls, poses, True, duration)
-    return _Ladder(falls, poses, False, min(now, duration))
+    return _Ladder(falls, poses, False, min(now, duration), "" if now > duration else f"landing {MAX_LANDINGS + 1} follows")
 
 
 def _fall(stand: Stand, pose: _Pose, now: float) -> _Fall | None:

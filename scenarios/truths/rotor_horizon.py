@@ -49,18 +49,19 @@ def horizon(moments: tuple[float, ...], spin: tuple[Fraction, ...], rounding: Ar
     P, Q = math.sqrt(abs(Ic * (Ic - Ib))), math.sqrt(abs(Ia * (Ib - Ia)))
     at_c, at_a = P * abs(float(spin[2])), Q * abs(float(spin[0]))
     of_state = P * rounding[2] + Q * rounding[0]
-    of_moments = sum(
-        at * EPS * float((one + other) / abs(one - other)) for at, one, other in ((at_c, Ic, Ib), (at_a, Ib, Ia)) if one != other
+    of_c, of_a = (
+        at * EPS * float((one + other) / abs(one - other)) if one != other else 0.0 for at, one, other in ((at_c, Ic, Ib), (at_a, Ib, Ia))
     )
     separation = abs(float(Ic * (Ic - Ib) * spin[2] ** 2 - Ia * (Ib - Ia) * spin[0] ** 2))
-    change = of_state + of_moments
-    if 2.0 * (at_c + at_a + change) * change <= TOLERANCE * separation or P * Q == 0.0:
+    change_c, change_a = P * rounding[2] + of_c, Q * rounding[0] + of_a
+    change = (2.0 * at_c + change_c) * change_c + (2.0 * at_a + change_a) * change_a
+    if change <= TOLERANCE * separation or P * Q == 0.0:
         return math.inf
     to_a = float(abs(Ib * (Ib - Ia) * spin[1] ** 2 + Ic * (Ic - Ia) * spin[2] ** 2))
     rate = math.sqrt(float(abs(Ic - Ib) / (Ia * Ib * Ic)) * to_a)
     largest = P * math.sqrt(to_a / float(abs(Ic * (Ic - Ia))))
     speed = math.sqrt(float(sum(w * w for w in spin)))
-    return _crossing(of_state / largest, of_moments / largest, speed / rate) / rate
+    return _crossing(of_state / largest, (of_c + of_a) / largest, speed / rate) / rate
 
 
 def _crossing(of_state: float, of_moments: float, angle: float) -> float:

@@ -65,7 +65,8 @@ def slipping(scene: Scenario) -> Truth | None:
         return _states(scene, stand, t, angle, speed)
 
     statement = "integrals of energy and of horizontal momentum; time by a Chebyshev series (Clenshaw & Curtis 1960)"
-    return Truth("slipping", statement, states, horizon=min(lands, scene.duration))
+    ends = "the body lands on a face" if lands < scene.duration else ""
+    return Truth("slipping", statement, states, horizon=min(lands, scene.duration), ends=ends)
 
 
 def _pace(stand: Stand, level: float, u: Array) -> Array:

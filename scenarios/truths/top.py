@@ -114,5 +114,6 @@ def _integrated(scene: Scenario, arm: Array, along: float, across: float, others
     times = np.append((solved.t[:-1, None] + between * np.diff(solved.t)[:, None]).ravel(), solved.t[-1])
     held = is_held(times)
     horizon = scene.duration if held.all() else float(times[max(0, int(np.argmin(held)) - 1)])
+    ends = "" if held.all() else "the tip lifts off the floor, or another corner strikes the floor"
     statement = "equations of Lagrange's top (1788), integrated numerically (DOP853)"
-    return Truth("top", statement, states, horizon=min(horizon, scene.duration) if solved.success else 0.0)
+    return Truth("top", statement, states, horizon=min(horizon, scene.duration) if solved.success else 0.0, ends=ends)

@@ -38,6 +38,7 @@ class Truth:
         states: Function of times, shape (n,), that returns states, shape (n, 13).
         events: The impacts within the scene's duration, in order.
         horizon: Time up to which the formula is valid [s].
+        ends: Why it is not valid after the horizon, if the horizon is before the end of the scene.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Truth:
     states: States
     events: tuple[Impact, ...] = ()
     horizon: float = float("inf")
+    ends: str = ""
 
     def covers(self, t: Array) -> NDArray[np.bool_]:
         """Mask of the times [s] up to the horizon, with a margin, because rounding of n dt may exceed the horizon."""

@@ -16,7 +16,7 @@ from comparisons.running.run import measure
 from comparisons.tradeoff import costs, errors, study
 from comparisons.tradeoff.errors import DIVISIONS, output_interval
 from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import CostPoint, TradeOff
+from comparisons.tradeoff.points import CostPoint, TradeOff, spread
 from comparisons.tradeoff.study import tradeoff
 from scenarios import DropspinError, load
 
@@ -395,3 +395,51 @@ def test_memory_per_world_is_the_peak_of_a_batch(worlds):
 
 def test_memory_of_an_engine_without_batches_is_unknown():
     assert np.isnan(costs.memory_per_world(EngineEntry("exact", Exact()), SPIN, 1e-3, 1024))
+
+
+def test_empty_name_of_a_metric_is_refused_before_anything_runs():
+    with pytest.raises(DropspinError, match="spin-principal's metric '' is unknown"):
+        tradeoff("spin-principal", "no_such_module:Engine", "")
+
+
+def test_front_that_the_rounds_do_not_decide_is_undecided():
+    """A configuration that is ten times as slow in four of nine rounds is on it by the least and the median, and not by the quartile."""
+    steady, disturbed = np.full(9, 2.0), np.array([1.0] * 5 + [10.0] * 4)
+    found = found_with([CostPoint("steady", 0.1, 1e-3, steady), CostPoint("disturbed", 0.1, 1e-3, disturbed)])
+    assert [point.engine for point in found.undecided] == ["disturbed", "steady"]
+    assert found_with([CostPoint("steady", 0.1, 1e-3, steady), CostPoint("cheap", 0.1, 1e-3, 0.5 * steady)]).undecided == []
+    assert (spread(steady), spread(np.array([1.0, 1.0, 1.0, 3.0])), spread(np.array([1.0, 3.0, 3.0]))) == (1.0, 1.0, 3.0)
+
+
+class Disturbed(Exact):
+    """An engine on a machine whose other load makes two of three calls ten times as slow, by a clock of its own."""
+
+    name = "disturbed"
+
+    def prepare(self, scene, dt):
+        return DisturbedSimulation(scene, dt)
+
+
+class DisturbedSimulation(ExactSimulation):
+    def advance(self, steps):
+        super().advance(steps)
+        CLOCK["calls"] += 1
+        CLOCK["now"] += STEP * steps * (1.0 if CLOCK["calls"] % 3 == 0 else 10.0)
+
+
+CLOCK = {"now": 0.0, "calls": 0}
+
+
+def test_cost_of_a_round_is_that_of_the_least_disturbed_timing(monkeypatch):
+    """By a clock that only the engine advances; the call, whose time is subtracted, is disturbed too."""
+    monkeypatch.setattr("comparisons.running.recording.time.perf_counter", lambda: CLOCK["now"])
+    assert costs.cost(EngineEntry("disturbed", Disturbed()), SPIN, 0.01) == pytest.approx(STEP / 0.01, rel=1e-9)
+
+
+def test_load_counts_other_threads_per_processor(monkeypatch, tmp_path):
+    (tmp_path / "loadavg").write_text("0.20 0.18 0.12 7/80 11206\n")
+    monkeypatch.setattr(costs, "LOAD", tmp_path / "loadavg")
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    assert costs.load() == 3.0
+    monkeypatch.setattr(costs, "LOAD", tmp_path / "absent")
+    assert np.isnan(costs.load())

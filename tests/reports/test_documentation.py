@@ -157,6 +157,7 @@ def quoted_constants():
     runs = [
         f"the time step `--dt` ({1e3 * limits.DT:g} ms)",
         f"`--within` ({limits.WITHIN:g})",
+        f"more than {runner.MOST_STEPS_PER_START:,} time steps",
         f"more than {runner.MOST_ROWS:,} time steps",
     ]
     return {

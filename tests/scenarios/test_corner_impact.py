@@ -150,7 +150,7 @@ def test_solution_ends_where_a_disturbance_has_grown_too_much():
     scene = load("drop-box-corner").model_copy(update={"duration": 5.0})
     truth = truth_for(scene)
     assert truth.horizon < 5.0
-    assert 1 < len(truth.events) <= 10
+    assert 1 < len(truth.events) <= 100
     heights = lowest_height(scene, truth(np.linspace(0, truth.horizon, 3000)))
     assert heights.min() >= -1e-12
     assert heights[-1] == pytest.approx(0.0, abs=1e-12)
@@ -162,10 +162,8 @@ def test_solution_ends_where_a_disturbance_has_grown_too_much():
 
 
 def test_corner_impact_is_limited_to_its_range_of_validity():
-    """No closed form for a Coulomb floor, an edge whose ends move differently, or damping; a flight that ends in the air has one."""
+    """No closed form for an edge whose ends move differently, or damping; a flight that ends in the air has one."""
     content = dropped_from_rest("none").model_dump(exclude_none=True)
-    coulomb = content | {"floor": {"restitution": 0.5, "friction": 0.3}}
-    assert truth_for(load(coulomb)) is None
     spinning_edge = content | {"start": {"position": [0, 1.5, 0], "orientation": [0.3, 0, 0, 1], "velocity": [0, 0, 1]}}
     assert truth_for(load(spinning_edge)).name == "edge-impact"
     spinning_edge["start"] |= {"velocity": [0, 0, 0], "angular_velocity": [0, 0, 0.1]}

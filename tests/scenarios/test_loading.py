@@ -1,5 +1,6 @@
 """Loading scenes; the message for an invalid scene is one line that says where, what was given and what is allowed."""
 
+import fnmatch
 import math
 import re
 from pathlib import Path
@@ -30,6 +31,50 @@ def test_malformed_file_is_rejected_with_its_message(path):
     assert "\n" not in message
     for part in expected:
         assert part in message
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ({"mas": 2.0}, "scene['body']['mas']: unknown key. Allowed: mass, shape, radius, inertia. Did you mean 'mass'?"),
+        ({"mas": 2.0, "raduis": 0.1}, "Did you mean 'mass'? (and 1 more problem)"),
+        ({"radius": -1.0, "mas": 2.0}, "Did you mean 'mass'? (and 1 more problem)"),
+        ({"radius": 0.1, "mass": 1.0, "inertai": 1.0}, "Did you mean 'inertia'?"),
+    ],
+)
+def test_misspelt_key_is_named_first_and_is_one_problem_with_the_key_that_is_meant(body, message):
+    with pytest.raises(SceneError) as caught:
+        load({"duration": 1.0, "body": {"shape": "sphere", **({} if "raduis" in body else {"radius": 0.1}), **body}})
+    assert str(caught.value).endswith(message)
+    assert "unknown key" in str(caught.value)
+
+
+def test_misspelt_table_is_named_first(tmp_path):
+    (tmp_path / "scene.toml").write_text('duration = 1.0\n[boddy]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
+    with pytest.raises(SceneError, match=r"scene\.toml: boddy: unknown key\. .* Did you mean 'body'\?$"):
+        load(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("model.xml", b'<mujoco model="x"><worldbody/></mujoco>', "is an MJCF model in XML; a scene is a TOML file in UTF-8."),
+        (
+            "model.urdf",
+            b'<?xml version="1.0"?>\n<!-- a > b -->\n<robot name="x"/>',
+            "is a URDF model in XML; a scene is a TOML file in UTF-8.",
+        ),
+        ("page.toml", b"<!DOCTYPE html><html></html>", "is a file in XML; a scene is a TOML file in UTF-8."),
+        ("scene.json", b'{"duration": 1.0}', "is a file in JSON; a scene is a TOML file in UTF-8."),
+        ("scene.yaml", b"duration: 1.0\nbody:\n", "not TOML: *(at line 1, column 9); a scene is a TOML file in UTF-8."),
+        ("program", b"\x7fELF\x02\x00\xf8", "is a binary file, which is not UTF-8 text; a scene is a TOML file in UTF-8."),
+    ],
+)
+def test_file_of_another_format_is_named(name, content, message, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(SceneError) as caught:
+        load(tmp_path / name)
+    assert fnmatch.fnmatchcase(str(caught.value), f"*{name}: {message}")
 
 
 def test_unreadable_files_are_rejected(tmp_path):

@@ -111,7 +111,12 @@ def test_landings_match_taylor_series(corners, masses, speed, slope, heading, co
 def test_landing_keeps_mcgeers_ratio(n, moment):
     """(I + M R² cos(2π/n)) / (I + M R²), with I about the axis."""
     points, square = [[*corner, z] for corner in regular(n) for z in (-0.1, 0.1)], 0.2**2
-    body = {"shape": "vertices", "points": points, "mass": 2.0, "inertia": [0.05, 0.05, moment * 2.0 * square]}
+    body = {
+        "shape": "vertices",
+        "points": points,
+        "mass": 2.0,
+        "inertia": [moment * square + 0.01, moment * square + 0.01, moment * 2.0 * square],
+    }
     impact = truth_for(prism(regular(n), 2.0, 0.1, body=body)).events[0]
     assert impact.after[12] / impact.before[12] == pytest.approx((moment + math.cos(2 * math.pi / n)) / (moment + 1.0), rel=1e-13)
 
@@ -200,7 +205,7 @@ def test_wheel_that_starts_too_fast_would_lift_off():
 def test_triangle_that_loses_all_its_speed_stops():
     """(k + cos 120°)/(1 + k) <= 0 for k <= 1/2: it lies after the first landing."""
     points = [[*corner, z] for corner in regular(3) for z in (-0.1, 0.1)]
-    body = {"shape": "vertices", "points": points, "mass": 1.0, "inertia": [0.02, 0.02, 0.012]}
+    body = {"shape": "vertices", "points": points, "mass": 1.0, "inertia": [0.012, 0.012, 0.012]}
     truth = truth_for(prism(regular(3), 0.5, body=body))
     assert len(truth.events) == 1
     assert not truth([2.0]).velocity.any()
@@ -210,7 +215,7 @@ def test_solution_ends_where_the_body_stops_on_a_face_that_does_not_carry_it():
     """A plank that rises on its lower edge and drops back on a slope of 70°, with k = 1/2; its face is stable up to 68°."""
     plank = [[0.5, -0.2], [0.5, 0.2], [-0.5, 0.2], [-0.5, -0.2]]
     points = [[*corner, z] for corner in plank for z in (-0.1, 0.1)]
-    body = {"shape": "vertices", "points": points, "mass": 1.0, "inertia": [0.1, 0.1, 0.5 * 0.29]}
+    body = {"shape": "vertices", "points": points, "mass": 1.0, "inertia": [0.03, 0.125, 0.5 * 0.29]}
     truth = truth_for(prism(plank, -1.0, math.radians(70.0), lean=0.05, body=body))
     assert len(truth.events) == 1
     assert not truth.events[0].after[SPIN].any()

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 from unittest import mock
 
 TERMINAL = {"FORCE_COLOR": "1", "TERM": "dumb"}
@@ -29,8 +30,11 @@ class Done:
     stderr: str
 
 
-def dropspin(*arguments: object, cwd: Path | str, **environment: str) -> Done:
-    """Run a command in this process, with `cwd` as the working directory; engines run in processes of their own, as always."""
+def dropspin(*arguments: object, cwd: Path | str, stdout: TextIO | None = None, stderr: TextIO | None = None, **environment: str) -> Done:
+    """Run a command in this process, with `cwd` as the working directory; engines run in processes of their own, as always.
+
+    Its output goes to `stdout` and `stderr`, or into the result.
+    """
     from reports.commands.main import main
 
     out, err = io.StringIO(), io.StringIO()
@@ -41,8 +45,8 @@ def dropspin(*arguments: object, cwd: Path | str, **environment: str) -> Done:
         stack.enter_context(mock.patch.object(sys, "argv", ["dropspin", *map(str, arguments)]))
         stack.enter_context(_unchanged_handlers())
         stack.enter_context(_without_modules_of(Path(cwd)))
-        stack.enter_context(contextlib.redirect_stdout(out))
-        stack.enter_context(contextlib.redirect_stderr(err))
+        stack.enter_context(contextlib.redirect_stdout(stdout or out))
+        stack.enter_context(contextlib.redirect_stderr(stderr or err))
         try:
             main()
         except SystemExit as end:

@@ -17,6 +17,9 @@ change x and q: an impulse j acts at this point, at r from the centre of mass, w
 SMOOTH = "j is vertical (no friction), and such that u_y becomes -e u_y (Newton's restitution); the horizontal parts of u may change too."
 STICKING = """j is such that u becomes [0, -e u_y, 0]: Newton's restitution of the normal velocity, and infinite friction, which
 ends the sliding of this point whatever the ratio of the tangential to the normal impulse."""
+CONE = """u_y becomes -e u_y (Newton's restitution), and j is in the cone of Coulomb friction: its horizontal part is at most f times its
+vertical part j_y. Either the horizontal part of u becomes 0, or it becomes s d with a unit vector d and s > 0, and then
+j = j_y ([0, 1, 0] - f d): friction acts against the slip that is left, which need not have the direction of the slip before."""
 EDGE = "The two ends of an edge strike at once, with equal velocities; r is the middle of the edge."
 PENDULUM = """The body stands on one edge, that of its lowest corners, which stays at rest on the floor. The body turns about it
 without friction or slip, as a rigid pendulum: (I_e + M R²) d²ψ/dt² = M |g| R sin ψ, with ψ the angle from the direction against
@@ -93,7 +96,7 @@ def laws(scene, truth):
         linear, angular = number(scene.damping.linear), number(scene.damping.angular)
         found.append(f"A medium resists in proportion to the velocities: dv/dt = g - {linear} v, dL/dt = -{angular} L.")
     if truth.name.endswith("-impact"):
-        found.append(SMOOTH if scene.floor.friction == "none" else STICKING)
+        found.append({"none": SMOOTH, "infinite": STICKING}.get(scene.floor.friction, CONE))
     if truth.name == "bounce-ladder":
         found.append(_bounces(scene, truth))
     return [" ".join(one.split()) for one in found]

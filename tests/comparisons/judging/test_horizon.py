@@ -13,7 +13,7 @@ from comparisons.measuring.metrics import METRICS
 from scenarios import truth_for
 
 TILTED = np.array([0.2, -0.3, 0.1, 0.9]) / np.linalg.norm([0.2, -0.3, 0.1, 0.9])
-LIMIT = r"compared up to t = 6\.8 s: the exact solution is valid until then"
+LIMIT = r"compared up to t = 6\.8 s, where the exact solution ends: rounding of the initial state determines when the body turns over"
 
 
 def spinning(**changes):

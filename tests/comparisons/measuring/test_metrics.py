@@ -278,3 +278,59 @@ def test_flights_end_where_the_body_is_desynchronised():
     assert 2 <= len(slow.flights) < 6
     frozen = Trajectory.from_states(motion.t, np.tile(scene.initial_state, (len(motion), 1)))
     assert len(Comparison.with_truth(scene, frozen, truth_for(scene)).flights) == 2
+
+
+def dropped(velocity=(0.0, 0.0, 0.0), restitution=0.0):
+    """A ball of 2 cm, 1 m above a floor of a restitution."""
+    return scenarios.load(
+        {
+            "name": "dropped",
+            "duration": 1.5,
+            "body": {"shape": "sphere", "radius": 0.02, "mass": 0.1},
+            "start": {"position": [0.0, 1.02, 0.0], "velocity": list(velocity)},
+            "gravity": {"acceleration": [0.0, -9.81, 0.0]},
+            "floor": {"restitution": restitution, "friction": "none"},
+        }
+    )
+
+
+def rebounding(scene, dt, restitution, waits=0.0, stops=0.0):
+    """Exact flights; the first rebound is `waits` seconds late, and the ball rests from an impact slower than `stops` on."""
+    t, g = dt * np.arange(1 + scene.steps(dt)), 9.81
+    states = np.tile(scene.initial_state, (len(t), 1))
+    start, height, velocity = 0.0, scene.clearance, scene.start.velocity[1]
+    while velocity + height > 0.0 and start < t[-1]:
+        speed = np.sqrt(velocity**2 + 2.0 * g * height)
+        since = np.maximum(t - start, 0.0)
+        aloft = (t >= start) & (since <= (velocity + speed) / g)
+        states[:, 1] = np.where(aloft, 0.02 + height + velocity * since - 0.5 * g * since**2, np.where(t >= start, 0.02, states[:, 1]))
+        states[:, 8] = np.where(aloft, velocity - g * since, np.where(t >= start, 0.0, states[:, 8]))
+        start, velocity, height, waits = start + (velocity + speed) / g + waits, restitution * speed if speed > stops else 0.0, 0.0, 0.0
+    states[:, 0] = scene.start.velocity[0] * t
+    return Trajectory.from_states(t, states)
+
+
+@pytest.mark.parametrize("dt", [5e-3, 1e-3])
+@pytest.mark.parametrize("kind", [{}, {"waits": 0.3}, {"stops": 0.2}, {"stops": 2.0}])
+@pytest.mark.parametrize("restitution", [0.3, 0.5, 0.9])
+@pytest.mark.parametrize("scene", [dropped(), dropped((2.0, 0.0, 0.0)), dropped((0.0, 1.0, 0.0)), dropped(restitution=0.05)])
+def test_rebound_of_a_body_that_should_stay_down_is_measured(scene, restitution, kind, dt):
+    """e² of the height from which it falls, above what the exact body has, for a rebound at once, after 0.3 s or that ends in rest."""
+    up = scene.start.velocity[1]
+    fallen = 1.0 + up**2 / (2.0 * 9.81)
+    found = measure(scene, rebounding(scene, dt, restitution, **kind))
+    speed = np.sqrt(2.0 * 9.81 * fallen)
+    assert found["bounce_height_error"] == pytest.approx((restitution**2 - scene.floor.restitution**2) * fallen, abs=2.0 * speed * dt)
+
+
+@pytest.mark.parametrize("dt", [5e-3, 1e-3])
+@pytest.mark.parametrize("scene", [dropped(), dropped((2.0, 0.0, 0.0)), dropped(restitution=0.05)])
+def test_body_that_stays_down_has_no_bounce_height_error(scene, dt):
+    """Neither has the exact motion; one that lies deeper has this depth."""
+    exact = truth_for(scene)(dt * np.arange(1 + scene.steps(dt)))
+    assert abs(measure(scene, exact)["bounce_height_error"]) < 2.5e-3 * bool(scene.floor.restitution) + 1e-12
+    deeper = exact.position - 1e-3 * (exact.t > truth_for(scene).events[0].time)[:, None] * np.array([0.0, 1.0, 0.0])
+    sunk = Trajectory(exact.t, deeper, exact.orientation, exact.velocity, exact.angular_velocity)
+    assert measure(scene, sunk)["bounce_height_error"] == pytest.approx(-1e-3, abs=1e-12)
+    shorter = Comparison(scene, sunk, exact[:-2], tuple(event.time for event in truth_for(scene).events))  # as of a later start phase
+    assert METRICS["bounce_height_error"].average([shorter]).value == pytest.approx(-1e-3, abs=1e-12)

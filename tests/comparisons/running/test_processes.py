@@ -1,5 +1,6 @@
 """Engines that break cost their own rows and leave no process behind."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -8,11 +9,13 @@ import textwrap
 import threading
 import time
 from pathlib import Path
+from unittest import mock
 
 import psutil
 import pytest
 from support import breaking
 from support import engines as made
+from support.cli import dropspin
 
 import dropspin as ds
 from comparisons.running.entries import engine_entry
@@ -66,6 +69,32 @@ def test_sleeping_engine_is_ended_by_the_wall_clock():
     found = ds.run([BALL], [breaking.breaking(breaking.sleep)], [4e-3], resources=ResourceLimits(processor_time=0.1)).table
     [row] = found.to_dict("records")
     assert (row["verdict"], row["reason"]) == ("timed_out", "not done after 1 s of wall time")
+
+
+@pytest.mark.parametrize("where", ["comparisons.running.processes.ProcessPool", "comparisons.running.processes.ProcessPool.schedule"])
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EAGAIN])
+def test_system_that_starts_no_process_is_not_blamed_on_the_output_folder(where, code, tmp_path, monkeypatch):
+    """Such as shared memory that is full or read-only, and a limit of processes."""
+    monkeypatch.setattr(where, mock.Mock(side_effect=OSError(code, os.strerror(code))))
+    done = dropspin("run", "drop-ball", "-e", "document", "--dt", "0.01", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith(
+        f"dropspin: the system cannot start a process for document: {os.strerror(code)}; shared "
+    )
+    assert not list(tmp_path.iterdir())
+
+
+def _work_for_two_seconds(entry):
+    time.sleep(2.0)
+    return "done"
+
+
+def test_wall_clock_that_is_set_times_no_engine_out(monkeypatch):
+    """By two hours, as by a time service or after a standby, while an engine works that may use 1000 s."""
+    real, start = time.time, time.monotonic()
+    monkeypatch.setattr(time, "time", lambda: real() + (7200.0 if time.monotonic() > start + 0.7 else 0.0))
+    with EngineProcesses(ResourceLimits(processor_time=100.0)) as processes:
+        assert processes.call(engine_entry("mujoco"), _work_for_two_seconds) == "done"
 
 
 def test_output_of_an_engine_is_dropped(capfd):

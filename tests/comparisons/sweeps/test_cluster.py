@@ -3,11 +3,15 @@
 import multiprocessing
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest import mock
 
 import pandas as pd
 import pytest
@@ -104,6 +108,39 @@ def test_missing_scheduler_and_missing_dask_are_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(connection, "find_spec", lambda name: None)
     with pytest.raises(EngineMissing, match=r"pip install 'dropspin\[cluster\]'"):
         run_sweep(load_sweep(SPEC), str(tmp_path / "other"), scheduler="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("answer", [None, b"HTTP/1.0 400 Bad Request\r\n\r\n"], ids=["silent", "HTTP"])
+def test_address_at_which_something_else_listens_is_refused_in_one_line(answer, tmp_path, monkeypatch):
+    monkeypatch.setattr(connection, "CONNECT_TIMEOUT", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve():
+            with suppress(OSError), server.accept()[0] as client:
+                client.recv(16)
+                client.sendall(answer)
+
+        if answer:
+            threading.Thread(target=serve, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(DropspinError) as caught:
+            run_sweep(load_sweep(SPEC), str(tmp_path / "out"), scheduler=address)
+    assert str(caught.value) == f"--scheduler {address}: what listens there does not answer as a scheduler; start one with: dask scheduler."
+    assert not (tmp_path / "out").exists()
+
+
+def test_sweep_that_was_refused_before_its_first_job_can_be_given_again(tmp_path, monkeypatch):
+    """With another spec too, and without --resume: the folder holds no row."""
+    monkeypatch.setattr("comparisons.sweeps.running.connected", lambda scheduler: nullcontext())
+    refuse = mock.Mock(side_effect=DropspinError("a worker has mujoco 3.1, this machine has 4.0; install the same on both."))
+    monkeypatch.setattr("comparisons.sweeps.running.run_on_cluster", refuse)
+    for spec in (SPEC, SPEC | {"dts": [8e-3]}):
+        with pytest.raises(DropspinError, match="install the same on both"):
+            run_sweep(load_sweep(spec), str(tmp_path / "out"), scheduler="tcp://host:8786")
+    run_sweep(load_sweep(SPEC | {"engines": ["document"]}), str(tmp_path / "out"))
+    assert len(table(tmp_path / "out")) == 12
+    with pytest.raises(DropspinError, match="holds 12 of 12 jobs of this sweep"):
+        run_sweep(load_sweep(SPEC | {"engines": ["document"]}), str(tmp_path / "out"))
 
 
 def test_worker_with_other_versions_refuses_its_part(tmp_path):

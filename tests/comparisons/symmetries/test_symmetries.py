@@ -9,7 +9,8 @@ from support import engines as made
 
 from comparisons.engines.registry import engine
 from comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES
-from comparisons.symmetries.study import SCENES, symmetries
+from comparisons.running.entries import engine_entry
+from comparisons.symmetries.study import SCENES, findings_of, symmetries
 from reference_impl.threads import usable_cores
 from scenarios import DropspinError, load, truth_for
 
@@ -140,6 +141,17 @@ def test_thresholds_with_a_unit_are_found(unit, distort):
     found = lost(made.engine_with("thresholds", distort), "fall-spin")
     assert unit in found
     assert not {"turned by 1 rad", "10 m away", "in grams", AGAIN} & found
+
+
+@pytest.mark.parametrize("height", [0.5, 0.501])
+def test_unit_in_the_depth_of_a_contact_is_found_also_if_the_body_starts_in_contact(height):
+    """MuJoCo's default contacts have lengths in m and times in s; whether a box touches at its start depends on rounding, but later not."""
+    box = {"shape": "box", "half_extents": [0.5, 0.5, 0.5], "mass": 1e3}
+    tables = {"gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": {"restitution": 0.0, "friction": 1.0}}
+    scene = load({"duration": 1.0, "body": box, "start": {"position": [0.0, height, 0.0]}, **tables})
+    names = ["in millimetres", "in milliseconds", "in grams", "turned by 90°"]
+    _, found = findings_of(engine_entry("mujoco[profile=default]"), scene, 2e-3, names)
+    assert [one.status for one in found] == ["lost", "lost", "kept", "kept"]
 
 
 def test_threshold_of_mass_is_found():

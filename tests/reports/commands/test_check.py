@@ -55,6 +55,30 @@ def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, 
         assert "If the changes are intended" not in output
 
 
+def test_check_reads_by_default_the_baseline_that_accept_writes_by_default(repository, tmp_path):
+    """And the output says whether there was one."""
+    assert dropspin("check", "out/failing", cwd=repository).stdout == dropspin("check", "out/failing", *BASELINE, cwd=repository).stdout
+    with_baseline = dropspin("check", "out/good", cwd=repository).stdout
+    assert "Checked: the expectations of the scenes, and the accepted results in dropspin-baseline.toml." in with_baseline
+    without = dropspin("check", repository / "out/failing", "--summary", "summary.md", cwd=tmp_path)
+    assert "Checked: the expectations of the scenes only, without a baseline." in without.stdout
+    assert "without a baseline" in (tmp_path / "summary.md").read_text()
+    left_out = dropspin("check", "out/failing", "--no-baseline", cwd=repository)
+    assert (left_out.returncode, left_out.stdout) == (without.returncode, without.stdout)
+
+
+def test_run_that_the_default_baseline_does_not_cover_is_refused_with_the_remedy(repository, tmp_path):
+    for extra, reason in ((), "none of the "), (("--quick",), "a quick run has too few starts"):
+        dropspin("run", "fall-spin", "-e", "document", "--dt", "0.01", *extra, "-o", tmp_path / "run", cwd=repository)
+        done = dropspin("check", tmp_path / "run", cwd=repository)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"dropspin: dropspin-baseline.toml: {reason}")
+        assert "With --no-baseline, only the expectations of the scenes are checked." in done.stderr
+        assert dropspin("check", tmp_path / "run", "--no-baseline", cwd=repository).returncode == 0
+    both = dropspin("check", tmp_path / "run", *BASELINE, "--no-baseline", cwd=repository)
+    assert (both.returncode, "give only one of them" in both.stderr) == (2, True)
+
+
 def test_the_command_that_reproduces_a_failure_measures_the_same_value(repository, tmp_path):
     """It is one command and ends as the check did."""
     found = json.loads(dropspin("check", "out/failing", *BASELINE, "--json", cwd=repository).stdout)
@@ -107,6 +131,17 @@ def test_a_crash_cannot_be_accepted(repository, tmp_path):
     assert done.returncode == 2
     assert "there is nothing to accept, because no engine was measured; " in done.stderr
     assert not (tmp_path / "none.toml").exists()
+
+
+@pytest.mark.parametrize("fault", ["raise RuntimeError('no')", "import no_such_library"], ids=["broken", "missing"])
+def test_summary_counts_an_engine_that_could_not_be_used(fault, tmp_path):
+    (tmp_path / "my_engine.py").write_text(fault)
+    (tmp_path / "spin.toml").write_text('duration = 0.1\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
+    assert dropspin("run", "spin.toml", "-e", ENGINE, "-e", "document", "--dt", "0.01", "-o", "out", cwd=tmp_path).returncode == 3
+    assert dropspin("check", "out", "--summary", "summary.md", cwd=tmp_path).returncode == 3
+    rows = [line.split("|")[1:-1] for line in (tmp_path / "summary.md").read_text().splitlines() if line.startswith("| ")]
+    assert [cell.strip() for cell in rows[0]] == ["engine", "passed", "failed", "known", "limited", "broke down or missing"]
+    assert {row[0].strip().replace("\\", ""): int(row[-1]) for row in rows[1:]} == {ENGINE: 1, "document": 0}
 
 
 def test_an_engine_that_can_no_longer_be_imported_loses_its_accepted_results(repository, junit_schema, tmp_path):

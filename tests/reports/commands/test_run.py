@@ -103,9 +103,10 @@ def test_json_of_a_run_is_the_table_to_the_last_digit(tmp_path):
             assert row["value"] == float(kept["value"])
             assert (row["upper"] is None) == (kept["upper"] == "")
     assert any(0 < abs(row["value"]) < 1e-11 for row in rows)
-    timing, running, writing = done.stderr.splitlines()
+    timing, running, finished, writing = done.stderr.splitlines()
     assert (timing, writing) == ("timing the steps of each engine", "writing the report")
-    assert re.fullmatch(r"running spin-principal \(scene 1 of 1, \d+ s elapsed\)", running)
+    assert re.fullmatch(r"running spin-principal \(0 of 1 scene finished, \d+ s elapsed\)", running)
+    assert re.fullmatch(r"finished spin-principal \(1 of 1 scene, \d+ s elapsed\)", finished)
 
 
 def test_expectations_for_other_steps_are_not_called_missing(tmp_path):

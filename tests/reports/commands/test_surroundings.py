@@ -1,12 +1,18 @@
 """Files of the working directory, and packages that are installed and broken, do not disturb a command."""
 
 import json
+import resource
+import shlex
 import shutil
+import subprocess
 import sys
+from unittest import mock
 
 import pytest
 from support.adapters import DRIFTING
-from support.cli import dropspin, spawn
+from support.cli import DROPSPIN, assert_refused, dropspin, spawn
+
+from reports.views import listings
 
 STRAYS = ("bottleneck", "numexpr", "cloudpickle", "yaml", "colorama", "lxml", "click", "numpy", "matplotlib", "scenarios", "_pytest")
 BALL = """
@@ -136,3 +142,44 @@ def test_run_is_resumed_with_scenes_of_the_same_adapter_only(tmp_path):
     done = spawn(*command, "--resume", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "measured again, not resumed: since the interrupted run, the code of stopping changed" in done.stderr
+
+
+def test_backend_of_a_notebook_that_is_not_installed_does_not_prevent_plots(tmp_path):
+    (tmp_path / "ball.toml").write_text(BALL)
+    assert dropspin(*RUN, cwd=tmp_path).returncode == 0
+    done = spawn("report", "out", "--plots", "svg", cwd=tmp_path, MPLBACKEND="module://not_installed.backend_inline")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("threads", ["0", "-1", " 00 "])
+def test_number_of_threads_below_one_is_refused_in_one_line(threads, tmp_path):
+    assert_refused(
+        dropspin("list", cwd=tmp_path, NUMBA_NUM_THREADS=threads), f"NUMBA_NUM_THREADS: got {threads!r}; give a whole number above 0"
+    )
+
+
+def test_working_directory_that_was_removed_is_refused_in_one_line(tmp_path):
+    """In a process of its own: the command arranges Python's path before anything else."""
+    folder = tmp_path / "removed"
+    folder.mkdir()
+    command = f"rmdir ../removed; exec {shlex.quote(str(DROPSPIN))} list"
+    done = subprocess.run(["sh", "-c", command], cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "dropspin: the working directory does not exist any more; change to another one.\n"
+
+
+def test_limit_of_the_address_space_is_named_in_one_line(tmp_path, monkeypatch):
+    """One that is too small for the libraries, and a larger one, with which work fails in any way."""
+    for limit, words in (
+        (10**8, "limited to 0.093 GiB; raise the limit (ulimit -v); 1 GiB is the least"),
+        (2**31, "(RuntimeError: can't start)"),
+    ):
+        monkeypatch.setattr(resource, "getrlimit", lambda kind, limit=limit: (limit, limit))
+        monkeypatch.setattr(listings, "scene_rows", mock.Mock(side_effect=RuntimeError("can't start")))
+        done = dropspin("list", cwd=tmp_path)
+        assert_refused(done, words)
+
+
+def test_memory_that_is_short_without_a_limit_is_no_internal_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(listings, "scene_rows", mock.Mock(side_effect=MemoryError("Unable to allocate 3 TiB")))
+    assert_refused(dropspin("list", cwd=tmp_path), "not enough memory (MemoryError: Unable to allocate 3 TiB).")

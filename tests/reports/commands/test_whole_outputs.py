@@ -92,6 +92,26 @@ def full_disk(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
+def test_full_disk_says_that_what_was_measured_is_kept(outputs):
+    command = ("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "new")
+    with full_disk(20_000):
+        done = dropspin(*command, cwd=outputs)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].endswith("choose another folder. 1 of 1 scene is kept; --resume continues the run.")
+    resumed = dropspin(*command, "--resume", cwd=outputs)
+    assert resumed.returncode == 0
+    assert "running" not in resumed.stderr
+
+
+def test_full_disk_says_that_a_sweep_can_be_resumed(outputs):
+    (outputs / "spec.toml").write_text('scenes = ["ball.toml"]\nengines = ["document"]\ndts = [0.01]\n')
+    with full_disk(5_000):
+        done = dropspin("sweep", "spec.toml", "-o", "new", cwd=outputs)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].endswith("the parts written so far are complete: --resume continues the sweep.")
+    assert dropspin("sweep", "spec.toml", "-o", "new", "--resume", cwd=outputs).returncode == 0
+
+
 @pytest.mark.parametrize(("command", "kind"), LONG, ids=[command[0] for command, _ in LONG])
 def test_interrupted_commands_leave_the_old_output(command, kind, outputs):
     before = contents(outputs)

@@ -89,6 +89,29 @@ def test_slower_engine_that_is_faster_in_some_rounds_is_said_to_be(found):
     assert sentence.endswith("; other at 10 ms takes 2.0 times that, but less in a quarter of the rounds.")
 
 
+def test_timings_that_decide_no_front_and_a_busy_machine_are_said(found):
+    """And in the table: a front is undecided, not guessed, and each cost has its spread."""
+    rounds = {"accurate": np.full(9, 2.0), "other": np.array([1.0] * 4 + [3.0] * 5)}
+    ladders = tuple(Ladder(engine, ((0.01, 1e-3),), "budget", SPENT) for engine in rounds)
+    points = tuple(CostPoint(engine, 0.01, 1e-3, cost, {256: 1e-3}, {256: 2.5}) for engine, cost in rounds.items())
+    disturbed = TradeOff(found.scene, found.metric, points, ladders, load=2.5)
+    listed = tradeoff.sentences(disturbed, [1e-2])
+    assert listed[1:5] == [
+        "2 configurations are on the Pareto front in some of the rounds only, so that the timings do not decide it: "
+        "accurate at 10 ms, other at 10 ms.",
+        "Timings vary: the median of the rounds is typically 2 times the least (column cost_spread).",
+        "Timings of batches vary by a factor of up to 2.5, that of accurate at 10 ms in a batch of 256.",
+        "The machine was busy while costs were measured: 2.5 other threads per processor were running, on average; "
+        "measure again on an idle machine.",
+    ]
+    assert {row["on the Pareto front"] for row in tradeoff.pareto_front_rows(disturbed)} == {"undecided"}
+    rows = {row["engine"]: row for row in tradeoff.rows(disturbed)}
+    assert [rows["other"][name] for name in ("on_pareto_front", "cost", "cost_best", "cost_spread", "spread_per_world_256")] == [
+        *(None, 3.0, 1.0, 3.0, 2.5)
+    ]
+    assert not any("vary" in sentence or "busy" in sentence for sentence in tradeoff.sentences(found, [1e-2]))
+
+
 def test_every_engine_has_a_row_with_its_place(found):
     """The Pareto front, the most accurate step of each dominated engine, and those left out."""
     rows = tradeoff.pareto_front_rows(found)

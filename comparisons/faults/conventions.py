@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.fault_model import (
+from comparisons.faults.fault_model import (
     Change,
     FaultModel,
     Reported,

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from comparisons.conformance.fault_model import Simulated, axis_names, changed_table, faults_of, moments_of_inertia
-from comparisons.conformance.flight import ORDERS
+from comparisons.faults.fault_model import Simulated, axis_names, changed_table, faults_of, moments_of_inertia
+from comparisons.faults.flight import ORDERS
 from scenarios import Scenario
 from scenarios.body import Box
 
@@ -31,12 +31,13 @@ def _permuted_extents(order: tuple[int, ...]) -> Simulated:
     return permuted
 
 
-def _scaled_size(by: float) -> Simulated:
+def _scaled(size: str, by: float) -> Simulated:
+    """The radius of spheres or the half extents of boxes times a factor, with the same moments of inertia."""
+
     def scaled(scene: Scenario) -> Scenario:
-        if scene.floor is None:
+        if scene.floor is None or size not in type(scene.body).model_fields:
             return scene
-        sizes = {"radius", "half_extents"} & set(type(scene.body).model_fields)
-        larger = {size: lambda given: np.multiply(given, by).tolist() for size in sizes}
+        larger = {size: lambda given: np.multiply(given, by).tolist()}
         return changed_table("body", inertia=moments_of_inertia(scene), **larger)(scene)
 
     return scaled
@@ -67,7 +68,9 @@ IMPACT = (
     *faults_of(
         "size",
         *((f"the box's extents appear to be permuted to ({axis_names(order)})", _permuted_extents(order)) for order in ORDERS),
-        ("the body is half as large as it should be: is a radius read as a diameter, or half extents as extents?", _scaled_size(0.5)),
-        ("the body is twice as large as it should be: is a diameter read as a radius, or extents as half extents?", _scaled_size(2.0)),
+        ("the sphere is half as large as it should be: is a radius read as a diameter?", _scaled("radius", 0.5)),
+        ("the sphere is twice as large as it should be: is a diameter read as a radius?", _scaled("radius", 2.0)),
+        ("the box is half as large as it should be: are half extents read as extents?", _scaled("half_extents", 0.5)),
+        ("the box is twice as large as it should be: are extents read as half extents?", _scaled("half_extents", 2.0)),
     ),
 )

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.probes import Probe
 from scenarios import DropspinError, Scenario, truth_for
 from scenarios.state import ORIENTATION
 
@@ -19,7 +18,7 @@ Reported = Callable[[Array], Array]
 Change = Callable[[Array, Array], Array]
 """From a part of states and their orientations to the changed part."""
 Exact = dict[Scenario, Array | None]
-"""The exact states of scenes at a probe's times, shape (2, 13); None for a scene without an exact solution at all of them."""
+"""The exact states of scenes at some times, shape (n, 13); None for a scene without an exact solution at all of them."""
 
 
 def unchanged_scene(scene: Scenario) -> Scenario:
@@ -50,18 +49,18 @@ class FaultModel:
     is_peculiarity: bool = False
     about: str = ""
 
-    def motion(self, probe: Probe, known: Exact) -> Array | None:
-        """The states of a probe with this fault, shape (2, 13); None without an exact solution.
+    def motion(self, scene: Scenario, times: Array, known: Exact) -> Array | None:
+        """The states of a scene with this fault at some times [s], shape (n, 13); None without an exact solution.
 
         Many faults simulate the same scene: `known` holds the exact states found before, and receives those found now.
         """
         try:
-            scene = self.simulated(probe.scene)
-            if scene not in known:
-                known[scene] = _exact_states(scene, probe.times)
+            simulated = self.simulated(scene)
+            if simulated not in known:
+                known[simulated] = _exact_states(simulated, times)
         except (DropspinError, ValueError):  # the body is impossible, or starts below the floor
             return None
-        states = known[scene]
+        states = known[simulated]
         return None if states is None else self.reported(states)
 
     def start(self, scene: Scenario) -> Array:

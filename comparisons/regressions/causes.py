@@ -1,0 +1,204 @@
+"""The search for a single cause with which the asymptotic errors of an engine are consistent: a wrong parameter, or a known fault.
+
+The errors that a cause has are the differences between the exact solutions of the scene with and without it. A cause must have the errors
+of the scenes in which asymptotic errors fail, and none in the scenes in which they pass. Where an exact solution with the cause is not
+known to the end, or leaves a metric undefined, neither holds.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from comparisons.faults.conventions import CONVENTIONS
+from comparisons.faults.fault_model import FaultModel
+from comparisons.faults.flight import FLIGHT
+from comparisons.faults.impact import IMPACT
+from comparisons.judging.convergence import JUMPING
+from comparisons.measuring.comparison import Comparison, exactly
+from comparisons.measuring.metrics import METRICS, metrics_for
+from comparisons.measuring.tolerances import negligible
+from comparisons.regressions.parameters import PARAMETERS, Parameter
+from comparisons.results.results import Results
+from scenarios import DropspinError, Scenario, Trajectory, truth_for
+
+Array = NDArray[np.float64]
+Wrong = Callable[[Scenario, Array], Trajectory | None]
+"""From a scene and times [s] to the exact motion with a cause; None without an exact solution, or if the cause changes nothing."""
+FIRST_SIZE = 1e-3
+LARGEST_SIZE = 0.3
+MOST_STEPS = 20_000
+"""Largest number of time steps of the sampled exact solutions."""
+NEAR = 1.3
+"""Largest ratio of two sizes of an error that count as near each other before the first iteration."""
+ITERATIONS = 3
+"""Number of iterations for the size of an error; each reduces its relative error by a factor of about the size."""
+
+
+class WrongParameter(NamedTuple):
+    """A parameter whose wrong value explains the errors.
+
+    Attributes:
+        parameter: The parameter.
+        size: Its error, in the unit of the parameter.
+        signed: Whether the errors determine if it is too high or too low.
+    """
+
+    parameter: Parameter
+    size: float
+    signed: bool
+
+
+class Causes(NamedTuple):
+    """The causes of which each alone explains the errors: wrong parameters, and known faults."""
+
+    parameters: list[WrongParameter]
+    faults: list[FaultModel]
+
+
+def causes(results: Results, engine: str) -> Causes:
+    """The causes each of which alone explains asymptotic errors of an engine and is excluded by none.
+
+    Each error must lie within its 95 % interval, widened by the error of sampling the exact solutions at the run's finest time step.
+    """
+    table = results.table
+    mine = table[(table["engine"] == engine) & (table["kind"] == "asymptotic_error") & ~table["metric"].isin(JUMPING)]
+    judged = mine[mine["verdict"].isin(["failed", "passed"]) & (mine["cause"] != "unresolved") & mine["lower"].notna()]
+    failed = judged[judged["verdict"] == "failed"]
+    if failed.empty:
+        return Causes([], [])
+    dt = min(map(float, results.provenance["asked"]["dts"]))
+    scenes = [(results.scenes[str(name)], rows) for name, rows in judged.groupby("scene")]
+    scenes.sort(key=lambda scene: not (scene[1]["verdict"] == "failed").any())  # those that fail exclude most causes
+    widths = (failed["upper"] - failed["lower"]) / failed["value"].abs()
+    narrowest = failed["scene"].iloc[int(widths.argmin())]
+    leading = failed[failed["scene"] == narrowest]
+
+    def holds(wrong: Wrong) -> bool:
+        count = 0
+        for scene, rows in scenes:
+            explained = _explained(scene, wrong, rows, dt)
+            if explained is None:
+                return False
+            count += explained
+        return count > 0
+
+    parameters = []
+    for parameter in PARAMETERS:
+        sizes = [size for size in _sizes(results.scenes[str(narrowest)], parameter, leading, dt) if holds(_with(parameter, size))]
+        parameters += [WrongParameter(parameter, sizes[0], len(sizes) == 1)] if sizes else []
+    faults = [fault for fault in (*CONVENTIONS, *FLIGHT, *IMPACT) if fault.about != "start" and holds(_with_fault(fault))]
+    return Causes(parameters, faults)
+
+
+def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: float) -> Iterator[float]:
+    """The errors of a parameter, positive and negative, that explain the errors of a scene best.
+
+    Each error has a size that explains it. Steps of a metric, such as a contact that is detected or not, may give another one than the
+    others: the size is that of the most precise error among those near the median.
+    """
+    rows = failed.set_index("metric")
+    uncertainty = (rows["upper"] - rows["lower"] + [negligible(scene, unit) for unit in rows["unit"]]) / rows["value"].abs()
+    for sign in (1.0, -1.0):
+        size, lead = sign * FIRST_SIZE, None
+        for _ in range(ITERATIONS):
+            caused = pd.Series(_caused(scene, _with(parameter, size), dt).errors, dtype=float).reindex(rows.index)
+            factors = (rows["value"] / caused).abs().replace([0.0, np.inf], np.nan).dropna()
+            if lead is None and len(factors):
+                near = factors[(factors / factors.median()).between(1.0 / NEAR, NEAR)]
+                lead = uncertainty[near.index].idxmin() if len(near) else None
+            size *= factors.get(lead, np.nan)
+            if not abs(size) <= LARGEST_SIZE:
+                break
+        else:
+            yield size
+
+
+def _explained(scene: Scenario, wrong: Wrong, rows: pd.DataFrame, dt: float) -> int | None:
+    """How many of the failed asymptotic errors of a scene a cause has; None if it has another error than one of those that it defines."""
+    coarse, fine = (_caused(scene, wrong, step) for step in (dt, 0.5 * dt))
+    count = 0
+    for row in rows.to_dict("records"):
+        metric = row["metric"]
+        caused = fine.errors.get(metric, np.nan)
+        if np.isnan(caused):
+            continue
+        sampling = abs(caused - coarse.errors.get(metric, np.nan)) + abs(fine.sampled[metric]) + negligible(scene, row["unit"])
+        lower = row["lower"] - sampling
+        if not fine.is_whole:  # the largest error so far is a lower bound of the whole one
+            lower, caused = (-np.inf, -np.inf if METRICS[metric].signed else caused)
+        if not lower <= caused <= row["upper"] + sampling:
+            return None
+        count += fine.is_whole and row["verdict"] == "failed"
+    return count
+
+
+def _with(parameter: Parameter, size: float) -> Wrong:
+    return lambda scene, times: _simulated(parameter.change(scene, size), times)
+
+
+def _with_fault(fault: FaultModel) -> Wrong:
+    def wrong(scene: Scenario, times: Array) -> Trajectory | None:
+        motion = _simulated(fault.simulated(scene), times)
+        return motion and Trajectory.from_states(motion.t, fault.reported(motion.states))
+
+    return wrong
+
+
+def _simulated(changed: Scenario | None, times: Array) -> Trajectory | None:
+    return None if changed is None else _exact(changed, float(times[1]), len(times))
+
+
+@lru_cache(maxsize=32)  # many faults of what is reported simulate the same scene
+def _exact(scene: Scenario, step: float, count: int) -> Trajectory | None:
+    truth = truth_for(scene)
+    return None if truth is None else exactly(truth, step * np.arange(count, dtype=float))
+
+
+class _Caused(NamedTuple):
+    """The errors that a cause has, by metric, those of sampling the exact solution, and whether the exact solution with it is as long."""
+
+    errors: dict[str, float]
+    sampled: dict[str, float]
+    is_whole: bool
+
+
+def _caused(scene: Scenario, wrong: Wrong, dt: float) -> _Caused:
+    """The errors that a cause has; none without an exact solution."""
+    reference = _sampled(scene, dt)
+    try:
+        motion = None if reference is None else wrong(scene, reference.times)
+    except (DropspinError, ValueError):  # the body is impossible
+        motion = None
+    if motion is None or reference is None:
+        return _Caused({}, {}, is_whole=False)
+    common = min(len(motion), len(reference.motion))
+    is_whole, exact = common == len(reference.motion), reference.motion[:common]
+    sampled = reference.errors if is_whole else _measured(scene, exact, exact)
+    errors = {name: value - sampled[name] for name, value in _measured(scene, motion[:common], exact).items()}
+    return _Caused(errors, sampled, is_whole)
+
+
+class _Sampled(NamedTuple):
+    """The exact solution of a scene at each time step, and the errors that its sampling has."""
+
+    times: Array
+    motion: Trajectory
+    errors: dict[str, float]
+
+
+@lru_cache(maxsize=256)  # of each scene it is needed for every cause
+def _sampled(scene: Scenario, dt: float) -> _Sampled | None:
+    step = max(dt, scene.duration / MOST_STEPS)
+    times = step * np.arange(1 + scene.steps(step), dtype=float)
+    motion = _simulated(scene, times)
+    return None if motion is None else _Sampled(times, motion, _measured(scene, motion, motion))
+
+
+def _measured(scene: Scenario, motion: Trajectory, exact: Trajectory) -> dict[str, float]:
+    truth = truth_for(scene)
+    case = Comparison.with_truth(scene, motion, truth, exact)
+    return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}

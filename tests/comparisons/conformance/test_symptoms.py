@@ -1,0 +1,96 @@
+"""What `conform` says of motions that no known fault explains: what differs and by how much, and nothing that is right."""
+
+import numpy as np
+import pytest
+from support import engines as made
+from support.bouncing import Bouncing, coulomb, pyramid, with_restitution
+
+from comparisons.conformance.checks import run_check
+from comparisons.conformance.probes import PROBES
+from comparisons.running.inputs import EngineEntry
+from scenarios import truth_for
+
+BALLS = tuple(probe.name for probe in PROBES if probe.name.endswith(" ball") or probe.name.endswith(" floor"))
+SQUARED = "restitution appears to be squared; an engine that multiplies the values of two bodies needs 1 for the floor"
+
+
+def failed(engine, *checks):
+    """The message of each check that fails."""
+    found = [run_check(EngineEntry(engine.label, engine), check) for check in checks or BALLS]
+    return {one.check: one.message for one in found if one.outcome == "failed"}
+
+
+def test_ball_by_the_law_of_the_exact_solution_passes():
+    """The planted laws below differ from this one alone."""
+    engine = Bouncing(title="exact ball")
+    assert failed(engine) == {}
+    assert not any(engine.declines(probe.scene) for probe in PROBES if probe.name in BALLS)
+
+
+@pytest.mark.parametrize(
+    ("law", "check", "message"),
+    [
+        (
+            pyramid,
+            "slippery floor",
+            "the impulse of friction over that of the normal force is 0.17 instead of 0.12 (41 % too high); "
+            "friction acts 14° from its exact direction; position is off by ",
+        ),
+        (
+            lambda *impact: coulomb(*impact, factor=0.9),
+            "slippery floor",
+            "the impulse of friction over that of the normal force is 0.108 instead of 0.12 (10 % too low); position is off by ",
+        ),
+        (with_restitution(lambda e, speed: min(1.0, 1.01 * e)), "bouncing ball", "restitution is 0.606 instead of 0.6 (1 % too high); pos"),
+        (with_restitution(lambda e, speed: e / (1.0 + 0.1 * speed)), "lively ball", "restitution is 0.83 instead of 1 (17 % too low); pos"),
+        (
+            with_restitution(lambda e, speed: e / (1.0 + 0.1 * speed)),
+            "dull ball",
+            "restitution is 0.249 instead of 0.3 (17 % too low); pos",
+        ),
+    ],
+    ids=["pyramid", "friction 0.9", "restitution 1.01", "restitution by speed, lively", "restitution by speed, dull"],
+)
+def test_symptom_states_what_is_wrong_and_by_how_much(law, check, message):
+    found = failed(Bouncing(title="planted", law=law), check)
+    assert found[check].startswith(message)
+
+
+def test_errors_are_stated_only_where_they_exceed_what_is_allowed():
+    found = failed(Bouncing(title="planted", law=with_restitution(lambda e, speed: min(1.0, 1.01 * e))), "bouncing ball")["bouncing ball"]
+    assert "position is off by 0.0025 m (allowed: 0.0008 m); velocity is off by 0.0123 m/s (allowed: 0.007 m/s)" in found
+    assert "attitude" not in found
+    assert "height" not in found
+
+
+def test_fault_that_another_probe_excludes_is_not_named():
+    """A dull ball that rebounds with e² has stopped at both times of comparison, as one that does not rebound has; the others rebound."""
+    found = failed(Bouncing(title="squared", law=with_restitution(lambda e, speed: e * e)))
+    assert set(found) == set(BALLS) - {"lively ball"}
+    assert set(found.values()) == {SQUARED}
+
+
+def test_ball_whose_rebounds_end_early_is_not_said_to_sleep():
+    [message] = failed(Bouncing(title="dead", law=with_restitution(lambda e, speed: e if speed > 1.0 else 0.0)), "dull ball").values()
+    assert "sleep" not in message
+    assert "restitution is 0" not in message
+
+
+def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
+    """A floor 5 mm too high."""
+    ball = next(probe for probe in PROBES if probe.name == "bouncing ball")
+
+    class High(made.Exact):
+        name = "high"
+
+        def prepare(self, scene, dt):
+            lower = scene.initial_state - 0.005 * np.eye(13)[1]
+            simulation = made.ExactSimulation(scene.starting_at(lower), dt, lambda row, time: row + 0.005 * np.eye(13)[1])
+            simulation._start = scene.initial_state
+            return simulation
+
+    [message] = failed(High(), "bouncing ball").values()
+    assert message.startswith("the first contact begins at a height of 0.105")
+    assert " instead of 0.1" in message
+    assert "restitution" not in message
+    assert truth_for(ball.scene).events[0].before[1] == pytest.approx(0.1)

@@ -1,0 +1,141 @@
+"""The single cause with which the asymptotic errors of an engine are consistent: a wrong parameter, a known fault, or none."""
+
+import numpy as np
+import pytest
+from support import engines as made
+from support.detection_power import FAULTS, faulty_engine
+from support.fault_suite import FAULTS as PLANTED
+from support.fault_suite import Made, with_body, with_gravity, with_restitution
+from support.releases import TODAY, WithoutGyroscopicTerm, relabelled
+
+from comparisons.regressions.baseline import Baseline, accept
+from comparisons.regressions.causes import causes
+from comparisons.regressions.checking import check
+from comparisons.regressions.parameters import PARAMETERS
+from comparisons.running.run import run
+from reports.markdown import check_markdown
+from reports.terminal.summary import print_failures
+from reports.views.failures import failures, grouped
+from scenarios import load
+from scenarios.rotations import about, rotate
+
+SLOWER = "Coulomb coefficient 1 % too high or gravity 1 % too high or direction of gravity wrong by 0.003 rad"
+"""Each slows a sliding box alike."""
+OF = {fault.title: fault for fault in FAULTS}
+TITLED = {fault.title: fault for fault in PLANTED}
+
+
+def lasting(name, seconds=2.0):
+    """A scene that ends after some seconds at the latest; the faults show well before."""
+    scene = load(name)
+    return scene.model_copy(update={"duration": min(scene.duration, seconds)})
+
+
+def consistent_with(engine, *scenes):
+    results = run([lasting(name) for name in scenes], engine)
+    [group] = grouped(results, failures(results))
+    return group.consistent_with
+
+
+@pytest.mark.parametrize(
+    ("title", "engine", "scenes", "size", "words"),
+    [
+        ("restitution", "exact", ["drop-ball", "drop-ball-lively"], 0.005, "restitution 0.5 % too high"),
+        ("restitution", "mujoco", ["drop-ball"], -0.003, "restitution 0.3 % too low"),
+        ("linear damping", "exact", ["fall-damped"], -0.01, "linear damping 1 % too low"),
+        ("moment of inertia about x", "exact", ["spin-asymmetric"], 0.01, "moment of inertia about x 1 % too high"),
+        ("Coulomb coefficient", "exact", ["slide-box"], 0.01, SLOWER),
+    ],
+)
+def test_planted_parameter_is_named(title, engine, scenes, size, words):
+    assert consistent_with(faulty_engine(engine, OF[title], size), *scenes) == f"Consistent with {words}."
+
+
+def tilted(angle):
+    turn = about(np.array([0.0, 0.0, 1.0]), np.array(angle))
+    return with_gravity(np.array([rotate(turn, axis) for axis in np.eye(3)]).T)
+
+
+@pytest.mark.parametrize(
+    ("change", "scenes", "words"),
+    [
+        (
+            with_gravity(9.81 / 9.8 * np.eye(3)),
+            ["drop-ball", "fall-spin"],
+            "gravity 0.1 % too high, or with this fault: gravity is 9.81 m/s² along -y for every scene",
+        ),
+        (with_gravity(0.99 * np.eye(3)), ["drop-ball", "slide-box", "drop-ball-backspin"], "gravity 1 % too low"),
+        (tilted(3e-4), ["drop-ball", "fall-spin", "slide-box"], "direction of gravity wrong by 0.0003 rad"),
+        (
+            with_body(mass=1.01),
+            ["drop-ball", "drop-ball-backspin"],
+            "mass 1 % too high or moments of inertia 0.99 % too low or moment of inertia about z 0.99 % too low",
+        ),
+        (
+            with_restitution(lambda e: e * e),
+            ["drop-ball", "drop-ball-lively"],
+            "this fault: restitution appears to be squared; an engine that multiplies the values of two bodies needs 1 for the floor",
+        ),
+        (
+            with_body(moments=lambda m: m[[1, 0, 2]]),
+            ["spin-asymmetric", "fall-spin"],
+            "this fault: the moments of inertia appear to be permuted to (y, x, z)",
+        ),
+    ],
+    ids=["gravity 9.81", "gravity 0.99", "tilt", "mass", "restitution squared", "inertia permuted"],
+)
+def test_planted_cause_is_named_where_metrics_change_in_steps_and_where_two_causes_are_alike(change, scenes, words):
+    """A ball that falls faster than the scene's appears to touch a floor all along, so that its contact gap is 1 m."""
+    assert consistent_with(Made(title="planted", change=change), *scenes) == f"Consistent with {words}."
+
+
+def test_missing_gyroscopic_term_is_named():
+    words = "this fault: angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball"
+    assert consistent_with(WithoutGyroscopicTerm(), "spin-asymmetric", "drop-ball") == f"Consistent with {words}."
+
+
+@pytest.mark.parametrize("title", ["spin reported in the body frame", "friction omitted", "angular damping of 1e-3 not switched off"])
+def test_known_fault_is_named(title):
+    words = {
+        "spin reported in the body frame": "angular velocity appears to be in the body frame",
+        "friction omitted": "friction is omitted",
+        "angular damping of 1e-3 not switched off": "angular damping 0.001 1/s too high",
+    }
+    assert words[title] in consistent_with(TITLED[title], "fall-spin", "spin-asymmetric", "drop-ball-backspin")
+
+
+@pytest.mark.parametrize(
+    "engine",
+    [faulty_engine("exact", OF["gyroscopic term"], 0.01), made.engine_with("turned", made.turned_by(0.1)), made.Exact()],
+    ids=["gyroscopic", "turned", "sound"],
+)
+def test_fault_of_another_kind_has_no_cause(engine):
+    assert causes(run(lasting("spin-asymmetric"), engine), engine.label) == ([], [])
+
+
+def test_cause_that_another_scene_excludes_is_not_named():
+    """An inertia that is wrong in one scene alone: in the other one, which passes, that error would show."""
+    wrong = with_body(moments=lambda m: m * np.array([1.01, 1.0, 1.0]))
+    engine = Made(title="planted", change=lambda scene: wrong(scene) if scene.name == "spin-asymmetric" else scene)
+    assert consistent_with(engine, "spin-asymmetric") == "Consistent with moment of inertia about x 1 % too high."
+    assert consistent_with(engine, "spin-asymmetric", "drop-box-corner") == ""
+
+
+def test_check_prints_the_cause_first(capsys):
+    """Before the largest change, in the terminal and in a summary."""
+    scenes = [lasting("drop-ball"), lasting("fall-spin")]
+    accepted, _ = accept(run(scenes, Made(title="mine")), Baseline(), "first", TODAY)
+    worse = run(scenes, Made(title="worse", change=with_gravity(1.01 * np.eye(3))))
+    checked = check(relabelled(worse, "worse", "mine"), accepted)
+    found = failures(checked.results, "b.toml")
+    print_failures(grouped(checked.results, found, "b.toml"))
+    assert capsys.readouterr().out.startswith("Consistent with gravity 1 % too high.\n✗ ")
+    assert "\n- Consistent with gravity 1 % too high.\n- ✗ " in check_markdown(checked, None, found)
+
+
+def test_moments_that_no_body_has_explain_no_error():
+    """The largest moment of a thin plate is almost the sum of the other two."""
+    plate = load({"duration": 1.0, "body": {"shape": "box", "half_extents": [0.3, 0.001, 0.2], "mass": 1.0}})
+    [about_y] = [parameter for parameter in PARAMETERS if parameter.name == "moment of inertia about y"]
+    assert about_y.change(plate, 0.01) is None
+    assert about_y.change(plate, -0.01) is not None

@@ -1,0 +1,19 @@
+"""The reasons of expectations: a mechanism, which holds for every engine that they are shown for; the measured value is that of the row."""
+
+import re
+
+import pytest
+
+from comparisons.engines.registry import BUILT_IN
+from scenarios import load, names
+
+NAMES = {engine: engine for engine in BUILT_IN} | {"document": "wang", "pybullet": "bullet"}
+"""What a text calls an engine, in lower case."""
+
+
+@pytest.mark.parametrize("scene", names())
+def test_reason_states_no_measured_value_and_no_other_engine(scene):
+    for expectation in load(scene).expect:
+        reason, own = expectation.reason.lower(), (expectation.engine or "").partition("[")[0]
+        assert "measured" not in reason
+        assert [engine for engine, name in NAMES.items() if name in re.findall(r"[a-z_-]+", reason) and engine != own] == []

@@ -39,7 +39,7 @@ class Dart(Engine):
     def declines(self, scene: Scenario) -> str | None:
         moments, floor = np.linalg.eigvalsh(scene.body.inertia_tensor), scene.floor
         if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
-            return "DART damps a free joint about the world's axes; angular damping needs a body of equal moments of inertia"
+            return "the adapter damps about the world's axes only; angular damping needs a body of equal moments of inertia"
         if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, self.option("floor"))) is not None:
             return unfit
         if floor is not None and not hasattr(dart.constraint, "NsgsFrictionSolver"):

@@ -51,7 +51,7 @@ class Drake(Engine):
     def declines(self, scene: Scenario) -> str | None:
         moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
         if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
-            return "Drake damps a free joint's rotation with one coefficient; angular damping needs a body of equal moments of inertia"
+            return "the adapter damps all axes with one coefficient; angular damping needs a body of equal moments of inertia"
         if scene.floor is not None and scene.floor.restitution > 0.0:
             return "Drake has no coefficient of restitution; its contacts are springs with dissipation"
         return base.refusal_of_floor(scene, self.option("floor"))

@@ -52,7 +52,7 @@ class Genesis(Engine):
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor
         if scene.damping is not None and np.count_nonzero(scene.body.inertia_tensor) > 3:
-            return "Genesis damps along the body's own axes; these are not principal axes"
+            return "the adapter damps along the body's own axes only; these are not principal axes"
         if (unfit := refusal_of_shape(scene)) is not None or floor is None:
             return unfit
         if floor.coefficient < LEAST_FRICTION:

@@ -122,13 +122,15 @@ class MuJoCo(Engine):
         if min(body.mass, *np.linalg.eigvalsh(body.inertia_tensor)) < mujoco.mjMINVAL:
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
         if scene.damping is not None and not is_diagonal(body.inertia_tensor):
-            return "MuJoCo damps along the body's own axes; these are not principal axes"
+            return "the adapter damps along the body's own axes only; these are not principal axes"
         if (unfit := self._refusal_of_shape(scene)) is not None:
             return unfit
         if floor is None or self.option("profile") == "default":
             return None
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
-            return f"contacts break down at coefficients of friction above {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
+            return (
+                f"calibrated contacts break down at coefficients of friction above {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
+            )
         refusal_of_contacts = {Box: refusal_of_boxes, Vertices: refusal_of_meshes}.get(type(body))
         if refusal_of_contacts is not None and (too_old := refusal_of_contacts(VERSION)) is not None:
             return too_old
@@ -145,7 +147,7 @@ class MuJoCo(Engine):
         unfit = refusal_of_shape(scene, "mesh" if self.option("body") == "mesh" else "", maps_vertices=True)
         unfit = unfit or refusal_of_floor(scene, self.option("floor"))
         if unfit is None and scene.floor is not None and isinstance(scene.body, Vertices) and scene.body.resting_height == 0.0:
-            return "a body of vertices is mapped onto a floor as a mesh, and MuJoCo has no flat meshes"
+            return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo compiles no flat mesh"
         return unfit
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:

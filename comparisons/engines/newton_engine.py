@@ -48,7 +48,7 @@ class Newton(Engine):
         if solver == "mujoco" and find_spec("mujoco_warp") is None:
             return "Newton's MuJoCo solver needs mujoco-warp; install newton[sim]"
         if scene.damping is not None:
-            return "Newton has no linear damping of a free body"
+            return "the adapter maps no linear damping"
         if (unfit := refusal_of_shape(scene)) is not None or floor is None:
             return unfit
         if solver != "xpbd":

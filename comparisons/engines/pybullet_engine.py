@@ -94,7 +94,7 @@ class PyBullet(Engine):
         """Why calibration cannot reproduce the scene."""
         inertia = scene.body.inertia_tensor
         if not is_diagonal(inertia):
-            return "PyBullet takes inertia along the body's own axes only; these are not principal axes"
+            return "the adapter passes inertia along the body's own axes only; these are not principal axes"
         floor = scene.floor
         if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(inertia)) < SMALLEST_INERTIA:
             return f"Bullet omits the gyroscopic term if the product of the moments is below {SMALLEST_INERTIA:g}; scale the scene's units"

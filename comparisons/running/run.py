@@ -14,6 +14,7 @@ from comparisons.measuring.comparison import Comparison
 from comparisons.measuring.metrics import metrics_for
 from comparisons.results.provenance import provenance
 from comparisons.results.results import Results, joined
+from comparisons.running.belonging import verify_motion
 from comparisons.running.engine_process import Failed
 from comparisons.running.engine_run import Timing, time_engine
 from comparisons.running.entries import CONSTRUCTION, engine_entry
@@ -228,11 +229,13 @@ def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:
         By name, in the unit that `METRICS` has for it; NaN where the time step is too coarse.
 
     Raises:
-        DropspinError: There is no such scene, or the motion is not a `Trajectory`.
+        DropspinError: There is no such scene, or the motion is not a `Trajectory`, or not one of this scene: it has another start or
+            frame, other units, or unequal steps.
     """
     scene = as_scene(scene)
     if not isinstance(motion, Trajectory):
         raise DropspinError(f"motion: got a {type(motion).__name__}; give a Trajectory, such as simulate() returns.")
     truth = truth_for(scene)
+    verify_motion(scene, truth, motion)
     case = Comparison.with_truth(scene, motion, truth)
     return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}

@@ -26,8 +26,10 @@ from comparisons.engines.base import Engine
 from comparisons.running.run import run
 from scenarios.body import Box
 from scenarios.model import Damping
-from scenarios.rotations import about, multiply, rotate, unrotate
+from scenarios.rotations import about, conjugate, multiply, rotate, unrotate
 from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
+from support.bouncing import Bouncing, bounced, coulomb, pyramid
+from support.bouncing import with_restitution as with_restitution_of
 from support.sampled import Sampled, undistorted
 
 Array = np.ndarray
@@ -454,6 +456,158 @@ class WrongRotor(Made):
         return Sampled(scene, dt, scene, distort)
 
 
+@dataclass(frozen=True)
+class DampedAxis(Made):
+    """Exact except for a damping of 0.05 1/s about the body's x axis, in free flight of slow bodies."""
+
+    def prepare(self, scene, dt):
+        if scene.floor is not None or np.linalg.norm(scene.start.angular_velocity) * scene.duration > 1000.0:
+            return Sampled(scene, dt, scene, undistorted)
+        states = integrated(scene, dt, lambda v, spin: (0.0 * v, -np.array([0.05, 0.0, 0.0]) * spin))
+        return Sampled(scene, dt, scene, lambda rows, at, step, truth: states[: len(rows)].copy())
+
+
+def integrated(scene, dt, added, method="DOP853"):
+    """The states of free flight by an accurate integrator, with added accelerations: of the velocity, and of the spin in the body frame."""
+    tensor, g = scene.body.inertia_tensor, scene.acceleration
+    inverse, start = np.linalg.inv(tensor), scene.initial_state
+    k, kappa = (scene.damping.linear, scene.damping.angular) if scene.damping else (0.0, 0.0)
+
+    def rates(t, y):
+        q, v, spin = y[ORIENTATION], y[VELOCITY], y[SPIN]
+        turning, (pushed, spun) = 0.5 * multiply(q, np.array([*spin, 0.0])), added(v, spin)
+        return np.concatenate([v, turning, g - k * v + pushed, -inverse @ np.cross(spin, tensor @ spin) - kappa * spin + spun])
+
+    begin = start.copy()
+    begin[SPIN] = unrotate(start[ORIENTATION], start[SPIN])
+    times = dt * np.arange(scene.steps(dt) + 1)
+    solved = solve_ivp(rates, (0.0, times[-1]), begin, method, t_eval=times, rtol=3e-14, atol=1e-14).y.T
+    q = solved[:, ORIENTATION] / np.linalg.norm(solved[:, ORIENTATION], axis=1, keepdims=True)
+    return np.hstack([solved[:, POSITION], q, solved[:, VELOCITY], rotate(q, solved[:, SPIN])])
+
+
+@dataclass(frozen=True)
+class Leaking(Made):
+    """Exact except that each simulation begins 1 mm/s faster than the one before in its process."""
+
+    counted: list = field(default_factory=list, compare=False)
+
+    def prepare(self, scene, dt):
+        self.counted.append(None)
+        state = scene.initial_state
+        state[7] += 1e-3 * (len(self.counted) - 1)
+        return Sampled(scene, dt, scene.starting_at(state), undistorted)
+
+
+# Faults of single steps and single impacts.
+
+
+def kicked(steps):
+    """A start with gravity in some additional steps."""
+
+    def change(scene, dt):
+        state = scene.initial_state
+        state[VELOCITY] += steps * dt * scene.acceleration
+        return scene.starting_at(state)
+
+    return change
+
+
+def jittering(times, dt):
+    return times + 0.2 * dt * np.random.default_rng(0).uniform(-1.0, 1.0, len(times)) * (times > 0.0)
+
+
+def late_positions(rows, times, dt, truth):
+    rows[1:, POSITION] = rows[:-1, POSITION].copy()
+    return rows
+
+
+def half_precision_once(scene):
+    """The state after a tenth of a second passes through half precision."""
+    at = 0.1
+    truth = scenarios.truth_for(scene)
+    if truth is None or truth.horizon < at:
+        return undistorted
+    state = np.float16(truth(np.array([at])).states[0]).astype(float)
+    try:
+        rest = scenarios.truth_for(scene.starting_at(state))
+    except scenarios.DropspinError:  # rounding has sunk it into the floor
+        return undistorted
+    if rest is None:
+        return undistorted
+
+    def distort(rows, times, dt, truth):
+        later = times > at
+        rows[later] = rest(np.minimum(times[later] - at, rest.horizon)).states
+        return rows
+
+    return distort
+
+
+def tilted_floor(angle):
+    """The floor is turned by an angle about the x axis, for balls that fall on it."""
+    turn = about(np.array([1.0, 0.0, 0.0]), np.array(angle))
+
+    def plant(scene):
+        if scene.floor is None or scene.body.shape != "sphere" or not scene.starts_above_floor:
+            return undistorted
+        level = with_gravity(np.array([rotate(turn, axis) for axis in np.eye(3)]).T)(scene)
+        state = level.initial_state
+        for part in (POSITION, VELOCITY, SPIN):
+            state[part] = rotate(turn, state[part])
+        state[ORIENTATION] = multiply(turn, state[ORIENTATION])
+        tilted = scenarios.truth_for(level.starting_at(state))
+        if tilted is None:
+            return undistorted
+
+        def distort(rows, times, dt, truth):
+            rows = tilted(np.minimum(times, tilted.horizon)).states
+            for part in (POSITION, VELOCITY, SPIN):
+                rows[:, part] = unrotate(turn, rows[:, part])
+            rows[:, ORIENTATION] = multiply(conjugate(turn), rows[:, ORIENTATION])
+            return rows
+
+        return distort
+
+    return plant
+
+
+def bouncing_by(law):
+    """Impacts of balls by a law."""
+
+    def plant(scene):
+        if Bouncing(title="", law=law).declines(scene) or scene.floor is None:
+            return undistorted
+        return lambda rows, times, dt, truth: bounced(scene, law, np.minimum(times, truth.horizon))
+
+    return plant
+
+
+def other_vertex(scene):
+    """The impulse of the first impact of a box acts at the vertex opposite in its face."""
+    truth = scenarios.truth_for(scene)
+    if scene.floor is None or scene.body.shape == "sphere" or truth is None or not truth.events or not scene.starts_above_floor:
+        return undistorted
+    before, after, when = truth.events[0].before, truth.events[0].after.copy(), truth.events[0].time
+    q, impulse = before[ORIENTATION], scene.body.mass * (after[VELOCITY] - before[VELOCITY])
+    corners = rotate(q, scene.body.vertices)
+    second = corners[np.argsort(corners[:, 1])[1]]
+    spin = unrotate(q, np.cross(second, impulse))
+    after[SPIN] = before[SPIN] + rotate(q, np.linalg.solve(scene.body.inertia_tensor, spin))
+    rest = scenarios.truth_for(scene.model_copy(update={"floor": None}).starting_at(after))
+
+    def distort(rows, times, dt, truth):
+        later = times > when
+        rows[later] = rest(times[later] - when).states
+        return rows
+
+    return distort if rest else undistorted
+
+
+def doubled_at_first(scene, slip, speed, number):
+    return coulomb(scene, slip, speed, number, 2.0 if number == 0 else 1.0)
+
+
 def fault(title, **parts):
     return Made(title=title, **parts)
 
@@ -532,6 +686,22 @@ FAULTS = [
     sliding("balls of 2/3 M r²", change=hollow),
     fault("landings on an edge that take 1 % less speed", plant=landings(0.99), extra=("roll-prism-slope",)),
     fault("no restitution below 1 m/s", change=at_rest_below(1.0), extra=("bounce-elastic",)),
+    fault("gravity of 9.81 for 9.8 m/s²", change=with_gravity(9.81 / 9.8 * np.eye(3))),
+    fault("gravity acts twice in the first step", change=kicked(1.0), vanishing=True),
+    fault("time steps that jitter by 20 %", distort=at_times(jittering)),
+    fault("half precision once", plant=half_precision_once),
+    fault("positions one step late", distort=late_positions),
+    DampedAxis(title="damping about one axis"),
+    fault("floor tilted by 1 mrad", plant=tilted_floor(1e-3)),
+    fault(
+        "restitution that falls with the impact speed", plant=bouncing_by(with_restitution_of(lambda e, speed: e / (1.0 + 0.02 * speed)))
+    ),
+    sliding("friction doubled in the first impact", plant=bouncing_by(doubled_at_first)),
+    sliding("friction pyramid in impacts", plant=bouncing_by(pyramid)),
+    fault("impulse at another vertex", plant=other_vertex),
+    Leaking(title="velocity left from earlier simulations"),
+    fault("moment of inertia about y 1 % too large", change=with_body(moments=lambda m: m * np.array([1.0, 1.01, 1.0]))),
+    fault("inertia of a ball", change=with_body(moments=lambda m: np.full(3, m.mean()))),
     fault("mirrored: left-handed axes", distort=on_rows(lambda rows, t: rows * np.array([1, 1, -1, -1, -1, 1, 1, 1, 1, -1, -1, -1, 1]))),
 ]
 
@@ -563,21 +733,7 @@ class Integrated(Made):
     def prepare(self, scene, dt):
         if scene.floor is not None or np.linalg.norm(scene.start.angular_velocity) * scene.duration > 1000.0:
             return Sampled(scene, dt, scene, undistorted)
-        tensor, g = scene.body.inertia_tensor, scene.acceleration
-        inverse, start = np.linalg.inv(tensor), scene.initial_state
-        k, kappa = (scene.damping.linear, scene.damping.angular) if scene.damping else (0.0, 0.0)
-
-        def rates(t, y):
-            q, v, spin = y[ORIENTATION], y[VELOCITY], y[SPIN]
-            turning = 0.5 * multiply(q, np.array([*spin, 0.0]))
-            return np.concatenate([v, turning, g - k * v, -inverse @ np.cross(spin, tensor @ spin) - kappa * spin])
-
-        begin = start.copy()
-        begin[SPIN] = unrotate(start[ORIENTATION], start[SPIN])
-        times = dt * np.arange(scene.steps(dt) + 1)
-        solved = solve_ivp(rates, (0.0, times[-1]), begin, self.method, t_eval=times, rtol=3e-14, atol=1e-14).y.T
-        q = solved[:, ORIENTATION] / np.linalg.norm(solved[:, ORIENTATION], axis=1, keepdims=True)
-        states = np.hstack([solved[:, POSITION], q, solved[:, VELOCITY], rotate(q, solved[:, SPIN])])
+        states = integrated(scene, dt, lambda v, spin: (0.0 * v, 0.0 * spin), self.method)
         return Sampled(scene, dt, scene, lambda rows, at, step, truth: states[: len(rows)].copy())
 
 

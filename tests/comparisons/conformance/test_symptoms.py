@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support import engines as made
 from support.bouncing import Bouncing, coulomb, pyramid, with_restitution
+from support.fault_suite import FAULTS
 
 from comparisons.conformance.checks import run_check
 from comparisons.conformance.probes import PROBES
@@ -94,3 +95,32 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
     assert " instead of 0.1" in message
     assert "restitution" not in message
     assert truth_for(ball.scene).events[0].before[1] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("title", "check", "message"),
+    [
+        (
+            "gravity acts twice in the first step",
+            "time",
+            "velocity and position of a fall run ahead by 1 step: gravity acts in more steps than",
+        ),
+        ("positions one step late", "time", "position is 1 step late: it does not belong to the time of its row"),
+        ("velocities one step late", "time", "velocity is 1 step late: it does not belong to the time of its row"),
+        ("time steps that jitter by 20 %", "time", "rows are not uniform in time"),
+        ("half precision once", "velocity lag", "gravity, the time step or the precision of the state is wrong"),
+        ("clock 0.1 % fast", "velocity lag", "gravity, the time step or the precision of the state is wrong"),
+        ("damping about one axis", "turning", "damping or a clamp that the scene does not have: the final angular velocity is "),
+        ("restitution that falls with the impact speed", "lively ball", "restitution is 0.9606 instead of 1 (3.9 % too low)"),
+        (
+            "friction doubled in the first impact",
+            "slippery floor",
+            "the impulse of friction over that of the normal force is 0.24 instead of",
+        ),
+        ("friction pyramid in impacts", "slippery floor", "friction acts 14° from its exact direction"),
+        ("velocity left from earlier simulations", "repeats", "keeps state between simulations"),
+    ],
+)
+def test_fault_of_a_step_or_an_impact_is_named(title, check, message):
+    [fault] = [one for one in FAULTS if one.title == title]
+    assert message in failed(fault, check)[check]

@@ -1,0 +1,130 @@
+"""Whether a motion that was recorded elsewhere is one of a scene: from its start, in its frame, units and times. A mismatch is named.
+
+An engine may be wrong by any amount. So a motion is refused only if its times or its start cannot be the scene's, or if a known fault of
+conventions, such as another order of the quaternion, explains almost all of its difference from the exact solution in the first flight.
+"""
+
+from collections.abc import Iterator
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comparisons.faults.conventions import CONVENTIONS
+from comparisons.faults.fault_model import unchanged_scene
+from scenarios import DropspinError, Scenario, Trajectory, Truth
+from scenarios.rotations import angle_between_orientations
+from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+
+Array = NDArray[np.float64]
+
+UNEVEN = 0.01
+"""Largest difference of a time step from the mean, as a share of it; times in text files are rounded."""
+GROSS = 0.1
+"""Difference, of angles [rad] and relative to sizes and speeds, that a fault of conventions exceeds."""
+EXPLAINED = 0.1
+"""Largest share of a difference that is left where a fault explains it."""
+AT_START = 1e-3
+"""Largest difference of the first state from the start; a velocity may also be a time step early or late."""
+UNITS_OF_TIME = {1e3: "ms", 1e6: "µs", 1e9: "ns", 1.0 / 60.0: "minutes"}
+LONGEST = 2000  # rows that are compared
+
+
+def verify_motion(scene: Scenario, truth: Truth | None, motion: Trajectory) -> None:
+    """Raise `DropspinError` if a motion is not one of a scene; the message says what was recognised, and what to do."""
+    for problem in chain(_of_times(motion), _of_rates(motion), _of_states(scene, truth, motion)):
+        raise DropspinError(f"motion: {problem}.")
+
+
+def _of_times(motion: Trajectory) -> Iterator[str]:
+    if len(motion) < 2:
+        yield f"got {len(motion)} states; give at least two"
+        return
+    steps = np.diff(motion.t)
+    if not (steps > 0.0).all():
+        yield "the times do not increase; give the states in the order of time"
+    elif np.ptp(steps) > UNEVEN * steps.mean():
+        yield (
+            f"the times are not equally spaced: steps are {steps.min():.4g} to {steps.max():.4g} s long; interpolate the states at equal "
+            "steps, or give times without rounding"
+        )
+    elif abs(motion.t[0]) > UNEVEN * steps.mean():
+        yield f"the times begin at {motion.t[0]:.4g} s; give the motion from the scene's start on, at time 0"
+
+
+def _of_rates(motion: Trajectory) -> Iterator[str]:
+    """Of velocities that do not fit the change of the positions."""
+    moved, dt = np.diff(motion.position, axis=0), np.diff(motion.t)[:, None]
+    expected = 0.5 * dt * (motion.velocity[1:] + motion.velocity[:-1])
+    if not np.isfinite(moved).all() or not np.isfinite(expected).all():
+        return
+    if not expected.any() and moved.any():
+        yield "velocities are 0 while the position changes; give the velocity of the centre of mass [m/s]"
+    elif expected.any():
+        ratio = float(np.sum(moved * expected) / np.sum(expected**2))
+        for factor, unit in UNITS_OF_TIME.items():
+            if abs(ratio * factor - 1.0) < GROSS:
+                yield f"the times appear to be in {unit}, by the velocities and the change of the position; give them in s"
+
+
+def _of_states(scene: Scenario, truth: Truth | None, motion: Trajectory) -> Iterator[str]:
+    """Of states in another convention or from another start."""
+    first = truth.events[0].time if truth is not None and truth.events else np.inf
+    known = np.array([0.0]) if truth is None else motion.t[(motion.t < first) & truth.covers(motion.t)][:LONGEST]
+    exact = scene.initial_state[None] if truth is None or not len(known) else truth(known).states
+    found = motion.states[: len(exact)]
+    if not np.isfinite(found).all():
+        return
+    dt, lag = float(motion.t[1] - motion.t[0]), abs(motion.velocity_lag)
+    plain = _difference(scene, found, exact)
+    if plain > GROSS:
+        read = [fault for fault in CONVENTIONS if fault.simulated is unchanged_scene]
+        left = [_difference(scene, found, fault.reported(exact)) for fault in read]
+        if min(left) <= EXPLAINED * plain:
+            yield f"{read[int(np.argmin(left))].message}; convert the states"
+            return
+    early = (dt + lag) * max(float(np.linalg.norm(scene.acceleration)), float(np.linalg.norm(scene.start.angular_velocity)) ** 2)
+    off = _difference(scene, found[:1], scene.initial_state[None])
+    if off > AT_START + early / (_speed(scene, exact) or 1.0):
+        late = _late_by(scene, truth, found[0])
+        if late is not None:
+            yield f"it begins {late:.4g} s after the scene's start; give the states from the start on"
+            return
+        own, other = (
+            f"{_listed(state[POSITION])} m with velocity {_listed(state[VELOCITY])} m/s" for state in (found[0], scene.initial_state)
+        )
+        turned = (
+            f", turned by {float(angle_between_orientations(found[:1, ORIENTATION], scene.initial_state[None, ORIENTATION])[0]):.3g} rad"
+        )
+        yield f"it begins at {own}, the scene at {other}{turned}; give the motion of this scene, or a scene with this start"
+
+
+def _late_by(scene: Scenario, truth: Truth | None, state: Array) -> float | None:
+    """The time [s] at which the exact solution has a state; None if it never has."""
+    if truth is None:
+        return None
+    times = np.linspace(0.0, min(scene.duration, truth.horizon), LONGEST)
+    for _ in range(3):
+        states = truth(times).states
+        off = np.array([_difference(scene, state[None], other[None]) for other in states])
+        best = int(np.argmin(off))
+        times = np.linspace(times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)], LONGEST // 40)
+    return float(times[len(times) // 2]) if off.min() <= AT_START else None
+
+
+def _speed(scene: Scenario, exact: Array) -> float:
+    size, g = scene.body.size, float(np.linalg.norm(scene.acceleration))
+    speed, spin = (float(np.linalg.norm(exact[:, part], axis=1).max()) for part in (VELOCITY, SPIN))
+    return max(speed, size * spin, float(np.sqrt(g * size)))
+
+
+def _difference(scene: Scenario, found: Array, exact: Array) -> float:
+    """The largest difference of states, of angles [rad], and relative to the body's size and the largest speed."""
+    speed = _speed(scene, exact) or 1.0
+    scales = ((POSITION, scene.body.size), (VELOCITY, speed), (SPIN, speed / scene.body.size))
+    lengths = [float(np.linalg.norm(found[:, part] - exact[:, part], axis=1).max()) / scale for part, scale in scales]
+    return max(*lengths, float(angle_between_orientations(found[:, ORIENTATION], exact[:, ORIENTATION]).max()))
+
+
+def _listed(values: Array) -> str:
+    return f"({', '.join(f'{value:.4g}' for value in values)})"

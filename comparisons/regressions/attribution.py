@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Literal
 
+from comparisons.engines.registry import BUILT_IN
 from comparisons.results.provenance import MEASURING
 from scenarios.text import printable
 
 Stamp = Mapping[str, Any]
-Origin = Literal["engine", "adapter", "settings", "surroundings", "either", "absent", "nothing"]
+Origin = Literal["engine", "adapter", "settings", "dropspin", "surroundings", "either", "absent", "nothing"]
+OWN_CODE = "dropspin's own code"
 MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
 
 
@@ -19,8 +21,9 @@ class Attribution:
 
     Attributes:
         origin: `absent` if one of the runs has no measurements; `engine` for its version, else `adapter` for the adapter's code, else
-            `settings`; `surroundings` for dropspin, its code, the libraries and the machine; `either` if both the engine, its adapter or
-            its settings and the surroundings differ, so that the cause cannot be isolated; `nothing` if the whole provenance is the same.
+            `settings`; `dropspin` if nothing but dropspin's code differs, that of a built-in adapter included; `surroundings` for
+            dropspin, its code, the libraries and the machine; `either` if both the engine, its adapter or its settings and the surroundings
+            differ, so that the cause cannot be isolated; `nothing` if the whole provenance is the same.
         message: The cause in a sentence, without the engine's name.
     """
 
@@ -36,7 +39,7 @@ def surroundings(old: Stamp, new: Stamp) -> list[str]:
         if old["versions"][package] != new["versions"][package]
     ]
     if old["code"] != new["code"]:
-        found.append("dropspin's own code")
+        found.append(OWN_CODE)
     return found + [f"{word} {old[key]} → {new[key]}" for key, word in MACHINE.items() if old[key] != new[key]]
 
 
@@ -75,6 +78,8 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str]) -> 
         return Attribution(
             "nothing", "the provenance of both runs is the same; the engine is not deterministic, or has changed without a new version"
         )
+    if around == [OWN_CODE] and own.keys() <= ({"adapter"} if engine.split("[", maxsplit=1)[0] in BUILT_IN else set()):
+        return Attribution("dropspin", f"a correction of dropspin, not a change of the engine: {', '.join([*own.values(), *around])}")
     if not own:
         return Attribution("surroundings", f"attributed to the surroundings: {', '.join(around)}")
     first = next(iter(own))

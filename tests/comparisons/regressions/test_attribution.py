@@ -33,7 +33,13 @@ def settings(version, solref):
         (settings("1.1", 2), [], "engine", "attributed to the engine: candidate 1.0 → 1.1, its settings (solref)"),
         ({"adapters": {"candidate": "b"}}, [], "adapter", "attributed to its adapter: the code of candidate's adapter"),
         ({"cpu": "B"}, [], "surroundings", "attributed to the surroundings: processor A → B"),
-        ({"code": "d"}, [], "surroundings", "attributed to the surroundings: dropspin's own code"),
+        ({"code": "d"}, [], "dropspin", "a correction of dropspin, not a change of the engine: dropspin's own code"),
+        (
+            {"code": "d", "adapters": {"candidate": "b"}},
+            [],
+            "either",
+            "the code of candidate's adapter, dropspin's own code; the cause cannot be isolated, because the results of every engine changed",
+        ),
         ({"versions": STAMP["versions"] | {"numpy": "2.1"}}, [], "surroundings", "attributed to the surroundings: numpy 2 → 2.1"),
         (
             {"cpu": "B", "adapters": {"candidate": "b"}},
@@ -55,3 +61,10 @@ def test_changes_are_attributed_to_what_differs(now, unmoved, origin, message):
     found = attribute(STAMP, STAMP | now, "candidate", unmoved)
     assert found.origin == origin
     assert found.message == message
+
+
+def test_changed_code_of_a_built_in_adapter_is_a_correction_of_dropspin():
+    stamp = STAMP | {"adapters": {"pybullet": "a"}, "settings": {"pybullet": STAMP["settings"]["candidate"]}}
+    found = attribute(stamp, stamp | {"code": "d", "adapters": {"pybullet": "b"}}, "pybullet", [])
+    assert found.origin == "dropspin"
+    assert found.message.endswith("not a change of the engine: the code of pybullet's adapter, dropspin's own code")

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import Scenario, load
+from scenarios import Scenario
+from scenarios.loading import from_mapping
 from scenarios.rotations import angle_between_orientations
 from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
@@ -60,7 +61,7 @@ def differences(found: Array, expected: Array) -> Array:
 
 
 def _probe(name: str, allowed: tuple[float, float, float, float], duration: float, body: dict[str, Any], **tables: Any) -> Probe:
-    return Probe(name, load({"name": name.replace(" ", "-"), "duration": duration, "body": body, **tables}), allowed)
+    return Probe(name, from_mapping({"name": name.replace(" ", "-"), "duration": duration, "body": body, **tables}), allowed)
 
 
 def _floor(restitution: float, friction: str | float) -> dict[str, Any]:

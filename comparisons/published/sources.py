@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import Field
 
-from scenarios import Scenario, load
+from scenarios import Scenario
 from scenarios.body import Table
 from scenarios.errors import UnknownName
-from scenarios.loading import read_toml
+from scenarios.loading import from_mapping, read_toml
 
 DATA = Path(__file__).parent / "data"
 
@@ -89,7 +89,7 @@ class Source(Table):
 
     def scene(self, name: str) -> Scenario:
         """One of the scenes."""
-        return load({"name": name, **self.scenes[name]})
+        return from_mapping({"name": name, **self.scenes[name]})
 
 
 def source_names() -> list[str]:

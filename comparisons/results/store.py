@@ -18,7 +18,8 @@ from comparisons.results.results import Results, TrajectoryKey
 from comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
 from comparisons.results.stored_files import file_name, read_stored, sha256
 from comparisons.results.stored_table import loaded_table
-from scenarios import DropspinError, Scenario, SceneError, Trajectory, load
+from scenarios import DropspinError, Scenario, SceneError, Trajectory
+from scenarios.loading import from_mapping
 from scenarios.rotations import length
 
 TRAJECTORY = tuple(field.name for field in fields(Trajectory))
@@ -91,7 +92,7 @@ def _loaded(folder: Path, file: RunFile, content: Mapping[str, Any], arrays: boo
 
 def _scene(file: RunFile, name: str) -> Scenario:
     try:
-        scene = load({**file.scenes[name], "name": name}).model_copy(update={"origin": file.origins[name]})
+        scene = from_mapping({**file.scenes[name], "name": name}).model_copy(update={"origin": file.origins[name]})
     except SceneError as error:
         raise ValueError(f"{FILE}: {error}") from None
     if scene.digest != file.digests[name]:

@@ -25,8 +25,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 Restitution = Literal["newton", "poisson", "energy"]
@@ -96,6 +94,8 @@ def _advanced(K: Array, friction: float, begin: _Phase, remaining: Callable[[_Ph
         begin, is_end = _slid(K, friction, begin, slip, remaining)
         if is_end:
             return begin
+    from scipy.optimize import brentq
+
     # The slip has stopped: the velocity changes by the same amount per impulse from here on.
     held = np.linalg.solve(K, N)  # the impulse that changes the normal velocity alone
     change: Array = N / held[1]
@@ -119,6 +119,7 @@ def _slid(K: Array, friction: float, begin: _Phase, slip: float, remaining: Call
     With dp = |u_t| dτ, the angle φ of the slip has an equation of its own, and a slip that stops decays exponentially:
     φ' = d⊥·c, (ln |u_t|)' = d·c, with c = K (N - f d).
     """
+    from scipy.integrate import solve_ivp
 
     def phase(y: Array) -> _Phase:
         return _Phase(slip * math.exp(y[1]) * _along(y[0]) + y[2] * N, y[3], y[4])

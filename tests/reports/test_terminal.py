@@ -39,11 +39,14 @@ def printed(results, capsys, width=80):
 def test_summary_of_the_default_run_has_at_most_39_lines_of_80_columns(core, capsys):
     """One line less than 40: the path of the report follows."""
     lines = printed(core, capsys)
-    assert len(core.scenes) == 24
+    assert len(core.scenes) == 28
     assert len(lines) <= 39
     assert max(map(len, lines)) <= 80
     head = next(number for number, line in enumerate(lines) if line.startswith("scene "))
-    assert [line.split()[0] for line in lines[head + 1 :][:24]] == list(core.scenes)
+    shown = [line.split()[0] for line in lines[head + 1 :] if line.split()[0] in core.scenes]
+    assert shown == [
+        scene for scene, found in core.statuses().items() if any(one.words not in ("converges", "declined") for one in found.values())
+    ]
 
 
 def test_summary_of_many_scenes_shows_those_with_findings_and_counts_the_others(core, capsys):
@@ -118,7 +121,7 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     assert set(largest["metric"]) == {"orientation_error"}
     scenes = " and ".join(largest["scene"])
     assert f"; largest error orientation {largest['value'].max():.3g} rad at dt = 1 ms in {scenes}; " in of["document"][0]
-    assert "largest error" not in of["pybullet"][0]
+    assert "largest error orientation" in of["pybullet"][0]  # a known limitation, in scenes whose slip turns
     for engine in core.engines:
         words = [by_engine[engine].words for by_engine in core.statuses().values()]
         assert f": converges in {words.count('converges')} of {len(words)} scenes, " in of[engine][0]

@@ -139,8 +139,8 @@ def test_tensor_with_products_of_inertia_is_exact_or_declined():
 def prism(count=8, half_length=0.1, **more):
     """A regular prism of vertices that falls flat on one end, with restitution 1/2."""
     ring = [(0.2 * math.cos(2 * math.pi * k / count), 0.2 * math.sin(2 * math.pi * k / count)) for k in range(count)]
-    ends = (-half_length, half_length) if half_length else (0.0,)
-    body = {"shape": "vertices", "points": [[x, y, z] for x, z in ring for y in ends], "mass": 1.0, "inertia": [0.03, 0.04, 0.03]}
+    ends, across = ((-half_length, half_length), 0.03) if half_length else ((0.0,), 0.02)
+    body = {"shape": "vertices", "points": [[x, y, z] for x, z in ring for y in ends], "mass": 1.0, "inertia": [across, 0.04, across]}
     start, gravity = {"position": [0.0, half_length + 0.3, 0.0]}, {"acceleration": [0.0, -9.8, 0.0]}
     floor = {"restitution": 0.5, "friction": "infinite"}
     return scenarios.load({"duration": 0.5, "body": body, "start": start, "gravity": gravity, "floor": floor} | more)

@@ -143,11 +143,17 @@ def test_contacts_without_a_floor_are_refused():
 
 
 def test_only_the_faults_of_the_note_break_the_laws(core_run):
-    """Wang's impulse has a component along a frictionless floor (eq 11), and acts along it; every other violation vanishes."""
+    """Wang's impulse has a component along a frictionless floor (eq 11), and acts along it; every other violation vanishes.
+
+    In maximal coordinates, Bullet's friction exceeds the cone where the slip turns in an impact.
+    """
     table = ds.load_results(core_run, arrays=False).asymptotic_errors("model", "setting")
     broken = table[table["metric"].isin(["contact_pull", "friction_cone_excess", "friction_push", "contact_gap"])]
     assert set(zip(broken["scene"], broken["engine"], broken["metric"], broken["verdict"], strict=True)) == {
         ("drop-box-corner", "document", "friction_cone_excess", "known"),
         ("drop-box-edge", "document", "friction_cone_excess", "known"),
         ("drop-box-edge", "document", "friction_push", "known"),
+        ("drop-box-slippery", "pybullet", "friction_cone_excess", "limited"),
+        ("drop-box-turning", "pybullet", "friction_cone_excess", "limited"),
+        ("drop-tetra-turning", "pybullet", "friction_cone_excess", "limited"),
     }

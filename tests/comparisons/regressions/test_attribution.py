@@ -38,7 +38,8 @@ def settings(version, solref):
             {"code": "d", "adapters": {"candidate": "b"}},
             [],
             "either",
-            "the code of candidate's adapter, dropspin's own code; the cause cannot be isolated, because the results of every engine changed",
+            "the code of candidate's adapter, dropspin's own code; "
+            "the cause cannot be isolated, because the results of every engine changed",
         ),
         ({"versions": STAMP["versions"] | {"numpy": "2.1"}}, [], "surroundings", "attributed to the surroundings: numpy 2 → 2.1"),
         (

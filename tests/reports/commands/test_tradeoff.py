@@ -61,7 +61,7 @@ def test_budget_is_an_option_with_the_default_of_the_study(tmp_path):
 
 def test_a_scene_without_an_exact_solution_is_refused(tmp_path):
     tumbling = "[start]\nposition = [0.0, 1.0, 0.0]\norientation = [0.1, 0.2, 0.3, 0.9]\nangular_velocity = [1.0, 2.0, 3.0]\n"
-    floor = "[gravity]\nacceleration = [0.0, -9.81, 0.0]\n[floor]\nrestitution = 0.6\nfriction = 0.3\n"
+    floor = "[gravity]\nacceleration = [0.0, -9.81, 0.0]\n[floor]\nrestitution = 0.6\nfriction = 0.3\n[damping]\nlinear = 0.1\n"
     (tmp_path / "mine.toml").write_text(SCENE.partition("[start]")[0] + tumbling + floor)
     done = dropspin("tradeoff", "mine.toml", cwd=tmp_path)
     assert done.returncode == 2

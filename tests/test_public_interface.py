@@ -70,7 +70,7 @@ def table_of(html):
 def test_notebook_shows_status_and_leading_error_of_each_engine():
     """Scenes by engines; also of a scene without an exact solution, an engine that declines it, and names with markup."""
     named = ds.load(FALL | {"name": "<b>fall</b>"})
-    unsolved = ds.load("drop-box-corner")
+    unsolved = ds.load("drop-box-flat")
     sideways = unsolved.starting_at(unsolved.initial_state + np.eye(13)[7])
     sideways = sideways.model_copy(update={"floor": unsolved.floor.model_copy(update={"friction": 0.3}), "expect": ()})
     found = ds.run([named, sideways, ds.load("spin-principal")], ["document", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
@@ -85,10 +85,10 @@ def test_notebook_shows_status_and_leading_error_of_each_engine():
             [value] = rows.loc[rows["dt"] == 2e-3, "value"]
             assert float(error) == pytest.approx(abs(value), rel=0.05)
             assert (status, shown_unit) == ("converges", unit)
-    assert shown.loc["drop-box-corner", "document"] == "declined"
-    assert shown.loc["drop-box-corner", "mujoco"] == "no exact solution"
+    assert shown.loc["drop-box-flat", "document"] == "declined"
+    assert shown.loc["drop-box-flat", "mujoco"] == "no exact solution"
     assert "<b>" not in found._repr_html_()
-    assert found.leading_errors("drop-box-corner").empty
+    assert found.leading_errors("drop-box-flat").empty
     with pytest.raises(ds.UnknownName, match=r"'spin-principle' is unknown\. Did you mean 'spin-principal'"):
         found.leading_errors("spin-principle")
 

@@ -316,7 +316,7 @@ def test_the_page_shows_orders_and_asymptotic_errors(studied):
     assert "converges in 0 of 1 scene, known model error in 1; largest error orientation 2.67 rad at dt = 2 ms in spin-asymmetric; " in text
     assert "mujoco: converges in 1 of 1 scene; " in text
     assert len(re.findall(r'<span class="status known">†<span class="words"> known model error</span></span>', text)) == 1
-    assert len(re.findall(r">order 1\.0[012]</td>", text)) >= 4
+    assert len(re.findall(r">order 1\.0[012] ", text)) >= 4
     assert ">→ 0.753</td>" in text
     assert "fitted at 0.008, 0.004, 0.002 s; claimed 1" in text
     assert ">rounding</td>" in text

@@ -6,6 +6,7 @@ import pytest
 import dropspin as ds
 from comparisons.measuring.batch import motions_side_by_side
 from comparisons.measuring.comparison import Comparison
+from comparisons.measuring.metrics import METRICS
 from comparisons.measuring.motions import Motions, Setup
 from comparisons.running.run import measure
 from scenarios import Trajectory, load, truth_for
@@ -108,9 +109,9 @@ def test_body_that_turns_back_above_the_floor_has_this_gap(name, gap):
     exact = truth_for(scene)(dt * np.arange(1 + scene.steps(dt)))
     states = exact.states.copy()
     states[:, 1] += gap
-    found = measure(scene, Trajectory.from_states(exact.t, states))
-    assert found["contact_gap"] == pytest.approx(gap, abs=5.0 * dt)
-    assert abs(found["restitution_error"]) <= 3.0 * G * dt / 4.0
+    case = Comparison.with_truth(scene, Trajectory.from_states(exact.t, states), truth_for(scene))
+    assert METRICS["contact_gap"].measure(case) == pytest.approx(gap, abs=5.0 * dt)
+    assert abs(METRICS["restitution_error"].measure(case)) <= 3.0 * G * dt / 4.0
 
 
 def spring(stiffness, damping, dt, margin=0.0, later_gain=1.0):

@@ -40,7 +40,7 @@ from comparisons.running.run import run
     ("planted", "scenes", "metrics"),
     [
         (TooLively, WITH_FLOOR, {"restitution_error"}),
-        (WithoutGyroscopicTerm, TURNING, {"orientation_error"}),
+        (WithoutGyroscopicTerm, TURNING, {"orientation_error", "angular_momentum_direction_error"}),
         (Euler, TURNING, {"orientation_error"}),
     ],
     ids=["1 % restitution", "no gyroscopic term", "Euler instead of RK4"],

@@ -138,7 +138,7 @@ def _judged(scene: Scenario, engine: Engine, metric: Metric, points: list[Series
     if study.asymptotic_error is None:
         return
     found = study.asymptotic_error
-    width = (found.upper - found.lower) / abs(float(errors[-1]))
+    width = (found.upper - found.lower) / abs(float(errors[-1])) if errors[-1] else math.nan
     is_covered = found.lower <= m <= found.upper
     name = f"{scene.name} {engine.label} {metric.name} {errors} m={m:.6g} [{found.lower:.6g}, {found.upper:.6g}] {study.cause}"
     yield name, Outcome(m, is_covered, study.cause, width, abs(m) > LARGE * abs(float(errors[0])))

@@ -79,7 +79,7 @@ def row(name: str, steps: str, found: list[Outcome]) -> list[str]:
         _share(one.cause == "model" for one in zeros),
         _share(one.cause == "discretisation" for one in large),
     ]
-    return [name, steps, str(len(found)), *shares, f"{np.median([one.width for one in found]):.2g}"]
+    return [name, steps, str(len(found)), *shares, f"{np.nanmedian([one.width for one in found]):.2g}"]
 
 
 def _share(hits: Iterator[bool]) -> str:

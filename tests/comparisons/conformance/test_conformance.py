@@ -600,6 +600,33 @@ def lag_of(stated):
     return check_velocity_lag(type("Single", (made.Exact,), prepare)(), "velocity lag")
 
 
+class Leapfrog(Simulation):
+    """Exact positions of a fall; velocities are those of half a step before."""
+
+    def __init__(self, scene, dt, lag):
+        self.velocity_lag, self._scene, self._dt, self._step = lag * dt, scene, dt, 0
+
+    def advance(self, steps):
+        self._step += steps
+
+    def state(self):
+        found, g, t = self._scene.initial_state.copy(), self._scene.acceleration, self._step * self._dt
+        found[:3] += found[7:10] * t + 0.5 * g * t**2
+        found[7:10] += g * (t - 0.5 * self._dt if t else 0.0)
+        return found
+
+
+def test_leapfrog_with_velocities_of_half_a_step_before_has_that_velocity_lag():
+    """The lag is the one between velocity and position, not between position and the exact fall, which is 0 here."""
+
+    def staggered(lag):
+        return type("Staggered", (made.Exact,), {"prepare": lambda self, scene, dt: Leapfrog(scene, dt, lag)})()
+
+    assert check_velocity_lag(staggered(0.5), "velocity lag").outcome == "passed"
+    with pytest.raises(CheckFailed, match=r"velocity_lag is 0 steps, but velocity lags position by 0\.5 steps"):
+        check_velocity_lag(staggered(0.0), "velocity lag")
+
+
 def test_rounding_of_single_precision_does_not_change_the_velocity_lag():
     assert lag_of(1 / 8).outcome == "passed"
     with pytest.raises(CheckFailed, match=r"velocity lags position by 0\.125 steps.*; set self.velocity_lag = 0.5 \* dt / 4"):

@@ -1,4 +1,4 @@
-"""Contacts of a motion: sequences of time steps in which the floor acts, told from accelerations that are wrong in flight.
+"""Contacts of a motion: sequences of time steps in which the floor acts, distinguished from accelerations that are wrong in flight.
 
 A change of velocity that gravity does not explain may come from the floor, or from a wrong acceleration: gravity of another size or
 direction, drag, wind, time steps of varying length, rounding. The floor carries the body, so it acts in steps in which

@@ -87,7 +87,7 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
 
 
 def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
-    """Energy above the initial energy; more is allowed on a floor of infinite friction, where Newton's restitution can add energy."""
+    """Energy above the initial energy; more is allowed on a floor with friction, where Newton's restitution can add energy."""
     try:
         scale = whole.energy_scale
     except Unresolved:

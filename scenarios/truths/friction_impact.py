@@ -10,7 +10,9 @@ With the velocity u of the point, u' = u + K j, and N the normal, two models of 
         poisson  at (1 + e) times the impulse at which u_n = 0
         energy   where the work of the normal impulse after u_n = 0 is e² times that before
 
-They agree where the direction of the slip does not change; else they are different models, and neither is the error of the other.
+All agree if the point slips in one direction until the impact ends, or if normal and tangential motion are uncoupled, as in a ball of equal
+moments; `newton` also agrees with the cone if the slip stops without turning and sticks. Else they are different models, and neither is the
+error of the other. With Newton's restitution, energy may be gained at a rough corner (T. R. Kane, 1984); with `energy` it is not.
 
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988), for the cone; E. J. Routh, Elementary Rigid
 Dynamics (1905), sections 187-194, J. B. Keller, Impact with friction, J. Applied Mechanics 53 (1986), and W. J. Stronge, Impact Mechanics

@@ -33,7 +33,7 @@ fuzz: $(VENV)/.installed-dev          ## commands with damaged files, wrong adap
 	FUZZ_CASES=$(or $(FUZZ_CASES),2000) $(BIN)/python -m pytest -n 2 --dist worksteal tests/fuzz
 
 faults: $(VENV)/.installed-dev        ## engines with one planted fault each against the core catalogue: docs/faults.md
-	$(BIN)/python tests/support/fault_suite.py
+	PYTHONPATH=tests $(BIN)/python -m support.fault_suite
 	PYTHONPATH=tests $(BIN)/python -m support.detection_power
 
 coverage: $(VENV)/.installed-dev      ## how often the intervals of asymptotic errors are right: docs/coverage.md

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
 from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene, few_steps, recorded
 from comparisons.engines.base import Engine
-from scenarios import Scenario, truth_for
+from scenarios import Scenario, Trajectory, truth_for
 from scenarios.rotations import angle_between_orientations
 from scenarios.state import ORIENTATION, POSITION, VELOCITY
 
@@ -56,11 +56,11 @@ def check_time(engine: Engine, check: str) -> CheckResult:
         except Declined:
             continue
         late = float(np.median(np.arange(len(times)) - times))
-        if abs(late) > LATE and clock is _by_velocity and abs(_runs_ahead(engine)[0] + late) < LATE:
+        if abs(late) > LATE and clock is _by_velocity and abs(_runs_ahead(*_fall(engine))[0] + late) < LATE:
             count = "more steps than were taken, such as twice in the first one" if late < 0.0 else "fewer steps than were taken"
             side = "ahead" if late < 0.0 else "behind"
             raise CheckFailed(f"velocity and position of a fall run {side} by {_steps(late)}: gravity acts in {count}")
-        if abs(late) > LATE and (clock is not _by_velocity or abs(late - _velocity_lag(engine)[1]) > LATE):
+        if abs(late) > LATE and (clock is not _by_velocity or abs(late - _velocity_lag(*_fall(engine))[1]) > LATE):
             raise CheckFailed(f"{what} is {_off(late)}")
     return CheckResult(check, "passed", f"steps have the length asked for, {asked} s")
 
@@ -99,8 +99,9 @@ def _by_velocity(scene: Scenario, rows: Array) -> Array:
 
 def check_velocity_lag(engine: Engine, check: str) -> CheckResult:
     """`velocity_lag` is the time by which velocity lags position: how much faster a falling body moves than its velocity says, over g."""
-    measured, stated = _velocity_lag(engine)
-    ahead, noise = _runs_ahead(engine)
+    fall = _fall(engine)
+    measured, stated = _velocity_lag(*fall)
+    ahead, noise = _runs_ahead(*fall)
     if noise > LAG_TOLERANCE:
         return CheckResult(check, "noted", f"a fall does not lag by the same time throughout, but by {noise:.2g} steps more or less")
     if abs(measured) > LARGEST_LAG:
@@ -115,26 +116,27 @@ def check_velocity_lag(engine: Engine, check: str) -> CheckResult:
     return CheckResult(check, "passed", f"velocity lags position by {stated:.3g} steps")
 
 
-def _velocity_lag(engine: Engine) -> tuple[float, float]:
-    """The lag of velocity behind position in a fall, measured and stated, in steps."""
-    scene, dt = accepted_scene(engine, "falling", "falling straight"), STEPS_TRIED[0]  # few steps, so that rounding adds up to little
-    motion, g = few_steps(engine, scene, dt), scene.acceleration
+def _fall(engine: Engine) -> tuple[Scenario, Trajectory]:
+    """A fall of few steps, so that rounding adds up to little."""
+    scene = accepted_scene(engine, "falling", "falling straight")
+    motion = few_steps(engine, scene, STEPS_TRIED[0])
     if not np.isfinite(motion.states).all():
         raise CheckFailed("the state is not finite after a fall")
+    return scene, motion
+
+
+def _velocity_lag(scene: Scenario, motion: Trajectory) -> tuple[float, float]:
+    """The lag of velocity behind position in a fall, measured and stated, in steps."""
+    g, dt = scene.acceleration, STEPS_TRIED[0]
     moved = (motion.position[STARTED + 2 :] - motion.position[STARTED:-2]) / (2.0 * dt)
     return float(np.mean((moved - motion.velocity[STARTED + 1 : -1]) @ g) / (g @ g * dt)), motion.velocity_lag / dt
 
 
-def _runs_ahead(engine: Engine) -> tuple[float, float]:
+def _runs_ahead(scene: Scenario, motion: Trajectory) -> tuple[float, float]:
     """By how many steps a fall runs ahead of the exact one, and the largest deviation from a constant number."""
-    scene, dt = accepted_scene(engine, "falling", "falling straight"), STEPS_TRIED[0]  # few steps, so that rounding adds up to little
-    motion, g = few_steps(engine, scene, dt), scene.acceleration
-    t = motion.t[STARTED:]
-    if not np.isfinite(motion.states).all():
-        raise CheckFailed("the state is not finite after a fall")
-    truth = truth_for(scene)
+    t, g, truth = motion.t[STARTED:], scene.acceleration, truth_for(scene)
     assert truth is not None
-    ahead = (motion.position[STARTED:] - truth(t).position) @ g / (g @ g * dt)
+    ahead = (motion.position[STARTED:] - truth(t).position) @ g / (g @ g * STEPS_TRIED[0])
     fitted = polyfit(t, ahead, 2)  # what remains of the first steps is constant; damping and wrong gravity grow with t²
     noise = float(np.abs(ahead - np.polynomial.polynomial.polyval(t, fitted)).max() / t[-1])
     return float(fitted[1]), noise

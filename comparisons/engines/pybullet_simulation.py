@@ -238,16 +238,17 @@ def _turning_slip(scene: Scenario, rows: Array, dt: float) -> Iterator[KnownLimi
     height = scene.clearance if scene.starts_above_floor else body.size
     g, kinetic = abs(float(scene.acceleration[1])), float(kinetic_energy(scene, motion)[0])
     energy = max(body.mass * g * height, kinetic)
-    turned = body.mass * body.size * wrong / float(np.linalg.norm(angular_momentum(scene, motion), axis=1).max())
+    spin = float(np.linalg.norm(angular_momentum(scene, motion), axis=1).max())
     sizes = {
         "position_error": wrong * left,
         "orientation_error": min(np.pi, body.mass * body.size * wrong / float(np.linalg.eigvalsh(body.inertia_tensor)[0]) * left),
         "energy_error": body.mass * wrong * (fastest + 0.5 * wrong) / energy,
-        "angular_momentum_error": turned,
-        "angular_momentum_direction_error": min(np.pi, 0.5 * np.pi * turned),
         "friction_cone_excess": (np.sqrt(2.0) - 1.0) * wrong / np.sqrt(2.0 * energy / body.mass),
         "friction_push": body.mass * wrong * fastest / energy,
     }
+    if spin > 0.0:
+        turned = body.mass * body.size * wrong / spin
+        sizes |= {"angular_momentum_error": turned, "angular_momentum_direction_error": min(np.pi, 0.5 * np.pi * turned)}
     if g > 0.0 and scene.starts_above_floor:
         sizes["bounce_height_error"] = wrong * (fastest + 0.5 * wrong) / (g * height)
     yield KnownLimitation(

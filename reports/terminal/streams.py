@@ -32,7 +32,7 @@ class _Unfailing(io.TextIOWrapper):
 def unfailing(stream: IO[str]) -> IO[str]:
     """The stream of an open file without its errors, of which `error_of` has the first one.
 
-    A character that it cannot encode becomes a question mark. Any other stream, such as one in memory, is returned as it is.
+    A character that it cannot encode becomes a question mark. Any other stream, such as one in memory, is returned unchanged.
     """
     if not isinstance(stream, io.TextIOWrapper):
         return stream

@@ -56,7 +56,7 @@ def routh(K, u, e, friction, restitution):
     def slopes(direction):
         return np.array([c - friction * k * direction, n - friction * c * direction])
 
-    sign, pieces, v, p = np.sign(u[0]), [], u[:2].copy(), 0.0
+    sign, v, p = np.sign(u[0]), u[:2].copy(), 0.0
     stop = -v[0] / slopes(sign)[0] if v[0] * slopes(sign)[0] < 0.0 else np.inf
     sticking = np.array([0.0, n - c * c / k])
     later = sticking if abs(c) <= friction * k else slopes(np.sign(c))

@@ -1,4 +1,4 @@
-"""Contacts are told from accelerations that are wrong in flight, at one motion and at many, and at any height."""
+"""Contacts are distinguished from wrong accelerations in flight, in one motion and in many, and at any height."""
 
 import numpy as np
 import pytest

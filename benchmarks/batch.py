@@ -20,14 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from speed import DT, scene
 
-import reference_impl
-import scenarios
-from comparisons.engines.base import Engine
-from comparisons.engines.document import reference_body, reference_world
-from comparisons.engines.registry import engine
-from comparisons.running.recording import record_batch
-from reference_impl.threads import usable_cores
-from scenarios.model import initial_states
+from dropspin import reference_impl, scenarios
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.document import reference_body, reference_world
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.recording import record_batch
+from dropspin.reference_impl.threads import usable_cores
+from dropspin.scenarios.model import initial_states
 
 STEPS = 1000
 WORLDS = {"document": (32, 256, 1024, 4096), "mujoco": (1024,)}

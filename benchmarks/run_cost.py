@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 import dropspin as ds
-import reference_impl
-from comparisons.engines.document import Document, DocumentBatch, DocumentSimulation, reference_body, reference_world
-from comparisons.engines.mujoco_engine import MuJoCo, MuJoCoBatch, MuJoCoSimulation
-from comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
-from comparisons.running.engine_run import EngineRun, run_engine
-from comparisons.running.inputs import EngineEntry
+from dropspin import reference_impl
+from dropspin.comparisons.engines.document import Document, DocumentBatch, DocumentSimulation, reference_body, reference_world
+from dropspin.comparisons.engines.mujoco_engine import MuJoCo, MuJoCoBatch, MuJoCoSimulation
+from dropspin.comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
+from dropspin.comparisons.running.engine_run import EngineRun, run_engine
+from dropspin.comparisons.running.inputs import EngineEntry
 
 DT = 4e-3
 JOBS = 10_000
@@ -90,7 +90,7 @@ def run_cost(scenes: Sequence[ds.Scenario]) -> None:
         time_method(engine, "prepare", "building")
     for engine in (Document, MuJoCo):
         time_method(engine, "prepare_batch", "building")
-    import_module("comparisons.running.run").EngineProcesses = ProcessesHere
+    import_module("dropspin.comparisons.running.run").EngineProcesses = ProcessesHere
     ds.run(scenes[:1], "document", jobs=1)  # compiles
     seconds.clear()
     start = time.perf_counter()

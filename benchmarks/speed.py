@@ -22,13 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import reference_impl
-import scenarios
-from comparisons.engines.registry import engine
-from comparisons.results.provenance import processor, versions
-from reference_impl import lanes
-from reference_impl.methods import ROTATIONS
-from reference_impl.threads import usable_cores
+from dropspin import reference_impl, scenarios
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.results.provenance import processor, versions
+from dropspin.reference_impl import lanes
+from dropspin.reference_impl.methods import ROTATIONS
+from dropspin.reference_impl.threads import usable_cores
 
 Array = NDArray[np.float64]
 

@@ -11,14 +11,14 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Engine
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import present_entry
-from comparisons.running.inputs import EngineEntry, verify_time_step
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.start_phases import START_PHASES
-from comparisons.running.verification import verified_refusal, verified_settings
-from scenarios import DropspinError, Scenario, load
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.inputs import EngineEntry, verify_time_step
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.start_phases import START_PHASES
+from dropspin.comparisons.running.verification import verified_refusal, verified_settings
+from dropspin.scenarios import DropspinError, Scenario, load
 
 Array = NDArray[np.float64]
 Motion = Callable[[float, int, float], tuple[list[float], list[float]]]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_impl.vectors import Mat3, Quat, Vec3
+from dropspin.reference_impl.vectors import Mat3, Quat, Vec3
 
 Array = NDArray[np.float64]
 

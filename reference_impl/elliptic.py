@@ -5,7 +5,7 @@ Source: R. Bulirsch, Numerische Mathematik 7 (1965), for sn, cn, dn; B. C. Carls
 
 import math
 
-from reference_impl.vectors import compiled
+from dropspin.reference_impl.vectors import compiled
 
 SMALLEST_SINE = 1e-100  # below it sn equals its argument, and the square of cn/sn would overflow
 MAX_MEANS = 40  # of the arithmetic-geometric mean, which converges quadratically: a dozen suffice for m₁ down to 1e-300

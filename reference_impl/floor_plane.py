@@ -1,6 +1,6 @@
 """The geometry of the floor y = 0: its normal, components along it, and the points at which a body can touch it."""
 
-from reference_impl.vectors import Vec3, compiled, row
+from dropspin.reference_impl.vectors import Vec3, compiled, row
 
 N = Vec3(0.0, 1.0, 0.0)
 """The floor's unit normal, upwards."""

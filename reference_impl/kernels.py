@@ -22,9 +22,9 @@ from numba import njit
 from numba.core import config as numba_config
 from numpy.typing import NDArray
 
-from reference_impl import lanes, sources
-from reference_impl.methods import COLLIDE, CORRECTIONS, LAWS, ROTATIONS, Methods
-from reference_impl.parameters import (
+from dropspin.reference_impl import lanes, sources
+from dropspin.reference_impl.methods import COLLIDE, CORRECTIONS, LAWS, ROTATIONS, Methods
+from dropspin.reference_impl.parameters import (
     STEP_SIZE,
     read_body,
     read_damping,
@@ -34,8 +34,8 @@ from reference_impl.parameters import (
     read_quaternion,
     read_vector,
 )
-from reference_impl.step import advance
-from reference_impl.vectors import compiled
+from dropspin.reference_impl.step import advance
+from dropspin.reference_impl.vectors import compiled
 
 Array = NDArray[np.float64]
 config: Any = numba_config  # numba sets its attributes at run time, which its type hints do not know

@@ -23,7 +23,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, overload_attribute, register_model
 from numpy.typing import NDArray
 
-from reference_impl.vectors import NumberLike, Vec3, any_, compiled, select
+from dropspin.reference_impl.vectors import NumberLike, Vec3, any_, compiled, select
 
 Array = NDArray[np.float64]
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from reference_impl.contacts import mean, sequential
-from reference_impl.corrections import projection
-from reference_impl.laws import clamped, coulomb, normal, note, poisson
-from reference_impl.rotations import exact, gyroscopic, implicit_gyroscopic, midpoint, rk4, symmetric_top
-from reference_impl.rotations import note as note_rotation
-from reference_impl.step import DAMPING_ORDER, TRANSLATION_DISCRETISATION, TRANSLATION_ORDER
+from dropspin.reference_impl.contacts import mean, sequential
+from dropspin.reference_impl.corrections import projection
+from dropspin.reference_impl.laws import clamped, coulomb, normal, note, poisson
+from dropspin.reference_impl.rotations import exact, gyroscopic, implicit_gyroscopic, midpoint, rk4, symmetric_top
+from dropspin.reference_impl.rotations import note as note_rotation
+from dropspin.reference_impl.step import DAMPING_ORDER, TRANSLATION_DISCRETISATION, TRANSLATION_ORDER
 
 Leaf = ModuleType
 """A module with one method and its properties:

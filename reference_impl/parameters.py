@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reference_impl.body import Body, Floor, KernelBody, KernelDamping, World
-from reference_impl.quaternion import from_matrix
-from reference_impl.vectors import Mat3, Quat, Vec3, compiled
+from dropspin.reference_impl.body import Body, Floor, KernelBody, KernelDamping, World
+from dropspin.reference_impl.quaternion import from_matrix
+from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled
 
 Array = NDArray[np.float64]
 Test = Callable[[Array], NDArray[np.bool_]]

@@ -2,7 +2,7 @@
 
 import math
 
-from reference_impl.vectors import Mat3, Quat, Vec3, compiled, transpose
+from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled, transpose
 
 
 @compiled

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reference_impl import lanes
-from reference_impl.body import Body, World
-from reference_impl.kernels import Parts, blocks, config, recording_kernel
-from reference_impl.methods import Methods
-from reference_impl.parameters import FRICTION, checked, ensemble_size, is_finite, pack
-from reference_impl.state import ORIENTATION, SPIN
-from reference_impl.threads import share_out
+from dropspin.reference_impl import lanes
+from dropspin.reference_impl.body import Body, World
+from dropspin.reference_impl.kernels import Parts, blocks, config, recording_kernel
+from dropspin.reference_impl.methods import Methods
+from dropspin.reference_impl.parameters import FRICTION, checked, ensemble_size, is_finite, pack
+from dropspin.reference_impl.state import ORIENTATION, SPIN
+from dropspin.reference_impl.threads import share_out
 
 Array = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """The layout of a state: 13 numbers, position [m], orientation [x, y, z, w], velocity [m/s], angular velocity [rad/s].
 
-The layout is that of `scenarios.state`, which this package cannot import; a test compares the two.
+The layout is that of `dropspin.scenarios.state`, which this package cannot import; a test compares the two.
 """
 
 POSITION = slice(0, 3)

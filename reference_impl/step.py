@@ -6,8 +6,8 @@ Order: 1 for the translation under gravity, as semi-implicit Euler, and under da
 Source: H. Wang, Rigid Body Dynamics (lecture note), Algorithm 1.
 """
 
-from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import Vec3, any_, compiled, cross, row, transpose
+from dropspin.reference_impl.quaternion import rotation_matrix
+from dropspin.reference_impl.vectors import Vec3, any_, compiled, cross, row, transpose
 
 TRANSLATION_ORDER = 1.0
 DAMPING_ORDER = 1.0

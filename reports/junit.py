@@ -7,11 +7,11 @@ from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES
-from comparisons.results.provenance import versions_behind
-from comparisons.results.results import Results
-from reports.views.failures import reproduce, what_fails
-from reports.views.numbers import step, subject, word
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
+from dropspin.comparisons.results.provenance import versions_behind
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.views.failures import reproduce, what_fails
+from dropspin.reports.views.numbers import step, subject, word
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "known", "limited", "declined", "missing"}
 

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 
-from comparisons.regressions.checking import Checked
-from comparisons.regressions.comparing import Changes
-from comparisons.results.provenance import versions_behind
-from comparisons.results.results import Results
-from reports.pages import page
-from reports.views import check, compare
-from reports.views.failures import Failure, grouped
-from reports.views.run import Overview
+from dropspin.comparisons.regressions.checking import Checked
+from dropspin.comparisons.regressions.comparing import Changes
+from dropspin.comparisons.results.provenance import versions_behind
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.pages import page
+from dropspin.reports.views import check, compare
+from dropspin.reports.views.failures import Failure, grouped
+from dropspin.reports.views.run import Overview
 
 MOST_SENTENCES = 24
 """Largest number of sentences on the failures of one engine in a summary; JUnit and JSON have all failures."""

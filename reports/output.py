@@ -7,8 +7,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from comparisons.results.output import unfinished_folder
-from scenarios import DropspinError
+from dropspin.comparisons.results.output import unfinished_folder
+from dropspin.scenarios import DropspinError
 
 SECTION = "section.json"
 """The file from which a report reads a study."""

@@ -8,8 +8,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from comparisons.judging.verdicts import MARKS
-from reports.views import numbers
+from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.reports.views import numbers
 
 
 def page(template: str, **content: Any) -> str:
@@ -20,7 +20,7 @@ def page(template: str, **content: Any) -> str:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("reports"),
+        loader=PackageLoader("dropspin.reports"),
         autoescape=select_autoescape(enabled_extensions=("html",), disabled_extensions=("md",), default=True),
         keep_trailing_newline=True,
         undefined=StrictUndefined,

@@ -6,20 +6,20 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
-from comparisons.results.output import OLD, unfinished_folder
-from comparisons.results.results import Results
-from comparisons.results.run_file import ARRAY_FILE, FILE, parsed
-from comparisons.results.store import load_results, save
-from comparisons.results.stored_files import read_stored
-from reports.html.report import html_report
-from reports.junit import junit_xml
-from reports.markdown import run_markdown
-from reports.plots.chart import figure_of
-from reports.plots.figures import CHARTS, report_charts
-from reports.plots.svg import save_png, save_svg
-from reports.sections import Section
-from reports.views.run import overview
-from scenarios import DropspinError
+from dropspin.comparisons.results.output import OLD, unfinished_folder
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.run_file import ARRAY_FILE, FILE, parsed
+from dropspin.comparisons.results.store import load_results, save
+from dropspin.comparisons.results.stored_files import read_stored
+from dropspin.reports.html.report import html_report
+from dropspin.reports.junit import junit_xml
+from dropspin.reports.markdown import run_markdown
+from dropspin.reports.plots.chart import figure_of
+from dropspin.reports.plots.figures import CHARTS, report_charts
+from dropspin.reports.plots.svg import save_png, save_svg
+from dropspin.reports.sections import Section
+from dropspin.reports.views.run import overview
+from dropspin.scenarios import DropspinError
 
 OURS = frozenset(
     {"run.json", "results.parquet", "results.csv", "report.html", "report.md", "replay.html", "junit.xml", "plots"}

@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError
 
-from comparisons.results.stored_files import file_name, read_stored
-from reports.plots.chart import Chart, figure_of
-from reports.plots.chart_data import chart_data
-from reports.plots.stored_chart import StoredChart, StoredData
-from reports.plots.svg import save_svg
-from scenarios import DropspinError
-from scenarios.text import Text
-from scenarios.validation import first_problem
+from dropspin.comparisons.results.stored_files import file_name, read_stored
+from dropspin.reports.plots.chart import Chart, figure_of
+from dropspin.reports.plots.chart_data import chart_data
+from dropspin.reports.plots.stored_chart import StoredChart, StoredData
+from dropspin.reports.plots.svg import save_svg
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.text import Text
+from dropspin.scenarios.validation import first_problem
 
 FILE = "section.json"
 

@@ -5,22 +5,22 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.published.results import Result
-from comparisons.published.sources import Source
-from comparisons.regressions.history import History
-from comparisons.results.stored_files import file_name
-from comparisons.robustness.study import RobustnessStudy
-from comparisons.symmetries.findings import Finding
-from comparisons.tradeoff.points import TradeOff
-from reports.html.replay import replay_page
-from reports.markdown import history_markdown
-from reports.output import write_table
-from reports.plots.figures import history_figure, limits_charts, tradeoff_charts
-from reports.plots.svg import save_svg
-from reports.replay.motions import replay_together
-from reports.sections import Section
-from reports.views import history, limits, reproduce, symmetries, tradeoff
-from scenarios import Scenario, Trajectory
+from dropspin.comparisons.published.results import Result
+from dropspin.comparisons.published.sources import Source
+from dropspin.comparisons.regressions.history import History
+from dropspin.comparisons.results.stored_files import file_name
+from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.comparisons.symmetries.findings import Finding
+from dropspin.comparisons.tradeoff.points import TradeOff
+from dropspin.reports.html.replay import replay_page
+from dropspin.reports.markdown import history_markdown
+from dropspin.reports.output import write_table
+from dropspin.reports.plots.figures import history_figure, limits_charts, tradeoff_charts
+from dropspin.reports.plots.svg import save_svg
+from dropspin.reports.replay.motions import replay_together
+from dropspin.reports.sections import Section
+from dropspin.reports.views import history, limits, reproduce, symmetries, tradeoff
+from dropspin.scenarios import Scenario, Trajectory
 
 
 def write_limits(found: Sequence[RobustnessStudy], folder: Path) -> None:

@@ -31,17 +31,17 @@ A draw is repeated until its exact solution is known for the whole duration and 
 at least 16 steps of 4 ms; the body rotates by at most 0.1 rad in a step; and when one corner strikes the floor, every other corner is
 higher above the floor than the distance that the body falls in a step.
 
-Source of the exact solutions: `scenarios.truths`.
+Source of the exact solutions: `dropspin.scenarios.truths`.
 """
 
 import numpy as np
 
-from scenarios.errors import DropspinError, SceneError
-from scenarios.families import FAMILIES, Draws
-from scenarios.model import Scenario
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from scenarios.truths import Impact, truth_for
+from dropspin.scenarios.errors import DropspinError, SceneError
+from dropspin.scenarios.families import FAMILIES, Draws
+from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.truths import Impact, truth_for
 
 MOST_SCENES = 1000
 LARGEST_SEED = 2**64 - 1

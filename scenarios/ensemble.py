@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.drawing import uniform
-from scenarios.model import Ensemble, Scenario, unit
-from scenarios.rotations import about, multiply, rotate
-from scenarios.state import ORIENTATION, RATES
+from dropspin.scenarios.drawing import uniform
+from dropspin.scenarios.model import Ensemble, Scenario, unit
+from dropspin.scenarios.rotations import about, multiply, rotate
+from dropspin.scenarios.state import ORIENTATION, RATES
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Ten families of random scenes with exact solutions. The docstring of `scenarios.draw` states the distributions.
+"""Ten families of random scenes with exact solutions. The docstring of `dropspin.scenarios.draw` states the distributions.
 
 A family returns the content of a scene with the longest allowed duration, and the number of the impact after which the scene ends: 0 if it
 ends in the flight before the first impact, None if the scene lasts for the whole duration.
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.rotations import about, multiply, rotate
-from scenarios.state import UP
+from dropspin.scenarios.rotations import about, multiply, rotate
+from dropspin.scenarios.state import UP
 
 Array = NDArray[np.float64]
 Table = dict[str, Any]
@@ -236,7 +236,7 @@ def _height(body: Table, attitude: Array) -> float:
     """Height at which a body of this orientation touches the floor [m]."""
     from pydantic import TypeAdapter
 
-    from scenarios.body import Body
+    from dropspin.scenarios.body import Body
 
     made: Any = TypeAdapter(Body).validate_python(body)
     return made.rounding - float(rotate(attitude, made.vertices)[:, 1].min())

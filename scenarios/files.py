@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from scenarios.errors import DropspinError
+from dropspin.scenarios.errors import DropspinError
 
 
 def read_file(path: Path, given: str, what: str, largest: int) -> bytes:

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
-from scenarios.files import read_file
-from scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
-from scenarios.problems import scene_name
-from scenarios.validation import Alternatives, first_problem, shown
+from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
+from dropspin.scenarios.files import read_file
+from dropspin.scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
+from dropspin.scenarios.problems import scene_name
+from dropspin.scenarios.validation import Alternatives, first_problem, shown
 
 CATALOGUE = Path(__file__).parent / "catalogue"
 DRAWN = r"draw-([0-9]{1,20})-([0-9]{1,4})"
@@ -70,7 +70,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
-        from scenarios.draw import drawn_scene
+        from dropspin.scenarios.draw import drawn_scene
 
         return drawn_scene(*map(int, drawn.groups()))
     if isinstance(scene, str):

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import Scenario
-from scenarios.trajectory import Trajectory
+from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Components = tuple[Any, ...]

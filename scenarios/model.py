@@ -8,10 +8,10 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from scenarios.text import Prose, Text, joined, verify_line
+from dropspin.scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.text import Prose, Text, joined, verify_line
 
 TOUCHING = 1e-9
 """Height above the floor, relative to the size of the body, up to which the body counts as touching the floor."""
@@ -48,7 +48,7 @@ class Gravity(Table):
 class Floor(Table):
     """The plane y = 0, facing up.
 
-    `impact_law` is the model of an impact with a coefficient of friction: see `scenarios.truths.friction_impact`.
+    `impact_law` is the model of an impact with a coefficient of friction: see `dropspin.scenarios.truths.friction_impact`.
     """
 
     restitution: Annotated[Number, Field(ge=0, le=1)]
@@ -186,7 +186,7 @@ class Scenario(Table):
 
     @property
     def initial_state(self) -> Array:
-        """The state at t = 0, shape (13,), in the layout of `scenarios.state`."""
+        """The state at t = 0, shape (13,), in the layout of `dropspin.scenarios.state`."""
         start = self.start
         return np.array([*start.position, *start.orientation, *start.velocity, *start.angular_velocity])
 

@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from scenarios.errors import SceneError, did_you_mean
-from scenarios.model import Scenario
+from dropspin.scenarios.errors import SceneError, did_you_mean
+from dropspin.scenarios.model import Scenario
 
 INDEX = Path(__file__).parent / "problems.toml"
 IDENTIFIER = r"(?i)(ds-[0-9]+)(\.[0-9]+)?"

@@ -1,6 +1,6 @@
 """The layout of a state: 13 numbers, position [m], orientation [x, y, z, w], velocity [m/s], angular velocity [rad/s].
 
-`reference_impl.state`, which cannot import this package, defines the same layout; a test compares the two.
+`dropspin.reference_impl.state`, which cannot import this package, defines the same layout; a test compares the two.
 """
 
 import numpy as np

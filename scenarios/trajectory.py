@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Vertices
-from scenarios.loading import from_mapping
-from scenarios.mechanics import is_diagonal
-from scenarios.model import Scenario
-from scenarios.rotations import conjugate, multiply, rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.body import Vertices
+from dropspin.scenarios.loading import from_mapping
+from dropspin.scenarios.mechanics import is_diagonal
+from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.rotations import conjugate, multiply, rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 Array = NDArray[np.float64]
 

@@ -36,14 +36,14 @@ def uses_pybullet(item: pytest.Item) -> bool:
 def _timed_once():
     """Time the steps of engines once, not three times: no test asserts on a clock. Their processes are forked, and inherit it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("comparisons.running.engine_run.TIMING_REPEATS", 1)
+        patch.setattr("dropspin.comparisons.running.engine_run.TIMING_REPEATS", 1)
         yield
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _shared_functions():
     """Compile what all kernels of Wang's method share, 5 s without numba's cache: engine processes, which are forked, have it then."""
-    from comparisons.running.recording import simulate
+    from dropspin.comparisons.running.recording import simulate
 
     simulate("drop-box-corner", "document", 1e-2)
 
@@ -51,7 +51,7 @@ def _shared_functions():
 @pytest.fixture
 def few_start_phases(monkeypatch):
     """Four start phases instead of 32, for engines made for tests: they solve each start anew, and are as exact from each."""
-    monkeypatch.setattr("comparisons.running.start_phases.START_PHASES", 4)
+    monkeypatch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 4)
 
 
 @pytest.fixture(scope="session")
@@ -83,8 +83,8 @@ def core_run(shared) -> Path:
         from support.engines import QUICK
         from support.scenes import with_few_members
 
-        from comparisons.results.store import save
-        from comparisons.running.run import run
+        from dropspin.comparisons.results.store import save
+        from dropspin.comparisons.running.run import run
 
         save(run(map(with_few_members, QUICK), ["document", "mujoco", "pybullet"]), folder)
 

@@ -4,14 +4,17 @@ import ast
 import importlib
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 import dropspin
 
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("scenarios", "reference_impl", "comparisons", "reports")
 SLOW = {"numba", "pandas", "pyarrow", "matplotlib", "mujoco", "pybullet", "scipy.stats", "scipy.spatial", "scipy.optimize"}
-EVERYTHING = {"click", "numpy", "pandas", "pydantic", "rich", "scipy", "scenarios", "comparisons", "reports", "reference_impl"}
+EVERYTHING = {"click", "numpy", "pandas", "pydantic", "rich", "scipy", *(f"dropspin.{name}" for name in PACKAGES)}
 COMMAND = "import sys, os\nsys.argv = ['dropspin', *{!r}]\nimport dropspin\ntry:\n    dropspin.main()\nexcept SystemExit:\n    pass\n"
 
 
@@ -26,13 +29,13 @@ def modules_after(program):
     [
         ("import dropspin", EVERYTHING),
         ("import dropspin; dir(dropspin)", EVERYTHING),
-        ("import dropspin; dropspin.load", SLOW | {"scipy", "comparisons", "reports", "rich"}),
-        ("import scenarios", SLOW | {"scipy", "mpmath"}),
-        ("import reference_impl", {"mujoco", "pybullet", "pandas", "pydantic", "scenarios"}),
-        ("import comparisons", SLOW | {"jinja2", "rich", "reports"}),
-        ("import reports", SLOW | {"jinja2", "rich"}),
-        ("import dropspin_pytest", EVERYTHING | {"tomlkit", "filelock"}),
-        (COMMAND.format(["--help"]), EVERYTHING - {"click", "reports"}),
+        ("import dropspin; dropspin.load", SLOW | {"scipy", "dropspin.comparisons", "dropspin.reports", "rich"}),
+        ("from dropspin import scenarios", SLOW | {"scipy", "mpmath"}),
+        ("from dropspin import reference_impl", {"mujoco", "pybullet", "pandas", "pydantic", "dropspin.scenarios"}),
+        ("from dropspin import comparisons", SLOW | {"jinja2", "rich", "dropspin.reports"}),
+        ("from dropspin import reports", SLOW | {"jinja2", "rich"}),
+        ("import dropspin.pytest_plugin", EVERYTHING | {"tomlkit", "filelock"}),
+        (COMMAND.format(["--help"]), EVERYTHING - {"click", "dropspin.reports"}),
         (COMMAND.format(["list"]), SLOW | {"scipy", "jinja2"}),
         (COMMAND.format(["list", "metrics"]), SLOW | {"scipy", "jinja2"}),
         (COMMAND.format(["show", "drop-ball"]), SLOW | {"scipy", "jinja2"}),
@@ -71,9 +74,24 @@ def test_imports_for_type_checkers_agree_with_those_at_run_time():
         assert getattr(found, "__module__", module) in (module, "builtins"), f"{name} is defined in another module"
 
 
+def test_no_file_is_loaded_under_two_names():
+    """The four packages stand at the root of a checkout, which is on the path, and are linked into `dropspin`."""
+    assert all(getattr(dropspin, name) is not None for name in dropspin.__all__)
+    loaded = [Path(file).resolve() for module in list(sys.modules.values()) if (file := getattr(module, "__file__", None))]
+    files = Counter(file for file in loaded if any(file.is_relative_to(ROOT / package) for package in PACKAGES))
+    assert len(files) > 100
+    assert set(files.values()) == {1}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_import_by_an_earlier_name_says_the_new_one(package):
+    with pytest.raises(ImportError, match=f"import dropspin.{package}, not {package}"):
+        importlib.import_module(package)
+
+
 @pytest.mark.parametrize("package", ["scenarios", "reference_impl"])
 def test_names_of_a_package_exist(package):
-    module = importlib.import_module(package)
+    module = importlib.import_module(f"dropspin.{package}")
     assert module.__doc__
     for name in module.__all__:
         assert getattr(module, name) is not None

@@ -5,9 +5,9 @@ import pytest
 import support.detection_power
 from support.detection_power import FAULTS, SEQUENTIAL, SIZES, failures, faulty_engine, smallest_caught, sound_engine
 
-from comparisons.running.recording import record
-from scenarios import load
-from scenarios.state import SPIN, VELOCITY
+from dropspin.comparisons.running.recording import record
+from dropspin.scenarios import load
+from dropspin.scenarios.state import SPIN, VELOCITY
 
 FAULT = {fault.title: fault for fault in FAULTS}
 

@@ -14,11 +14,11 @@ import pandas as pd
 import pytest
 from support.cli import DROPSPIN
 
-from comparisons.regressions.baseline import load_baseline
-from comparisons.results.store import load_results
-from comparisons.sweeps.running import read_sweep
-from reports.sections import read_section
-from scenarios import DropspinError
+from dropspin.comparisons.regressions.baseline import load_baseline
+from dropspin.comparisons.results.store import load_results
+from dropspin.comparisons.sweeps.running import read_sweep
+from dropspin.reports.sections import read_section
+from dropspin.scenarios import DropspinError
 
 SIGNALS = 30
 """Of each kind to each command."""

@@ -12,8 +12,7 @@ import pytest
 from support.cli import dropspin
 from support.repositories import ENGINES, SCENE_TEST, fill, options
 
-import dropspin_pytest
-import scenarios
+from dropspin import pytest_plugin, scenarios
 
 pytest_plugins = ["pytester"]
 
@@ -31,7 +30,7 @@ def _imported(tmp_path_factory):
 @pytest.fixture
 def repository(pytester, monkeypatch):
     """A user's repository with engines and a scene; the plugin's command runs in this process."""
-    monkeypatch.setattr(dropspin_pytest.Runs, "_dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=runs.root))
+    monkeypatch.setattr(pytest_plugin.Runs, "_dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=runs.root))
     return fill(pytester)
 
 
@@ -157,7 +156,7 @@ def test_value_of_a_metric():
     rows = [row | {"engine": "mine", "dt": 0.002, "value": None}, row | {"engine": "mine", "dt": 0.004, "value": 0.5}]
     rows += [row | {"engine": "other", "dt": 0.004, "value": 0.25}, {"engine": "shy", "kind": "", "metric": ""}]
     rows[-1] |= {"verdict": "declined", "reason": "I do not spin"}
-    result = dropspin_pytest.Result("spin", rows, Path("out"), "spin", {}, ())
+    result = pytest_plugin.Result("spin", rows, Path("out"), "spin", {}, ())
     assert result.value("energy_error", engine="mine", dt=0.004) == 0.5
     assert result.value("energy_error", engine="other") == 0.25
     assert str(result.value("energy_error", engine="mine")) == "nan"

@@ -23,7 +23,7 @@ def repository(pytester):
 
 SLOW_COMMAND = """
 import json, subprocess, time
-import dropspin_pytest
+from dropspin import pytest_plugin
 
 def command(runs, *arguments):
     print(*arguments, file=open("commands.log", "a"))
@@ -35,7 +35,7 @@ def command(runs, *arguments):
     row |= {"value": 0.002, "lower": None, "upper": 1e-6, "unit": "1", "verdict": "failed", "reason": "nothing changes"}
     return subprocess.CompletedProcess([], 1, json.dumps([row, row | {"metric": "energy_drift", "verdict": "passed"}]), "")
 
-dropspin_pytest.Runs._dropspin = command
+pytest_plugin.Runs._dropspin = command
 """
 
 
@@ -100,7 +100,7 @@ def test_unused_plugin_imports_and_writes_nothing(repository):
         import sys
 
         def test_own():
-            assert not {"numpy", "pandas", "click", "filelock", "tomlkit", "scenarios", "reports"} & set(sys.modules)
+            assert not {"numpy", "pandas", "click", "filelock", "tomlkit", "dropspin.scenarios", "dropspin.reports"} & set(sys.modules)
         """
     )
     for arguments in ([], ["-p", "no:dropspin"], ["-p", "no:cacheprovider", "-n", "1"]):

@@ -7,20 +7,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
-from comparisons.conformance.probes import DT
-from comparisons.conformance.protocol import ROUNDING, relative_difference
-from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, RICHEST, accepted_scene
-from comparisons.engines.base import BatchSimulation, Engine, numpy_array
-from comparisons.faults.fault_model import changed_table
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.recording import record
-from comparisons.running.start_phases import START_PHASES
-from comparisons.running.verification import BuildMismatch, verified_batch, verify_starts
-from comparisons.symmetries.findings import STEP_MULTIPLE, Finding, judged
-from comparisons.symmetries.study import batch_member, effects_of_rounding
-from scenarios import Scenario
-from scenarios.transformations import whole_steps
+from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
+from dropspin.comparisons.conformance.probes import DT
+from dropspin.comparisons.conformance.protocol import ROUNDING, relative_difference
+from dropspin.comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, RICHEST, accepted_scene
+from dropspin.comparisons.engines.base import BatchSimulation, Engine, numpy_array
+from dropspin.comparisons.faults.fault_model import changed_table
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.start_phases import START_PHASES
+from dropspin.comparisons.running.verification import BuildMismatch, verified_batch, verify_starts
+from dropspin.comparisons.symmetries.findings import STEP_MULTIPLE, Finding, judged
+from dropspin.comparisons.symmetries.study import batch_member, effects_of_rounding
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.transformations import whole_steps
 
 Array = NDArray[np.float64]
 

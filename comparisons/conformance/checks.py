@@ -4,24 +4,24 @@ import tempfile
 from collections.abc import Callable, Sequence
 from typing import cast
 
-from comparisons.conformance.batches import check_batches
-from comparisons.conformance.clock import check_time, check_velocity_lag
-from comparisons.conformance.compilation import check_compilation
-from comparisons.conformance.exceptions import described, whole_traceback
-from comparisons.conformance.isolation import check_files, check_repeats
-from comparisons.conformance.motion import check_motion
-from comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckResult, Declined
-from comparisons.conformance.probes import PROBES
-from comparisons.conformance.protocol import check_builds, check_claims, check_record, check_refusals, check_settings, check_states
-from comparisons.conformance.symmetries import check_symmetries
-from comparisons.conformance.waiting import check_waiting
-from comparisons.engines.base import Diverged, Engine
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import present_entry
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.verification import BuildMismatch
-from scenarios.errors import UnknownName
+from dropspin.comparisons.conformance.batches import check_batches
+from dropspin.comparisons.conformance.clock import check_time, check_velocity_lag
+from dropspin.comparisons.conformance.compilation import check_compilation
+from dropspin.comparisons.conformance.exceptions import described, whole_traceback
+from dropspin.comparisons.conformance.isolation import check_files, check_repeats
+from dropspin.comparisons.conformance.motion import check_motion
+from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckResult, Declined
+from dropspin.comparisons.conformance.probes import PROBES
+from dropspin.comparisons.conformance.protocol import check_builds, check_claims, check_record, check_refusals, check_settings, check_states
+from dropspin.comparisons.conformance.symmetries import check_symmetries
+from dropspin.comparisons.conformance.waiting import check_waiting
+from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.verification import BuildMismatch
+from dropspin.scenarios.errors import UnknownName
 
 CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
     "compilation": check_compilation,

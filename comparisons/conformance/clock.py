@@ -7,12 +7,12 @@ import numpy as np
 from numpy.polynomial.polynomial import polyfit
 from numpy.typing import NDArray
 
-from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
-from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene, few_steps, recorded
-from comparisons.engines.base import Engine
-from scenarios import Scenario, Trajectory, truth_for
-from scenarios.rotations import angle_between_orientations
-from scenarios.state import ORIENTATION, POSITION, VELOCITY
+from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
+from dropspin.comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene, few_steps, recorded
+from dropspin.comparisons.engines.base import Engine
+from dropspin.scenarios import Scenario, Trajectory, truth_for
+from dropspin.scenarios.rotations import angle_between_orientations
+from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY
 
 Array = NDArray[np.float64]
 

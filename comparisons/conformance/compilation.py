@@ -1,11 +1,11 @@
 """The check of compilation: what the first simulation of a scene takes longer than the second."""
 
-from comparisons.conformance.outcomes import CheckResult
-from comparisons.conformance.probes import DT
-from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene
-from comparisons.engines.base import Engine
-from comparisons.running.recording import time_steps
-from scenarios.text import rounded
+from dropspin.comparisons.conformance.outcomes import CheckResult
+from dropspin.comparisons.conformance.probes import DT
+from dropspin.comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.running.recording import time_steps
+from dropspin.scenarios.text import rounded
 
 MUCH = 10.0
 """Compilation that should be stated [s], because it counts against limits of processor time otherwise."""

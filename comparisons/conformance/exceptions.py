@@ -4,8 +4,8 @@ import os
 import sys
 import traceback
 
-from comparisons.engines import exceptions
-from comparisons.engines.base import Engine
+from dropspin.comparisons.engines import exceptions
+from dropspin.comparisons.engines.base import Engine
 
 
 def described(error: Exception, engine: Engine) -> str:

@@ -14,13 +14,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.probes import PROBES, Probe
-from comparisons.faults.conventions import CONVENTIONS
-from comparisons.faults.fault_model import Exact, FaultModel
-from comparisons.faults.flight import FLIGHT
-from comparisons.faults.impact import IMPACT
-from scenarios import Scenario
-from scenarios.body import Sphere
+from dropspin.comparisons.conformance.probes import PROBES, Probe
+from dropspin.comparisons.faults.conventions import CONVENTIONS
+from dropspin.comparisons.faults.fault_model import Exact, FaultModel
+from dropspin.comparisons.faults.flight import FLIGHT
+from dropspin.comparisons.faults.impact import IMPACT
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Sphere
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from contextlib import chdir
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.outcomes import CheckFailed, CheckResult
-from comparisons.conformance.probes import DT
-from comparisons.conformance.protocol import SEVERAL
-from comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene, advanced, recorded
-from comparisons.engines.base import Engine
+from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckResult
+from dropspin.comparisons.conformance.probes import DT
+from dropspin.comparisons.conformance.protocol import SEVERAL
+from dropspin.comparisons.conformance.short_runs import A_FEW_STEPS, accepted_scene, advanced, recorded
+from dropspin.comparisons.engines.base import Engine
 
 Array = NDArray[np.float64]
 

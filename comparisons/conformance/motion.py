@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.explanations import explain_motion
-from comparisons.conformance.outcomes import CheckResult, Declined
-from comparisons.conformance.probes import DT, PROBES, Probe, differences
-from comparisons.conformance.symptoms import symptoms
-from comparisons.engines.base import Engine, KnownLimitation
-from comparisons.running.recording import Breakdown, record, try_record
-from scenarios import truth_for
-from scenarios.truths import LAWS, Law
+from dropspin.comparisons.conformance.explanations import explain_motion
+from dropspin.comparisons.conformance.outcomes import CheckResult, Declined
+from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences
+from dropspin.comparisons.conformance.symptoms import symptoms
+from dropspin.comparisons.engines.base import Engine, KnownLimitation
+from dropspin.comparisons.running.recording import Breakdown, record, try_record
+from dropspin.scenarios import truth_for
+from dropspin.scenarios.truths import LAWS, Law
 
 Array = NDArray[np.float64]
 

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.exceptions import described
-from comparisons.conformance.explanations import explain_start
-from comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
-from comparisons.conformance.probes import DT, PROBES
-from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
-from comparisons.engines.base import Diverged, Engine
-from comparisons.running.verification import MULTIPLE, BuildMismatch, verified_record, verify_build, verify_start
-from scenarios import Scenario, load, names
+from dropspin.comparisons.conformance.exceptions import described
+from dropspin.comparisons.conformance.explanations import explain_start
+from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
+from dropspin.comparisons.conformance.probes import DT, PROBES
+from dropspin.comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
+from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.running.verification import MULTIPLE, BuildMismatch, verified_record, verify_build, verify_start
+from dropspin.scenarios import Scenario, load, names
 
 Array = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.outcomes import Declined
-from comparisons.conformance.probes import DT, PROBES
-from comparisons.engines.base import Engine
-from comparisons.running.recording import record
-from scenarios import Scenario, Trajectory, truth_for
+from dropspin.comparisons.conformance.outcomes import Declined
+from dropspin.comparisons.conformance.probes import DT, PROBES
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.running.recording import record
+from dropspin.scenarios import Scenario, Trajectory, truth_for
 
 Array = NDArray[np.float64]
 

@@ -1,16 +1,16 @@
 """The check of symmetries: peculiarities of an engine that exact solutions may not show."""
 
-from comparisons.conformance.outcomes import CheckResult, Declined
-from comparisons.conformance.probes import DT
-from comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
-from comparisons.engines.base import Engine
-from comparisons.measuring.symmetries import SYMMETRIES
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.recording import record
-from comparisons.symmetries.findings import Finding
-from comparisons.symmetries.study import findings_of
-from scenarios.text import counted
-from scenarios.transformations import whole_steps
+from dropspin.comparisons.conformance.outcomes import CheckResult, Declined
+from dropspin.comparisons.conformance.probes import DT
+from dropspin.comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.measuring.symmetries import SYMMETRIES
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.symmetries.findings import Finding
+from dropspin.comparisons.symmetries.study import findings_of
+from dropspin.scenarios.text import counted
+from dropspin.scenarios.transformations import whole_steps
 
 
 def check_symmetries(engine: Engine, check: str) -> CheckResult:

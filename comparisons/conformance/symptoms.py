@@ -6,12 +6,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.conformance.probes import Probe, differences
-from comparisons.measuring.comparison import Comparison
-from comparisons.measuring.metrics import METRICS
-from scenarios import Scenario, Trajectory, truth_for
-from scenarios.state import RATES, SPIN, VELOCITY
-from scenarios.text import rounded
+from dropspin.comparisons.conformance.probes import Probe, differences
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.scenarios import Scenario, Trajectory, truth_for
+from dropspin.scenarios.state import RATES, SPIN, VELOCITY
+from dropspin.scenarios.text import rounded
 
 Array = NDArray[np.float64]
 

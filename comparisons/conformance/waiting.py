@@ -3,13 +3,13 @@
 import time
 from itertools import pairwise
 
-from comparisons.conformance.outcomes import CheckFailed, CheckResult
-from comparisons.conformance.probes import DT
-from comparisons.conformance.protocol import relative_difference
-from comparisons.conformance.short_runs import accepted_scene
-from comparisons.engines.base import Engine, Simulation
-from scenarios import Scenario
-from scenarios.text import rounded
+from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckResult
+from dropspin.comparisons.conformance.probes import DT
+from dropspin.comparisons.conformance.protocol import relative_difference
+from dropspin.comparisons.conformance.short_runs import accepted_scene
+from dropspin.comparisons.engines.base import Engine, Simulation
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.text import rounded
 
 LONG_ENOUGH = 0.02
 """Wall time of the steps [s]; a shorter one could be hidden by the time that it takes to read a state."""

@@ -11,9 +11,7 @@ from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
-PACKAGE, PROTOCOL = "comparisons.engines", "base"
-HOME = Path(__file__).parents[2]
-OWN = tuple(HOME / name for name in ("comparisons", "reference_impl", "reports", "scenarios", "dropspin.py"))
+PACKAGE, PROTOCOL = "dropspin.comparisons.engines", "base"
 INSTALLED = frozenset({"site-packages", "dist-packages"})
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))
 
@@ -34,7 +32,7 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
         file = Path(inspect.getfile(adapter)).resolve()
     except (OSError, TypeError):
         return None
-    if file.is_relative_to(HOME / "comparisons"):
+    if adapter.__module__.startswith(f"{PACKAGE}."):
         return built_in_code(file)
     files: dict[Path, None] = {file: None}
     _add_imports(files, file, adapter.__module__)
@@ -110,6 +108,8 @@ def _imports(tree: ast.Module, package: str) -> Iterator[str]:
 def _file(name: str) -> Path | None:
     """The source file of a module; None if the module is installed, built into Python, a part of dropspin, or not found."""
     top = name.partition(".")[0]
+    if top == "dropspin":
+        return None
     if name != top and _file(top) is None:
         return None  # asking for a submodule imports its package
     module = sys.modules.get(name)
@@ -121,5 +121,5 @@ def _file(name: str) -> Path | None:
     if not isinstance(place, str) or not Path(place).is_file():
         return None
     file = Path(place).resolve()
-    installed = INSTALLED.intersection(file.parts) or any(file.is_relative_to(folder) for folder in (*STANDARD, *OWN))
+    installed = INSTALLED.intersection(file.parts) or any(file.is_relative_to(folder) for folder in STANDARD)
     return None if installed else file

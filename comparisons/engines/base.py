@@ -14,12 +14,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.npm_packages import is_npm, npm_version
-from comparisons.measuring.symmetries import REPRESENTED
-from scenarios import Scenario, Truth
-from scenarios.body import Box, Sphere
-from scenarios.errors import DropspinError, UnknownName
-from scenarios.validation import shown
+from dropspin.comparisons.engines.npm_packages import is_npm, npm_version
+from dropspin.comparisons.measuring.symmetries import REPRESENTED
+from dropspin.scenarios import Scenario, Truth
+from dropspin.scenarios.body import Box, Sphere
+from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.validation import shown
 
 Array = NDArray[np.float64]
 

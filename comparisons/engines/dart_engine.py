@@ -5,13 +5,13 @@ from typing import Any, ClassVar
 import dartpy as dart
 import numpy as np
 
-from comparisons.engines import base
-from comparisons.engines.base import FLOOR_HALF_SIZE, AsBuilt, Diverged, Engine, KnownLimitation, Simulation, version
-from scenarios.body import Array, Box
-from scenarios.model import Floor, Scenario
-from scenarios.rotations import cross, rotate
-from scenarios.state import ORIENTATION, SPIN
-from scenarios.transformations import heavy_neighbour
+from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE, AsBuilt, Diverged, Engine, KnownLimitation, Simulation, version
+from dropspin.scenarios.body import Array, Box
+from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.rotations import cross, rotate
+from dropspin.scenarios.state import ORIENTATION, SPIN
+from dropspin.scenarios.transformations import heavy_neighbour
 
 REASONS = {
     "deactivation": "never falls asleep; else a block that tips over more slowly than 0.05 rad/s stops halfway",

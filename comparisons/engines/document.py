@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-import reference_impl
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, may_tumble, version
-from comparisons.measuring.predictions import bounce_error, flight_error
-from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
-from scenarios import DropspinError, Scenario, Truth
-from scenarios.body import Body, Box, Sphere, Vertices
-from scenarios.model import differ_in_start_alone, initial_states
+from dropspin import reference_impl
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, may_tumble, version
+from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
+from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+from dropspin.scenarios import DropspinError, Scenario, Truth
+from dropspin.scenarios.body import Body, Box, Sphere, Vertices
+from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 
 class Document(Engine):

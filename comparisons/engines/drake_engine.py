@@ -12,12 +12,12 @@ from pydrake.multibody.tree import QuaternionFloatingJoint, RotationalInertia, S
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from comparisons.engines import base
-from comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
-from scenarios.body import Array
-from scenarios.model import Floor, Scenario
-from scenarios.state import ORIENTATION
-from scenarios.transformations import heavy_neighbour
+from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
+from dropspin.scenarios.body import Array
+from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.state import ORIENTATION
+from dropspin.scenarios.transformations import heavy_neighbour
 
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 

@@ -1,6 +1,6 @@
 """An exception of an adapter as text: its own text may be anything, or raise."""
 
-from scenarios.text import printable
+from dropspin.scenarios.text import printable
 
 LONGEST = 1000
 

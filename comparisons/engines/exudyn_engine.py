@@ -7,9 +7,9 @@ import numpy as np
 from exudyn import utilities as items
 from scipy.spatial.transform import Rotation
 
-from comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
-from scenarios.body import Array
-from scenarios.model import Scenario
+from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
+from dropspin.scenarios.body import Array
+from dropspin.scenarios.model import Scenario
 
 INTEGRATORS = {
     "generalized-alpha": ("GeneralizedAlpha", 2.0),

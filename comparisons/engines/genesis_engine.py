@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import genesis
 import numpy as np
 
-from comparisons.engines.base import (
+from dropspin.comparisons.engines.base import (
     FLOOR_HALF_SIZE,
     Array,
     AsBuilt,
@@ -21,11 +21,11 @@ from comparisons.engines.base import (
     refusal_of_shape,
     version,
 )
-from comparisons.engines.mujoco_simulation import from_world, to_world
-from comparisons.engines.one_world import OneWorld
-from scenarios import Scenario
-from scenarios.body import Sphere
-from scenarios.model import initial_states
+from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
+from dropspin.comparisons.engines.one_world import OneWorld
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.model import initial_states
 
 INTEGRATORS = {"approximate_implicitfast": "approximate_implicitfast", "euler": "Euler"}
 PRECISIONS = {"float32": "32", "float64": "64"}

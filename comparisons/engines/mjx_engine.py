@@ -13,14 +13,14 @@ import jax
 import numpy as np
 from jax import numpy as jnp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
-from comparisons.engines.mujoco_engine import MuJoCo
-from comparisons.engines.mujoco_limitations import limitations_met
-from comparisons.engines.mujoco_ports import Port, built, ported_model
-from comparisons.engines.mujoco_simulation import from_world, to_world
-from comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
-from scenarios import Scenario
-from scenarios.model import differ_in_start_alone, initial_states
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
+from dropspin.comparisons.engines.mujoco_engine import MuJoCo
+from dropspin.comparisons.engines.mujoco_limitations import limitations_met
+from dropspin.comparisons.engines.mujoco_ports import Port, built, ported_model
+from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
+from dropspin.comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 with redirect_stdout(StringIO()):  # it prints that Warp is not installed, which it does not need
     from mujoco import mjx

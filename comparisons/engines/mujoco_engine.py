@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from comparisons.engines.base import (
+from dropspin.comparisons.engines.base import (
     LATE_IMPACTS,
     MIDPOINT_GYROSCOPIC,
     PROFILES,
@@ -19,16 +19,24 @@ from comparisons.engines.base import (
     refusal_of_floor,
     refusal_of_shape,
 )
-from comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
-from comparisons.engines.mujoco_model import INTEGRATORS, Form, calibrated_specification, default_specification
-from comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
-from comparisons.engines.mujoco_versions import BATCHES, flight_of, numbers_of, refusal, refusal_of_boxes, refusal_of_meshes, solver
-from comparisons.engines.programs import can_be_pasted, rendered
-from comparisons.measuring.predictions import bounce_error, flight_error
-from scenarios import DropspinError, Scenario, Truth
-from scenarios.body import Box, Sphere, Vertices
-from scenarios.mechanics import is_diagonal
-from scenarios.model import differ_in_start_alone
+from dropspin.comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
+from dropspin.comparisons.engines.mujoco_model import INTEGRATORS, Form, calibrated_specification, default_specification
+from dropspin.comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
+from dropspin.comparisons.engines.mujoco_versions import (
+    BATCHES,
+    flight_of,
+    numbers_of,
+    refusal,
+    refusal_of_boxes,
+    refusal_of_meshes,
+    solver,
+)
+from dropspin.comparisons.engines.programs import can_be_pasted, rendered
+from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
+from dropspin.scenarios import DropspinError, Scenario, Truth
+from dropspin.scenarios.body import Box, Sphere, Vertices
+from dropspin.scenarios.mechanics import is_diagonal
+from dropspin.scenarios.model import differ_in_start_alone
 
 VERSION = numbers_of(mujoco.__version__)
 LEAST_OF_A_SPRING = 0.01  # restitution; the damping ratio there is 5, and a contact that is damped more hardly pushes

@@ -5,13 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Array, KnownLimitation
-from comparisons.engines.mujoco_contact import IMPEDANCE
-from scenarios import Scenario
-from scenarios.mechanics import angular_momentum, kinetic_energy
-from scenarios.rotations import cross, length, rotate, unrotate
-from scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
-from scenarios.trajectory import Trajectory
+from dropspin.comparisons.engines.base import Array, KnownLimitation
+from dropspin.comparisons.engines.mujoco_contact import IMPEDANCE
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
+from dropspin.scenarios.rotations import cross, length, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from dropspin.scenarios.trajectory import Trajectory
 
 AT_REST = 1e-3  # m/s; a slip that friction has stopped, and a body that rests, may still have this speed
 

@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import FLOOR_HALF_SIZE
-from scenarios import Scenario
-from scenarios.body import Box, Sphere, Vertices
-from scenarios.mechanics import is_diagonal, principal_axes
-from scenarios.transformations import heavy_neighbour
+from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Box, Sphere, Vertices
+from dropspin.scenarios.mechanics import is_diagonal, principal_axes
+from dropspin.scenarios.transformations import heavy_neighbour
 
 Array = NDArray[np.float64]
 

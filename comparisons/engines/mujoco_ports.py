@@ -5,14 +5,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from comparisons.engines.base import Array, AsBuilt, Engine
-from comparisons.engines.mujoco_contact import contact
-from comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
-from comparisons.engines.mujoco_engine import MuJoCo
-from comparisons.engines.mujoco_model import Form, calibrated_specification
-from comparisons.engines.mujoco_simulation import set_damping
-from scenarios import Scenario
-from scenarios.rotations import rotate
+from dropspin.comparisons.engines.base import Array, AsBuilt, Engine
+from dropspin.comparisons.engines.mujoco_contact import contact
+from dropspin.comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
+from dropspin.comparisons.engines.mujoco_engine import MuJoCo
+from dropspin.comparisons.engines.mujoco_model import Form, calibrated_specification
+from dropspin.comparisons.engines.mujoco_simulation import set_damping
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import rotate
 
 STICKING = 1e4
 """Friction of a floor that grips, in single precision; with 1e5 a gripping corner can become NaN in MJX, with 1e3 a turning box slips."""

@@ -9,14 +9,14 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, KnownLimitation, Simulation
-from comparisons.engines.mujoco_limitations import limitations_met
-from reference_impl.threads import usable_cores
-from scenarios import Scenario
-from scenarios.model import initial_states
-from scenarios.rotations import conjugate, rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from scenarios.transformations import heavy_neighbour
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, KnownLimitation, Simulation
+from dropspin.comparisons.engines.mujoco_limitations import limitations_met
+from dropspin.reference_impl.threads import usable_cores
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.model import initial_states
+from dropspin.scenarios.rotations import conjugate, rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.transformations import heavy_neighbour
 
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)

@@ -8,7 +8,7 @@ term explicit, .9260083 with it implicit, and 1 - 7e-15 with the midpoint rule.
 import re
 from collections.abc import Mapping
 
-from comparisons.engines.base import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
+from dropspin.comparisons.engines.base import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
 
 Version = tuple[int, ...]
 

@@ -10,14 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
-from comparisons.engines.mujoco_limitations import limitations_met
-from comparisons.engines.mujoco_ports import Port, built, ported_model
-from comparisons.engines.mujoco_simulation import from_world, to_world
-from comparisons.engines.one_world import OneWorld
-from scenarios import Scenario
-from scenarios.body import Vertices
-from scenarios.model import differ_in_start_alone, initial_states
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
+from dropspin.comparisons.engines.mujoco_limitations import limitations_met
+from dropspin.comparisons.engines.mujoco_ports import Port, built, ported_model
+from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
+from dropspin.comparisons.engines.one_world import OneWorld
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Vertices
+from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
 import mujoco_warp as mjw  # noqa: E402

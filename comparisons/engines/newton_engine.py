@@ -11,12 +11,21 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, Simulation, refusal_of_shape, version
-from comparisons.engines.newton_rounding import rounding_met
-from comparisons.engines.one_world import OneWorld
-from scenarios import Scenario
-from scenarios.body import Box, Sphere
-from scenarios.model import differ_in_start_alone, initial_states
+from dropspin.comparisons.engines.base import (
+    Array,
+    AsBuilt,
+    BatchSimulation,
+    Engine,
+    KnownLimitation,
+    Simulation,
+    refusal_of_shape,
+    version,
+)
+from dropspin.comparisons.engines.newton_rounding import rounding_met
+from dropspin.comparisons.engines.one_world import OneWorld
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Box, Sphere
+from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles
 import newton  # noqa: E402

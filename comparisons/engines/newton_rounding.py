@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from comparisons.engines.base import Array, KnownLimitation
-from scenarios import Scenario
-from scenarios.rotations import length
-from scenarios.state import SPIN, VELOCITY
+from dropspin.comparisons.engines.base import Array, KnownLimitation
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import length
+from dropspin.scenarios.state import SPIN, VELOCITY
 
 SPIN_GAINED = 3e-7
 """Share of ω in a step, at most; measured 1.9e-7 to 2.4e-7 with steps of 10 to 0.25 ms, about a principal axis."""

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from comparisons.engines.base import Array, AsBuilt, BatchSimulation, Simulation, numpy_array
-from scenarios import Scenario
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Simulation, numpy_array
+from dropspin.scenarios import Scenario
 
 
 class OneWorld(Simulation):

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from comparisons.engines.base import (
+from dropspin.comparisons.engines.base import (
     EXPLICIT_GYROSCOPIC,
     FLOOR_HALF_SIZE,
     IMPLICIT_GYROSCOPIC,
@@ -18,8 +18,8 @@ from comparisons.engines.base import (
     refusal_of_floor,
     refusal_of_shape,
 )
-from comparisons.engines.programs import can_be_pasted, rendered
-from comparisons.engines.pybullet_settings import (
+from dropspin.comparisons.engines.programs import can_be_pasted, rendered
+from dropspin.comparisons.engines.pybullet_settings import (
     FASTEST,
     REASONS,
     STRONGEST_FRICTION,
@@ -27,11 +27,11 @@ from comparisons.engines.pybullet_settings import (
     damping_properties,
     world_parameters,
 )
-from comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, Form, PyBulletSimulation
-from comparisons.measuring.predictions import bounce_error, flight_error
-from scenarios import DropspinError, Scenario, Truth
-from scenarios.body import Box, Vertices
-from scenarios.mechanics import is_diagonal
+from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, Form, PyBulletSimulation
+from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
+from dropspin.scenarios import DropspinError, Scenario, Truth
+from dropspin.scenarios.body import Box, Vertices
+from dropspin.scenarios.mechanics import is_diagonal
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
 FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision, and the body stops

@@ -6,7 +6,7 @@ the error reduction that adds penetration to the rebound, and the speed below wh
 
 import numpy as np
 
-from scenarios import Scenario
+from dropspin.scenarios import Scenario
 
 STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact to this
 FASTEST = 1e12  # m/s and rad/s; Bullet clamps the speeds of a multibody to 100 by default

@@ -12,19 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.engines.base import FLOOR_HALF_SIZE, Array, AsBuilt, KnownLimitation, Simulation, version
-from comparisons.engines.pybullet_settings import (
+from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE, Array, AsBuilt, KnownLimitation, Simulation, version
+from dropspin.comparisons.engines.pybullet_settings import (
     FASTEST,
     STRONGEST_FRICTION,
     contact_properties,
     damping_properties,
     world_parameters,
 )
-from scenarios import Scenario, Trajectory
-from scenarios.body import Box, Sphere, Vertices
-from scenarios.mechanics import angular_momentum, kinetic_energy
-from scenarios.state import SPIN, VELOCITY
-from scenarios.transformations import heavy_neighbour
+from dropspin.scenarios import Scenario, Trajectory
+from dropspin.scenarios.body import Box, Sphere, Vertices
+from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
+from dropspin.scenarios.state import SPIN, VELOCITY
+from dropspin.scenarios.transformations import heavy_neighbour
 
 ALMOST = 0.999
 NO_PUSH = 1e-6  # relative to what gravity adds in a step

@@ -14,15 +14,15 @@ import numpy as np
 import rapier3d
 from scipy.spatial.transform import Rotation
 
-from comparisons.engines import base
-from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, version
-from comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
-from comparisons.measuring.predictions import spins_steadily
-from scenarios import Scenario
-from scenarios.body import Sphere
-from scenarios.mechanics import principal_axes
-from scenarios.state import PARTS
-from scenarios.transformations import heavy_neighbour
+from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, version
+from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
+from dropspin.comparisons.measuring.predictions import spins_steadily
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.mechanics import principal_axes
+from dropspin.scenarios.state import PARTS
+from dropspin.scenarios.transformations import heavy_neighbour
 
 LARGEST = float(np.finfo(np.float32).max)
 FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapier's threads, which all worlds share

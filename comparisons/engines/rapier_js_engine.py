@@ -11,15 +11,15 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from comparisons.engines import base
-from comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
-from comparisons.engines.rapier_js_node import node
-from comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
-from scenarios import Scenario
-from scenarios.body import Sphere
-from scenarios.mechanics import principal_axes
-from scenarios.state import PARTS
-from scenarios.transformations import heavy_neighbour
+from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.rapier_js_node import node
+from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.mechanics import principal_axes
+from dropspin.scenarios.state import PARTS
+from dropspin.scenarios.transformations import heavy_neighbour
 
 NUMBERS = count()
 """Of the worlds in Node.js."""

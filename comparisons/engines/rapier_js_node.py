@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.engines.base import Array
-from comparisons.engines.npm_packages import npm_package
+from dropspin.comparisons.engines.base import Array
+from dropspin.comparisons.engines.npm_packages import npm_package
 
 PACKAGE = "@dimforge/rapier3d-compat"
 DRIVER = Path(__file__).with_suffix(".cjs")

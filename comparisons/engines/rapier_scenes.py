@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from comparisons.engines import base
-from scenarios import Scenario, truth_for
-from scenarios.body import Sphere
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION
+from dropspin.comparisons.engines import base
+from dropspin.scenarios import Scenario, truth_for
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION
 
 FRICTION = {"none": 0.0, "infinite": 1e6}
 WHY_FRICTION = f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution, because Rapier takes the average"

@@ -10,11 +10,11 @@ from importlib.util import find_spec
 from shutil import which
 from typing import NamedTuple, cast
 
-from comparisons.engines.base import Engine, EngineBroken, EngineMissing
-from comparisons.engines.exceptions import described
-from comparisons.engines.npm_packages import is_npm, npm_package
-from scenarios.errors import DropspinError, UnknownName
-from scenarios.validation import shown
+from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
+from dropspin.comparisons.engines.exceptions import described
+from dropspin.comparisons.engines.npm_packages import is_npm, npm_package
+from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.validation import shown
 
 
 class _Home(NamedTuple):
@@ -30,30 +30,32 @@ GROUP = "dropspin.engines"
 """The entry-point group in which other packages register engines: name = "module:Class"."""
 
 BUILT_IN = {
-    "document": _Home("comparisons.engines.document", "Document"),
-    "mujoco": _Home("comparisons.engines.mujoco_engine", "MuJoCo", "mujoco", "pip install mujoco"),
+    "document": _Home("dropspin.comparisons.engines.document", "Document"),
+    "mujoco": _Home("dropspin.comparisons.engines.mujoco_engine", "MuJoCo", "mujoco", "pip install mujoco"),
     "pybullet": _Home(
-        "comparisons.engines.pybullet_engine",
+        "dropspin.comparisons.engines.pybullet_engine",
         "PyBullet",
         "pybullet",
         "pip install pybullet (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)",
     ),
-    "rapier": _Home("comparisons.engines.rapier_engine", "Rapier", "rapier3d", "pip install 'dropspin[rapier]'"),
+    "rapier": _Home("dropspin.comparisons.engines.rapier_engine", "Rapier", "rapier3d", "pip install 'dropspin[rapier]'"),
     "rapier-js": _Home(
-        "comparisons.engines.rapier_js_engine",
+        "dropspin.comparisons.engines.rapier_js_engine",
         "RapierJS",
         "@dimforge/rapier3d-compat",
         "npm install @dimforge/rapier3d-compat, in the working folder or a folder above it",
     ),
-    "dart": _Home("comparisons.engines.dart_engine", "Dart", "dartpy", "pip install 'dropspin[dart]'"),
-    "drake": _Home("comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
-    "sapien": _Home("comparisons.engines.sapien_engine", "Sapien", "sapien", "pip install 'dropspin[sapien]'"),
-    "exudyn": _Home("comparisons.engines.exudyn_engine", "Exudyn", "exudyn", "pip install 'dropspin[exudyn]'"),
-    "jsbsim": _Home("comparisons.engines.jsbsim_engine", "JSBSim", "jsbsim", "pip install 'dropspin[jsbsim]'"),
-    "mjx": _Home("comparisons.engines.mjx_engine", "MJX", "jax", "pip install 'dropspin[mjx]'"),
-    "mujoco-warp": _Home("comparisons.engines.mujoco_warp_engine", "MuJoCoWarp", "mujoco_warp", "pip install 'dropspin[mujoco-warp]'"),
-    "newton": _Home("comparisons.engines.newton_engine", "Newton", "newton", "pip install 'dropspin[newton]'"),
-    "genesis": _Home("comparisons.engines.genesis_engine", "Genesis", "genesis", "pip install 'dropspin[genesis]'"),
+    "dart": _Home("dropspin.comparisons.engines.dart_engine", "Dart", "dartpy", "pip install 'dropspin[dart]'"),
+    "drake": _Home("dropspin.comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
+    "sapien": _Home("dropspin.comparisons.engines.sapien_engine", "Sapien", "sapien", "pip install 'dropspin[sapien]'"),
+    "exudyn": _Home("dropspin.comparisons.engines.exudyn_engine", "Exudyn", "exudyn", "pip install 'dropspin[exudyn]'"),
+    "jsbsim": _Home("dropspin.comparisons.engines.jsbsim_engine", "JSBSim", "jsbsim", "pip install 'dropspin[jsbsim]'"),
+    "mjx": _Home("dropspin.comparisons.engines.mjx_engine", "MJX", "jax", "pip install 'dropspin[mjx]'"),
+    "mujoco-warp": _Home(
+        "dropspin.comparisons.engines.mujoco_warp_engine", "MuJoCoWarp", "mujoco_warp", "pip install 'dropspin[mujoco-warp]'"
+    ),
+    "newton": _Home("dropspin.comparisons.engines.newton_engine", "Newton", "newton", "pip install 'dropspin[newton]'"),
+    "genesis": _Home("dropspin.comparisons.engines.genesis_engine", "Genesis", "genesis", "pip install 'dropspin[genesis]'"),
 }
 
 CURES = {
@@ -64,6 +66,8 @@ CURES = {
     r"partially initialized|cannot import name|No module named": "it is incomplete, or a file of the same name hides it; install it again",
 }
 """By what the import of a package says: what to do."""
+MOVED = frozenset({"scenarios", "reference_impl", "comparisons", "reports"})
+"""Packages of earlier versions that are parts of `dropspin` now."""
 
 
 def engine_names() -> list[str]:
@@ -170,6 +174,8 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
     except ModuleNotFoundError as error:
         if error.name is not None and f"{module_name}.".startswith(f"{error.name}."):
             raise DropspinError(f"engine {name!r}: no module {module_name!r} here or on Python's path.") from None
+        if error.name in MOVED:
+            raise EngineBroken(f"{name} cannot be used: it imports {error.name}, which is now dropspin.{error.name}.") from None
         raise EngineMissing(f"{name} needs the module {error.name}, which is not installed.") from None
     except (Exception, SystemExit) as error:
         raise EngineBroken(f"{name} cannot be used: its module {module_name} cannot be imported: {described(error)}.") from error

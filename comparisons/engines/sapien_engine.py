@@ -10,10 +10,19 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from comparisons.engines.base import SEMI_IMPLICIT_EULER, AsBuilt, Diverged, Engine, Simulation, may_tumble, refusal_of_shape, version
-from scenarios.body import Array, Body, Sphere
-from scenarios.mechanics import principal_axes
-from scenarios.model import Floor, Scenario
+from dropspin.comparisons.engines.base import (
+    SEMI_IMPLICIT_EULER,
+    AsBuilt,
+    Diverged,
+    Engine,
+    Simulation,
+    may_tumble,
+    refusal_of_shape,
+    version,
+)
+from dropspin.scenarios.body import Array, Body, Sphere
+from dropspin.scenarios.mechanics import principal_axes
+from dropspin.scenarios.model import Floor, Scenario
 
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message="Failed to find system libvulkan")  # of the renderer, which is not used

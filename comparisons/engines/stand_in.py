@@ -8,11 +8,11 @@ from typing import Annotated, Any, ClassVar, NoReturn
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from comparisons.engines.adapter_code import adapter_code
-from comparisons.engines.base import Engine, EngineBroken, NumericOption
-from scenarios import DropspinError, Scenario
-from scenarios.text import Text
-from scenarios.validation import validated
+from dropspin.comparisons.engines.adapter_code import adapter_code
+from dropspin.comparisons.engines.base import Engine, EngineBroken, NumericOption
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.text import Text
+from dropspin.scenarios.validation import validated
 
 LONGEST_SUMMARY = 500
 Short = Annotated[Text, Field(max_length=100)]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.faults.fault_model import (
+from dropspin.comparisons.faults.fault_model import (
     Change,
     FaultModel,
     Reported,
@@ -13,9 +13,9 @@ from comparisons.faults.fault_model import (
     unchanged_scene,
     unchanged_states,
 )
-from scenarios.rotations import about as rotation_about
-from scenarios.rotations import conjugate, multiply, rotate, unrotate
-from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
+from dropspin.scenarios.rotations import about as rotation_about
+from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
 
 Array = NDArray[np.float64]
 Messages = tuple[str, str, str]

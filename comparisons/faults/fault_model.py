@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import DropspinError, Scenario, truth_for
-from scenarios.state import ORIENTATION
+from dropspin.scenarios import DropspinError, Scenario, truth_for
+from dropspin.scenarios.state import ORIENTATION
 
 Array = NDArray[np.float64]
 Simulated = Callable[[Scenario], Scenario]

@@ -6,9 +6,9 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.faults.fault_model import FaultModel, Simulated, axis_names, changed_table, faults_of, moments_of_inertia
-from scenarios import Scenario
-from scenarios.model import Gravity
+from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, axis_names, changed_table, faults_of, moments_of_inertia
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.model import Gravity
 
 Array = NDArray[np.float64]
 

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from comparisons.faults.fault_model import Simulated, axis_names, changed_table, faults_of, moments_of_inertia
-from comparisons.faults.flight import ORDERS
-from scenarios import Scenario
-from scenarios.body import Box
+from dropspin.comparisons.faults.fault_model import Simulated, axis_names, changed_table, faults_of, moments_of_inertia
+from dropspin.comparisons.faults.flight import ORDERS
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Box
 
 SLOW = 0.2  # m/s; Bullet drops restitution below it
 

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from comparisons.judging.horizon import with_horizon
-from comparisons.judging.verdicts import Judgement
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metric import Metric
-from comparisons.measuring.metrics import METRICS
-from scenarios import Scenario, Trajectory, Truth
+from dropspin.comparisons.judging.horizon import with_horizon
+from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.metric import Metric
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.scenarios import Scenario, Trajectory, Truth
 
 NO_EVIDENCE = "no evidence"
 """The beginning of the reason if two engines agree because they use the same discretisation."""

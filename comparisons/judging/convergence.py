@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import KnownLimitation
-from comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget
-from comparisons.judging.verdicts import Cause, Judgement, Verdict, judge_asymptotic_error, with_limitations
-from comparisons.measuring.metric import Average, Metric
-from comparisons.measuring.tolerances import negligible, rounding
-from scenarios import Scenario
+from dropspin.comparisons.engines.base import KnownLimitation
+from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget
+from dropspin.comparisons.judging.verdicts import Cause, Judgement, Verdict, judge_asymptotic_error, with_limitations
+from dropspin.comparisons.measuring.metric import Average, Metric
+from dropspin.comparisons.measuring.tolerances import negligible, rounding
+from dropspin.scenarios import Scenario
 
 Array = NDArray[np.float64]
 

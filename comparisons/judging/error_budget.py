@@ -24,8 +24,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.judging.extrapolation import ORDERS, Posterior, extrapolate
-from comparisons.judging.series import (
+from dropspin.comparisons.judging.extrapolation import ORDERS, Posterior, extrapolate
+from dropspin.comparisons.judging.series import (
     ABOVE_NOISE,
     FEWEST_TIME_STEPS,
     SMALLEST_RATIO,
@@ -36,8 +36,8 @@ from comparisons.judging.series import (
     verified,
     verify_options,
 )
-from comparisons.judging.verdicts import Cause
-from scenarios.text import counted
+from dropspin.comparisons.judging.verdicts import Cause
+from dropspin.scenarios.text import counted
 
 Array = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.judging.mixtures import quantiles, student_t
+from dropspin.comparisons.judging.mixtures import quantiles, student_t
 
 Array = NDArray[np.float64]
 

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from comparisons.judging.verdicts import Judgement
-from comparisons.measuring.comparison import BeyondHorizon, Unresolved
-from comparisons.measuring.metric import Metric
-from scenarios import Scenario, Truth
+from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.measuring.comparison import BeyondHorizon, Unresolved
+from dropspin.comparisons.measuring.metric import Metric
+from dropspin.scenarios import Scenario, Truth
 
 
 def with_horizon(judgement: Judgement, scene: Scenario, metric: Metric, truth: Truth | None, unresolved: Unresolved | None) -> Judgement:

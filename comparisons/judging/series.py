@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.judging.extrapolation import ORDERS
-from scenarios import DropspinError
+from dropspin.comparisons.judging.extrapolation import ORDERS
+from dropspin.scenarios import DropspinError
 
 Array = NDArray[np.float64]
 

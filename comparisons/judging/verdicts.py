@@ -5,14 +5,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from comparisons.engines.base import EngineBroken, EngineMissing, KnownLimitation
-from comparisons.engines.registry import BUILT_IN, engine
-from comparisons.measuring.metric import Metric
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.tolerances import negligible
-from scenarios import DropspinError, Scenario, SceneError, Truth
-from scenarios.errors import did_you_mean
-from scenarios.model import Expectation
+from dropspin.comparisons.engines.base import EngineBroken, EngineMissing, KnownLimitation
+from dropspin.comparisons.engines.registry import BUILT_IN, engine
+from dropspin.comparisons.measuring.metric import Metric
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import negligible
+from dropspin.scenarios import DropspinError, Scenario, SceneError, Truth
+from dropspin.scenarios.errors import did_you_mean
+from dropspin.scenarios.model import Expectation
 
 Verdict = Literal[
     "passed", "failed", "known", "measured", "limited", "diverged", "crashed", "timed_out", "declined", "missing", "broken", "no_truth"

@@ -1,4 +1,4 @@
-"""Quantities at each state of many motions at once: the formulas of `scenarios.mechanics` in one compiled loop."""
+"""Quantities at each state of many motions at once: the formulas of `dropspin.scenarios.mechanics` in one compiled loop."""
 
 from collections.abc import Callable
 from functools import cache
@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring import motions
-from comparisons.measuring.motions import Array, Mask, Motions, RowNumbers, Setup, is_touching
-from scenarios import mechanics
-from scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
+from dropspin.comparisons.measuring import motions
+from dropspin.comparisons.measuring.motions import Array, Mask, Motions, RowNumbers, Setup, is_touching
+from dropspin.scenarios import mechanics
+from dropspin.scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
 
 REACH = 1.0 + 1e-9
 """Height of the centre of mass, relative to the size of the body, above which no point of it is below the floor."""
@@ -65,7 +65,7 @@ def _for_each(values: Array, size: int) -> NDArray[np.float64]:
 def _kernel() -> Callable[..., None]:
     from numba.extending import register_jitable
 
-    from reference_impl.kernels import compile_cached
+    from dropspin.reference_impl.kernels import compile_cached
 
     for formula in (*mechanics.FORMULAS, is_touching):
         register_jitable(formula)

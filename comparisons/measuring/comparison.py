@@ -15,12 +15,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.contacts import ContactResiduals, contact_residuals
-from comparisons.measuring.motions import Motions
-from scenarios import Scenario, Trajectory, Truth
-from scenarios.mechanics import angular_momentum, apex, energy, kinetic_energy
-from scenarios.model import TOUCHING
-from scenarios.rotations import rotate
+from dropspin.comparisons.measuring.contacts import ContactResiduals, contact_residuals
+from dropspin.comparisons.measuring.motions import Motions
+from dropspin.scenarios import Scenario, Trajectory, Truth
+from dropspin.scenarios.mechanics import angular_momentum, apex, energy, kinetic_energy
+from dropspin.scenarios.model import TOUCHING
+from dropspin.scenarios.rotations import rotate
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

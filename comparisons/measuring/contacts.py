@@ -26,11 +26,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.motions import Motions
-from scenarios import DropspinError, Scenario, Trajectory
-from scenarios.mechanics import angular_momentum
-from scenarios.rotations import length
-from scenarios.state import UP
+from dropspin.comparisons.measuring.motions import Motions
+from dropspin.scenarios import DropspinError, Scenario, Trajectory
+from dropspin.scenarios.mechanics import angular_momentum
+from dropspin.scenarios.rotations import length
+from dropspin.scenarios.state import UP
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import Scenario
-from scenarios.rotations import angle_between_orientations
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import angle_between_orientations
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 Array = NDArray[np.float64]
 

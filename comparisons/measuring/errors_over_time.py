@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.comparison import Comparison, Unresolved
-from scenarios.mechanics import energy
-from scenarios.rotations import angle_between_orientations, angle_between_vectors, length, rotation_vector
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.scenarios.mechanics import energy
+from dropspin.scenarios.rotations import angle_between_orientations, angle_between_vectors, length, rotation_vector
 
 Array = NDArray[np.float64]
 

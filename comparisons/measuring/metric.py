@@ -10,8 +10,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.comparison import Comparison, Unresolved
-from scenarios import Scenario, Truth
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.scenarios import Scenario, Truth
 
 Array = NDArray[np.float64]
 Measure = Callable[[Comparison], float | Array]

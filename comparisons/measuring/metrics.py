@@ -5,15 +5,15 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from comparisons.measuring import errors_over_time as errors
-from comparisons.measuring import requirements
-from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
-from comparisons.measuring.metric import Applies, Array, Components, Measure, Metric
-from comparisons.measuring.motions import Motions, at_rows
-from comparisons.measuring.stored_energy import energy_with_stored
-from scenarios import Scenario, Trajectory, Truth, truth_for
-from scenarios.mechanics import angular_momentum, apex
-from scenarios.rotations import angle_between_orientations, length
+from dropspin.comparisons.measuring import errors_over_time as errors
+from dropspin.comparisons.measuring import requirements
+from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
+from dropspin.comparisons.measuring.metric import Applies, Array, Components, Measure, Metric
+from dropspin.comparisons.measuring.motions import Motions, at_rows
+from dropspin.comparisons.measuring.stored_energy import energy_with_stored
+from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
+from dropspin.scenarios.mechanics import angular_momentum, apex
+from dropspin.scenarios.rotations import angle_between_orientations, length
 
 TURNED = 1e-3  # rad; a body that turns by less counts as not turning
 LANDING = 3  # steps, within which every engine has completed an impact

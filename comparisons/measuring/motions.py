@@ -12,10 +12,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.contact_runs import ContactRuns, contact_runs
-from scenarios import Scenario, Trajectory
-from scenarios.mechanics import Components, energy, energy_origin, kinetic_energy, lowest_height, scalar_product
-from scenarios.model import TOUCHING
+from dropspin.comparisons.measuring.contact_runs import ContactRuns, contact_runs
+from dropspin.scenarios import Scenario, Trajectory
+from dropspin.scenarios.mechanics import Components, energy, energy_origin, kinetic_energy, lowest_height, scalar_product
+from dropspin.scenarios.model import TOUCHING
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -230,7 +230,7 @@ def is_touching(before: Components, after: Components, dt: float, gravity: Compo
 
     Without contact, only gravity and damping change the velocity. A remaining change counts if it exceeds 1e-3 of the change by gravity,
     1e-6 of the speed (for engines in single precision) and twice the change by damping (because engines use different laws of damping). The
-    arithmetic is plain, as in `scenarios.mechanics`, for one step or for arrays of steps.
+    arithmetic is plain, as in `dropspin.scenarios.mechanics`, for one step or for arrays of steps.
     """
     x = after[0] - before[0] - dt * gravity[0]
     y = after[1] - before[1] - dt * gravity[1]

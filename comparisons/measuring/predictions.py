@@ -1,6 +1,6 @@
 """Predicted errors: the error of an integration scheme, where it follows from theory.
 
-Free flight: semi-implicit Euler has an exact discrete solution (`scenarios.discrete_flight`); the prediction is its error.
+Free flight: semi-implicit Euler has an exact discrete solution (`dropspin.scenarios.discrete_flight`); the prediction is its error.
 A body that falls flat from the height H and strikes the floor with the speed u has these relative errors, averaged over start phases:
 
     impact detected late, v⁺ = -e v⁻ - s g h     bounce height  -(1 - e)/2 u h/H,          restitution  -s g h/u
@@ -15,10 +15,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import METRICS
-from scenarios import Scenario, Trajectory, Truth, discrete_flight
-from scenarios.mechanics import angular_momentum
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.scenarios import Scenario, Trajectory, Truth, discrete_flight
+from dropspin.scenarios.mechanics import angular_momentum
 
 
 def flight_error(scene: Scenario, truth: Truth | None, metric: str, dt: float, *, exact_rotation: bool) -> float | None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from scenarios import Scenario, Truth
-from scenarios.state import RATES, SPIN
+from dropspin.scenarios import Scenario, Truth
+from dropspin.scenarios.state import RATES, SPIN
 
 
 def has_truth(scene: Scenario, truth: Truth | None) -> bool:

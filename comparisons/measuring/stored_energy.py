@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.contact_runs import RESOLVED, STEADY
-from comparisons.measuring.motions import Motions
+from dropspin.comparisons.measuring.contact_runs import RESOLVED, STEADY
+from dropspin.comparisons.measuring.motions import Motions
 
 Array = NDArray[np.float64]
 

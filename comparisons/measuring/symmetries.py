@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import Scenario
-from scenarios.rotations import about, conjugate
-from scenarios.state import POSITION, UP, VELOCITY
-from scenarios.transformations import (
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import about, conjugate
+from dropspin.scenarios.state import POSITION, UP, VELOCITY
+from dropspin.scenarios.transformations import (
     AWAY,
     REFLECTED,
     in_units,

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import Scenario
+from dropspin.scenarios import Scenario
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.published.printed import agreement
-from comparisons.published.results import EXACT, Result, Status, compared
-from comparisons.published.sources import DATA, Source
-from scenarios import Scenario, Truth, load, truth_for
-from scenarios.mechanics import kinetic_energy
-from scenarios.rotations import about, conjugate, rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN
-from scenarios.trajectory import Trajectory
+from dropspin.comparisons.published.printed import agreement
+from dropspin.comparisons.published.results import EXACT, Result, Status, compared
+from dropspin.comparisons.published.sources import DATA, Source
+from dropspin.scenarios import Scenario, Truth, load, truth_for
+from dropspin.scenarios.mechanics import kinetic_energy
+from dropspin.scenarios.rotations import about, conjugate, rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN
+from dropspin.scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 RATES = ("roll", "pitch", "yaw")

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import Scenario, Trajectory
-from scenarios.errors import UnknownName
-from scenarios.mechanics import angular_momentum, energy, kinetic_energy
+from dropspin.scenarios import Scenario, Trajectory
+from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.mechanics import angular_momentum, energy, kinetic_energy
 
 Array = NDArray[np.float64]
 Quantity = Callable[[Scenario, Trajectory], float]

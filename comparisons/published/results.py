@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from comparisons.judging.verdicts import Verdict
+from dropspin.comparisons.judging.verdicts import Verdict
 
 Status = Literal["reproduced", "differs", "error of the source", "not reproducible", "for comparison", "not run"]
 """Reproduced: the digits are equal, or the value is within the bound or tolerance that the source states. Differs: they are not, although

@@ -3,18 +3,18 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from comparisons.engines.mujoco_versions import numbers_of
-from comparisons.published.formulas import FORMULAS
-from comparisons.published.printed import ABSENT, SHOWN, agreement
-from comparisons.published.quantities import quantity
-from comparisons.published.results import Result, compared
-from comparisons.published.sources import Case, Group, Source, sources
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry, ignore
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import Breakdown, divergence, try_record
-from scenarios import Scenario
+from dropspin.comparisons.engines.mujoco_versions import numbers_of
+from dropspin.comparisons.published.formulas import FORMULAS
+from dropspin.comparisons.published.printed import ABSENT, SHOWN, agreement
+from dropspin.comparisons.published.quantities import quantity
+from dropspin.comparisons.published.results import Result, compared
+from dropspin.comparisons.published.sources import Case, Group, Source, sources
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown, divergence, try_record
+from dropspin.scenarios import Scenario
 
 RESOURCES = ResourceLimits(processor_time=60.0)
 

@@ -16,16 +16,16 @@ from tempfile import TemporaryDirectory
 from threading import Event
 from typing import Any
 
-from comparisons.engines.npm_packages import is_npm
-from comparisons.record.plan import Plan
-from comparisons.running.processes import Closed
-from scenarios import DropspinError, UnknownName
+from dropspin.comparisons.engines.npm_packages import is_npm
+from dropspin.comparisons.record.plan import Plan
+from dropspin.comparisons.running.processes import Closed
+from dropspin.scenarios import DropspinError, UnknownName
 
 POLL = 0.5  # s
 LONGEST_REASON = 300
 NOT_INSTALLABLE = "not installable"
 """The beginning of the reason why a release was not installed; another day it may be."""
-HOME = Path(__file__).parents[2]
+HOME = Path(__file__).parents[3]
 
 
 class NotMeasured(Exception):
@@ -98,7 +98,7 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
         request, answer = Path(folder, "request.json"), Path(folder, "answer.json")
         asked = {"package": own.package, "release": release, "labels": own.labels, "time_limit": time_limit}
         request.write_text(json.dumps(asked | {"scenes": plan.scenes_of(engine), "dts": plan.dts}), encoding="utf-8")
-        code, output = run([python, "-P", "-m", "comparisons.record.release", str(request), str(answer)], stopping)
+        code, output = run([python, "-P", "-m", "dropspin.comparisons.record.release", str(request), str(answer)], stopping)
         if code:
             raise NotMeasured(f"not runnable: exit code {code}: {without_paths(last_line(output))}")
         found: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))

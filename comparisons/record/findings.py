@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.mujoco_versions import numbers_of
-from comparisons.judging.convergence import ARTEFACTS, JUMPING
-from comparisons.measuring.metrics import METRICS, leading_metric
-from comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance
-from comparisons.record.plan import load_plan
-from comparisons.record.store import MACHINE, OTHERS, OWN, Row, stored
-from scenarios import DropspinError, load
-from scenarios.loading import names
+from dropspin.comparisons.engines.mujoco_versions import numbers_of
+from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
+from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance
+from dropspin.comparisons.record.plan import load_plan
+from dropspin.comparisons.record.store import MACHINE, OTHERS, OWN, Row, stored
+from dropspin.scenarios import DropspinError, load
+from dropspin.scenarios.loading import names
 
 MOST_DIGITS = 15.0
 """Digits of an error of 0: double precision has no more."""

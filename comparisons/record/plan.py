@@ -6,12 +6,12 @@ from pathlib import Path
 
 from pydantic import Field
 
-from comparisons.engines.mujoco_versions import numbers_of
-from comparisons.engines.npm_packages import is_npm
-from comparisons.results.stored_files import sha256
-from scenarios import load
-from scenarios.body import Table
-from scenarios.loading import read_toml
+from dropspin.comparisons.engines.mujoco_versions import numbers_of
+from dropspin.comparisons.engines.npm_packages import is_npm
+from dropspin.comparisons.results.stored_files import sha256
+from dropspin.scenarios import load
+from dropspin.scenarios.body import Table
+from dropspin.scenarios.loading import read_toml
 
 FILE = Path(__file__).with_name("plan.toml")
 NUMPY_1 = ["numpy<2", "pandas<3"]

@@ -1,4 +1,7 @@
-"""The program that measures a release in its environment: `python -m comparisons.record.release REQUEST ANSWER`, both files of JSON."""
+"""The program that measures a release in its environment.
+
+`python -m dropspin.comparisons.record.release REQUEST ANSWER`, both files of JSON.
+"""
 
 import json
 import sys
@@ -10,21 +13,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.engines.base import Diverged, Engine, version
-from comparisons.engines.registry import engine as engine_named
-from comparisons.engines.stand_in import code_of
-from comparisons.measuring.comparison import Comparison
-from comparisons.measuring.metrics import METRICS, leading_metric
-from comparisons.results.provenance import STAMPED
-from comparisons.results.stored_files import sha256
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import Breakdown, Recording, classify, divergence, record_batch, time_steps, try_record
-from comparisons.running.run import measure
-from comparisons.running.start_phases import StartPhase, start_phases
-from scenarios import Scenario, load, truth_for
+from dropspin.comparisons.engines.base import Diverged, Engine, version
+from dropspin.comparisons.engines.registry import engine as engine_named
+from dropspin.comparisons.engines.stand_in import code_of
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.results.provenance import STAMPED
+from dropspin.comparisons.results.stored_files import sha256
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown, Recording, classify, divergence, record_batch, time_steps, try_record
+from dropspin.comparisons.running.run import measure
+from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.scenarios import Scenario, load, truth_for
 
 Row = dict[str, Any]
 TIMING_REPEATS = 5

@@ -5,11 +5,11 @@ from pathlib import Path
 from threading import Event
 from typing import NamedTuple
 
-from comparisons.record.environments import NotMeasured, measured
-from comparisons.record.findings import Case, Release, read, release_of
-from comparisons.record.plan import Plan
-from comparisons.record.store import BLANK, MACHINE, machine
-from scenarios import DropspinError, UnknownName
+from dropspin.comparisons.record.environments import NotMeasured, measured
+from dropspin.comparisons.record.findings import Case, Release, read, release_of
+from dropspin.comparisons.record.plan import Plan
+from dropspin.comparisons.record.store import BLANK, MACHINE, machine
+from dropspin.scenarios import DropspinError, UnknownName
 
 NONE = Case("not measured", "", "", {})
 

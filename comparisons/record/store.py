@@ -18,13 +18,13 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from comparisons.judging.verdicts import VERDICTS
-from comparisons.measuring.metrics import METRICS
-from comparisons.record.environments import NOT_INSTALLABLE, without_paths
-from comparisons.results.output import written_whole
-from comparisons.results.provenance import processor
-from comparisons.results.stored_files import read_stored, sha256
-from scenarios import DropspinError
+from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.record.environments import NOT_INSTALLABLE, without_paths
+from dropspin.comparisons.results.output import written_whole
+from dropspin.comparisons.results.provenance import processor
+from dropspin.comparisons.results.stored_files import read_stored, sha256
+from dropspin.scenarios import DropspinError
 
 Row = Mapping[str, Any]
 OWN, OTHERS = "origin=own", "origin=unsigned"

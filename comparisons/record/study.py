@@ -8,14 +8,14 @@ from pathlib import Path
 from threading import Event
 from typing import Any, NamedTuple
 
-from comparisons.engines.adapter_code import built_in_code
-from comparisons.engines.registry import BUILT_IN
-from comparisons.record.environments import NOT_INSTALLABLE, POLL, NotMeasured, measured, releases
-from comparisons.record.plan import Plan
-from comparisons.record.store import Record, machine
-from comparisons.results.interrupts import finished
-from comparisons.running.cluster import connected
-from scenarios import DropspinError, UnknownName
+from dropspin.comparisons.engines.adapter_code import built_in_code
+from dropspin.comparisons.engines.registry import BUILT_IN
+from dropspin.comparisons.record.environments import NOT_INSTALLABLE, POLL, NotMeasured, measured, releases
+from dropspin.comparisons.record.plan import Plan
+from dropspin.comparisons.record.store import Record, machine
+from dropspin.comparisons.results.interrupts import finished
+from dropspin.comparisons.running.cluster import connected
+from dropspin.scenarios import DropspinError, UnknownName
 
 
 class Release(NamedTuple):

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Literal
 
-from comparisons.engines.registry import BUILT_IN
-from comparisons.results.provenance import MEASURING
-from scenarios.text import printable
+from dropspin.comparisons.engines.registry import BUILT_IN
+from dropspin.comparisons.results.provenance import MEASURING
+from dropspin.scenarios.text import printable
 
 Stamp = Mapping[str, Any]
 Origin = Literal["engine", "adapter", "settings", "dropspin", "surroundings", "either", "absent", "nothing"]

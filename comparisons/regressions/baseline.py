@@ -16,20 +16,20 @@ import tomlkit
 from pydantic import Field
 from tomlkit.items import InlineTable, Item
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.symmetries import kind_of
-from comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results, verify_comparable
-from comparisons.results.ensembles import ENSEMBLE_METRICS
-from comparisons.results.output import written_whole
-from comparisons.results.provenance import digest, versions_behind
-from comparisons.results.results import Results
-from comparisons.results.stored_table import OF_SYMMETRIES
-from scenarios import DropspinError
-from scenarios.body import Table
-from scenarios.errors import did_you_mean
-from scenarios.loading import read_toml
-from scenarios.text import Text
-from scenarios.validation import shown, validated
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results, verify_comparable
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
+from dropspin.comparisons.results.output import written_whole
+from dropspin.comparisons.results.provenance import digest, versions_behind
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.body import Table
+from dropspin.scenarios.errors import did_you_mean
+from dropspin.scenarios.loading import read_toml
+from dropspin.scenarios.text import Text
+from dropspin.scenarios.validation import shown, validated
 
 FORMAT = 3
 """Format 1 grouped results under headings, from which a merge could separate them; in format 2 the list of results had another name."""

@@ -13,17 +13,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from comparisons.faults.conventions import CONVENTIONS
-from comparisons.faults.fault_model import FaultModel
-from comparisons.faults.flight import FLIGHT
-from comparisons.faults.impact import IMPACT
-from comparisons.judging.convergence import JUMPING
-from comparisons.measuring.comparison import Comparison, exactly
-from comparisons.measuring.metrics import METRICS, metrics_for
-from comparisons.measuring.tolerances import negligible
-from comparisons.regressions.parameters import PARAMETERS, Parameter
-from comparisons.results.results import Results
-from scenarios import DropspinError, Scenario, Trajectory, truth_for
+from dropspin.comparisons.faults.conventions import CONVENTIONS
+from dropspin.comparisons.faults.fault_model import FaultModel
+from dropspin.comparisons.faults.flight import FLIGHT
+from dropspin.comparisons.faults.impact import IMPACT
+from dropspin.comparisons.judging.convergence import JUMPING
+from dropspin.comparisons.measuring.comparison import Comparison, exactly
+from dropspin.comparisons.measuring.metrics import METRICS, metrics_for
+from dropspin.comparisons.measuring.tolerances import negligible
+from dropspin.comparisons.regressions.parameters import PARAMETERS, Parameter
+from dropspin.comparisons.results.results import Results
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 
 Array = NDArray[np.float64]
 Wrong = Callable[[Scenario, Array], Trajectory | None]

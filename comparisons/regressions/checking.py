@@ -6,13 +6,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from comparisons.judging.convergence import STUDIES
-from comparisons.judging.verdicts import FAILURES, Verdict
-from comparisons.regressions.baseline import Baseline
-from comparisons.regressions.values import KEY, asked_for, changes, comparable_results, most_changed_first, step_names, verify_comparable
-from comparisons.results.measurement import Measurement, as_table
-from comparisons.results.results import Results
-from scenarios import DropspinError
+from dropspin.comparisons.judging.convergence import STUDIES
+from dropspin.comparisons.judging.verdicts import FAILURES, Verdict
+from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.values import (
+    KEY,
+    asked_for,
+    changes,
+    comparable_results,
+    most_changed_first,
+    step_names,
+    verify_comparable,
+)
+from dropspin.comparisons.results.measurement import Measurement, as_table
+from dropspin.comparisons.results.results import Results
+from dropspin.scenarios import DropspinError
 
 VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed", "gone": "failed"}
 ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic error", "ensemble": "accepted mean"}

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from comparisons.regressions.attribution import Attribution, attribute, surroundings
-from comparisons.regressions.motions import EqualMotions, equal_motions
-from comparisons.regressions.speed import SpeedChange, speed_changes
-from comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed, verify_comparable
-from comparisons.results.results import Results
-from scenarios import DropspinError
+from dropspin.comparisons.regressions.attribution import Attribution, attribute, surroundings
+from dropspin.comparisons.regressions.motions import EqualMotions, equal_motions
+from dropspin.comparisons.regressions.speed import SpeedChange, speed_changes
+from dropspin.comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed, verify_comparable
+from dropspin.comparisons.results.results import Results
+from dropspin.scenarios import DropspinError
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from comparisons.regressions.attribution import Attribution, attribute
-from comparisons.regressions.values import KEY, changes, comparable_results, most_changed_first, verify_comparable
-from comparisons.results.provenance import versions_behind
-from comparisons.results.results import Results
-from scenarios import DropspinError
+from dropspin.comparisons.regressions.attribution import Attribution, attribute
+from dropspin.comparisons.regressions.values import KEY, changes, comparable_results, most_changed_first, verify_comparable
+from dropspin.comparisons.results.provenance import versions_behind
+from dropspin.comparisons.results.results import Results
+from dropspin.scenarios import DropspinError
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.results.results import Results
-from scenarios import Trajectory
+from dropspin.comparisons.results.results import Results
+from dropspin.scenarios import Trajectory
 
 
 class EqualMotions(NamedTuple):

@@ -6,9 +6,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import Scenario
-from scenarios.model import Damping
-from scenarios.rotations import about, rotate
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.model import Damping
+from dropspin.scenarios.rotations import about, rotate
 
 Change = Callable[[Scenario, float], Scenario | None]
 """From a scene and the size of an error to the scene with it: the scene itself if it does not have the parameter, None if no scene can have

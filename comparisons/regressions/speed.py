@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from comparisons.results.results import Results
+from dropspin.comparisons.results.results import Results
 
 CONFIDENCE = 0.95
 

@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
-from comparisons.judging.verdicts import BREAKDOWNS
-from comparisons.results.results import Results
-from comparisons.results.stored_table import OF_SYMMETRIES
-from scenarios import DropspinError
+from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
+from dropspin.scenarios import DropspinError
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]
 """The columns that identify a result; `steps` is the time step as text, or, for orders and asymptotic errors, all time steps used."""

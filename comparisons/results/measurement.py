@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from comparisons.judging.verdicts import Cause, Judgement, Verdict
+from dropspin.comparisons.judging.verdicts import Cause, Judgement, Verdict
 
 Kind = Literal[
     "",

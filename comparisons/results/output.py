@@ -12,8 +12,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from comparisons.results.interrupts import interrupts_deferred
-from scenarios import DropspinError
+from dropspin.comparisons.results.interrupts import interrupts_deferred
+from dropspin.scenarios import DropspinError
 
 UNFINISHED = "unfinished-"
 OLD = "old"

@@ -11,8 +11,8 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
-from comparisons.engines.base import version
-from scenarios.text import printable
+from dropspin.comparisons.engines.base import version
+from dropspin.scenarios.text import printable
 
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
 ENGINES = (

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from comparisons.judging.convergence import ARTEFACTS, JUMPING
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, SEVERITY, WORDS
-from comparisons.measuring.metrics import leading_metric
-from comparisons.measuring.tolerances import scale
-from comparisons.results.ensembles import EnsembleOutcome
-from comparisons.results.measurement import empty_table
-from comparisons.results.provenance import digest
-from scenarios import Scenario, Trajectory, UnknownName, truth_for
+from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, SEVERITY, WORDS
+from dropspin.comparisons.measuring.metrics import leading_metric
+from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.results.ensembles import EnsembleOutcome
+from dropspin.comparisons.results.measurement import empty_table
+from dropspin.comparisons.results.provenance import digest
+from dropspin.scenarios import Scenario, Trajectory, UnknownName, truth_for
 
 TrajectoryKey = tuple[str, str, float]
 NEGLIGIBLE = 1e-4

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import from_json
 
-from comparisons.results.provenance import MEASURING
-from comparisons.results.stored_files import sha256
-from scenarios.text import Text
-from scenarios.validation import validated
+from dropspin.comparisons.results.provenance import MEASURING
+from dropspin.comparisons.results.stored_files import sha256
+from dropspin.scenarios.text import Text
+from dropspin.scenarios.validation import validated
 
 FORMAT = 5
 """Of the folder; 1 had no tolerances, 2 no time limit, 3 tolerances in a file of their own, 4 no checksums."""

@@ -12,15 +12,15 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from comparisons.results.arrays import loaded_arrays, stored_arrays
-from comparisons.results.ensembles import QUICK_MEMBERS, SAMPLES, EnsembleOutcome
-from comparisons.results.results import Results, TrajectoryKey
-from comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
-from comparisons.results.stored_files import file_name, read_stored, sha256
-from comparisons.results.stored_table import loaded_table
-from scenarios import DropspinError, Scenario, SceneError, Trajectory
-from scenarios.loading import from_mapping
-from scenarios.rotations import length
+from dropspin.comparisons.results.arrays import loaded_arrays, stored_arrays
+from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, SAMPLES, EnsembleOutcome
+from dropspin.comparisons.results.results import Results, TrajectoryKey
+from dropspin.comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
+from dropspin.comparisons.results.stored_files import file_name, read_stored, sha256
+from dropspin.comparisons.results.stored_table import loaded_table
+from dropspin.scenarios import DropspinError, Scenario, SceneError, Trajectory
+from dropspin.scenarios.loading import from_mapping
+from dropspin.scenarios.rotations import length
 
 TRAJECTORY = tuple(field.name for field in fields(Trajectory))
 OUTCOME = tuple(field.name for field in fields(EnsembleOutcome))

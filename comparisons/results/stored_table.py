@@ -9,13 +9,13 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from comparisons.judging.verdicts import VERDICTS
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.symmetries import kind_of
-from comparisons.results.ensembles import ENSEMBLE_METRICS
-from comparisons.results.measurement import COLUMNS, Kind
-from scenarios import Scenario
-from scenarios.validation import shown
+from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
+from dropspin.comparisons.results.measurement import COLUMNS, Kind
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.validation import shown
 
 _ARROW = {"str": (pa.string(), pa.large_string()), "float64": (pa.float64(),), "int64": (pa.int64(),)}
 

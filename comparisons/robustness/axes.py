@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.engines.base import may_tumble
-from comparisons.robustness import transformations as to
-from comparisons.robustness.axis_values import (
+from dropspin.comparisons.engines.base import may_tumble
+from dropspin.comparisons.robustness import transformations as to
+from dropspin.comparisons.robustness.axis_values import (
     Between,
     durations,
     geometric_mean,
@@ -19,10 +19,10 @@ from comparisons.robustness.axis_values import (
     steps,
     whole_power_between,
 )
-from comparisons.robustness.operating_point import OperatingPoint, falls, spin
-from scenarios import Scenario
-from scenarios.body import Sphere
-from scenarios.mechanics import is_diagonal
+from dropspin.comparisons.robustness.operating_point import OperatingPoint, falls, spin
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.mechanics import is_diagonal
 
 
 @dataclass(frozen=True)

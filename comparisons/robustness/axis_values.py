@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from comparisons.robustness.operating_point import OperatingPoint, natural_time
+from dropspin.comparisons.robustness.operating_point import OperatingPoint, natural_time
 
 Between = Callable[[float, float, float], float | None]
 """A function of two values and a ratio that returns the value halfway between them, or None if their ratio is smaller than that ratio."""

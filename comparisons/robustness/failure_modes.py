@@ -10,13 +10,13 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import metrics_for
-from scenarios import Scenario, Trajectory, Truth
-from scenarios.body import Sphere
-from scenarios.mechanics import lowest_height, offset_of
-from scenarios.model import TOUCHING
-from scenarios.rotations import length
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.scenarios import Scenario, Trajectory, Truth
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.mechanics import lowest_height, offset_of
+from dropspin.scenarios.model import TOUCHING
+from dropspin.scenarios.rotations import length
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios import Scenario
+from dropspin.scenarios import Scenario
 
 
 class OperatingPoint(NamedTuple):

@@ -7,18 +7,27 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.differences import differences
-from comparisons.robustness.axes import Axis
-from comparisons.robustness.failure_modes import SOUND, Diagnosis, ExtendedMotion, FailureMode, clamped, diagnose, held_speeds, worst
-from comparisons.robustness.operating_point import OperatingPoint
-from comparisons.robustness.transformations import in_nominal_units
-from comparisons.running.engine_process import Failed
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses
-from comparisons.running.recording import Breakdown, Recording, try_record
-from comparisons.running.start_phases import start_phases
-from scenarios import DropspinError, Scenario, Trajectory, truth_for
-from scenarios.state import RATES
+from dropspin.comparisons.measuring.differences import differences
+from dropspin.comparisons.robustness.axes import Axis
+from dropspin.comparisons.robustness.failure_modes import (
+    SOUND,
+    Diagnosis,
+    ExtendedMotion,
+    FailureMode,
+    clamped,
+    diagnose,
+    held_speeds,
+    worst,
+)
+from dropspin.comparisons.robustness.operating_point import OperatingPoint
+from dropspin.comparisons.robustness.transformations import in_nominal_units
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.recording import Breakdown, Recording, try_record
+from dropspin.comparisons.running.start_phases import start_phases
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
+from dropspin.scenarios.state import RATES
 
 Array = NDArray[np.float64]
 

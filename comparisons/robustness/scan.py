@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from comparisons.robustness.axes import AXES, Axis
-from comparisons.robustness.failure_modes import Diagnosis, FailureMode
-from comparisons.robustness.operating_point import OperatingPoint
-from comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
-from comparisons.running.inputs import MOST_STEPS
-from scenarios import Scenario
+from dropspin.comparisons.robustness.axes import AXES, Axis
+from dropspin.comparisons.robustness.failure_modes import Diagnosis, FailureMode
+from dropspin.comparisons.robustness.operating_point import OperatingPoint
+from dropspin.comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
+from dropspin.comparisons.running.inputs import MOST_STEPS
+from dropspin.scenarios import Scenario
 
 NEAR = 1.03
 """Largest ratio of the two values of a transition."""

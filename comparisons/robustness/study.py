@@ -5,17 +5,17 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product, takewhile
 
-from comparisons.engines.base import Engine
-from comparisons.robustness.axes import AXES, Axis
-from comparisons.robustness.operating_point import OperatingPoint
-from comparisons.robustness.runner import Runner
-from comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
-from comparisons.running.parallel import results_in_parallel, started_crews
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from scenarios import DropspinError, Scenario
-from scenarios.errors import UnknownName
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.robustness.axes import AXES, Axis
+from dropspin.comparisons.robustness.operating_point import OperatingPoint
+from dropspin.comparisons.robustness.runner import Runner
+from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.errors import UnknownName
 
 IN_FLIGHT = (
     "document",

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.robustness.operating_point import OperatingPoint, fall_time, spin
-from scenarios.transformations import body_times, changed, in_units, units_of_states
+from dropspin.comparisons.robustness.operating_point import OperatingPoint, fall_time, spin
+from dropspin.scenarios.transformations import body_times, changed, in_units, units_of_states
 
 Array = NDArray[np.float64]
 

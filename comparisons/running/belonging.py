@@ -10,11 +10,11 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.faults.conventions import CONVENTIONS
-from comparisons.faults.fault_model import unchanged_scene
-from scenarios import DropspinError, Scenario, Trajectory, Truth
-from scenarios.rotations import angle_between_orientations
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.comparisons.faults.conventions import CONVENTIONS
+from dropspin.comparisons.faults.fault_model import unchanged_scene
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth
+from dropspin.scenarios.rotations import angle_between_orientations
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 Array = NDArray[np.float64]
 

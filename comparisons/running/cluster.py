@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
-from comparisons.engines.base import EngineMissing
-from scenarios import DropspinError
+from dropspin.comparisons.engines.base import EngineMissing
+from dropspin.scenarios import DropspinError
 
 CONNECT_TIMEOUT, WORKER_TIMEOUT = 30.0, 120.0
 """How long to wait for a scheduler, and for its first worker [s]."""

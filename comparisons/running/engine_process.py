@@ -13,15 +13,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from comparisons.engines.adapter_code import adapter_code
-from comparisons.engines.base import EngineBroken
-from comparisons.engines.exceptions import described
-from comparisons.engines.registry import constructed
-from comparisons.engines.stand_in import StandIn
-from comparisons.judging.verdicts import Verdict
-from comparisons.running.engine_run import EngineRun, run_engine
-from comparisons.running.inputs import EngineEntry
-from scenarios import Scenario
+from dropspin.comparisons.engines.adapter_code import adapter_code
+from dropspin.comparisons.engines.base import EngineBroken
+from dropspin.comparisons.engines.exceptions import described
+from dropspin.comparisons.engines.registry import constructed
+from dropspin.comparisons.engines.stand_in import StandIn
+from dropspin.comparisons.judging.verdicts import Verdict
+from dropspin.comparisons.running.engine_run import EngineRun, run_engine
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.scenarios import Scenario
 
 PROCESSES = Path("/proc")
 

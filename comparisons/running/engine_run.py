@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.engines.base import Engine, KnownLimitation
-from comparisons.measuring.metrics import metrics_for
-from comparisons.measuring.tolerances import perturbed
-from comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
-from comparisons.running.ensembles import run_ensemble
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.progress import OnSimulations
-from comparisons.running.recording import Breakdown, classify, record, record_batch, time_steps
-from comparisons.running.verification import verified_claims, verified_predictions, verified_refusal
-from scenarios import Scenario, Trajectory, truth_for
+from dropspin.comparisons.engines.base import Engine, KnownLimitation
+from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.measuring.tolerances import perturbed
+from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
+from dropspin.comparisons.running.ensembles import run_ensemble
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.progress import OnSimulations
+from dropspin.comparisons.running.recording import Breakdown, classify, record, record_batch, time_steps
+from dropspin.comparisons.running.verification import verified_claims, verified_predictions, verified_refusal
+from dropspin.scenarios import Scenario, Trajectory, truth_for
 
 TIMING_REPEATS = 3
 LONG_ENOUGH = 1.0

@@ -9,14 +9,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Diverged, Engine
-from comparisons.judging.verdicts import Judgement
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
-from comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, EnsembleOutcome
-from comparisons.running.recording import record_batch
-from scenarios import Scenario, members
-from scenarios.mechanics import angular_momentum
+from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, EnsembleOutcome
+from dropspin.comparisons.running.recording import record_batch
+from dropspin.scenarios import Scenario, members
+from dropspin.scenarios.mechanics import angular_momentum
 
 Array = NDArray[np.float64]
 

@@ -3,14 +3,14 @@
 import sys
 from typing import Literal
 
-from comparisons.engines.base import Engine, EngineBroken, EngineMissing
-from comparisons.engines.registry import engine as engine_named
-from comparisons.engines.registry import is_foreign, parsed
-from comparisons.engines.stand_in import Traits, stand_in, traits
-from comparisons.running.engine_process import Failed
-from comparisons.running.inputs import EngineEntry, described_value
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from scenarios import DropspinError
+from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
+from dropspin.comparisons.engines.registry import engine as engine_named
+from dropspin.comparisons.engines.registry import is_foreign, parsed
+from dropspin.comparisons.engines.stand_in import Traits, stand_in, traits
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.inputs import EngineEntry, described_value
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.scenarios import DropspinError
 
 CONSTRUCTION = ResourceLimits(processor_time=60.0)
 """What the import and the construction of an engine may use."""

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.measuring.tolerances import SETS_OF_STARTS, SIGNS
-from comparisons.results.ensembles import QUICK_MEMBERS
-from comparisons.running.engine_run import Timing
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.start_phases import StartPhase, number_of_phases
+from dropspin.comparisons.measuring.tolerances import SETS_OF_STARTS, SIGNS
+from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
+from dropspin.comparisons.running.engine_run import Timing
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
 
 MEASURING = 1e-5
 """Time to record and measure a step [s], beyond that of the step; 2 to 24 µs with document, mujoco and pybullet."""

@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from comparisons.engines.base import Engine
-from comparisons.engines.registry import engine_names
-from scenarios import DropspinError, Scenario, SceneError, load
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.registry import engine_names
+from dropspin.scenarios import DropspinError, Scenario, SceneError, load
 
 SceneLike = Scenario | str | Path | Mapping[str, Any]
 """A scene, its catalogue name, the path of its file, or a mapping with the same keys as a file."""

@@ -6,18 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.judging.convergence import JUMPING
-from comparisons.judging.horizon import with_horizon
-from comparisons.judging.verdicts import Judgement, judge, with_limitations, with_precision
-from comparisons.measuring.comparison import Comparison, Unresolved, exactly
-from comparisons.measuring.metric import Average, Metric
-from comparisons.measuring.metrics import metrics_for
-from comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
-from comparisons.results.measurement import Case, Measurement
-from comparisons.running.engine_run import EngineRun
-from comparisons.running.recording import Breakdown, divergence
-from comparisons.running.start_phases import StartPhase, start_phases
-from scenarios import Scenario, Trajectory, Truth
+from dropspin.comparisons.judging.convergence import JUMPING
+from dropspin.comparisons.judging.horizon import with_horizon
+from dropspin.comparisons.judging.verdicts import Judgement, judge, with_limitations, with_precision
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved, exactly
+from dropspin.comparisons.measuring.metric import Average, Metric
+from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
+from dropspin.comparisons.results.measurement import Case, Measurement
+from dropspin.comparisons.running.engine_run import EngineRun
+from dropspin.comparisons.running.recording import Breakdown, divergence
+from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.scenarios import Scenario, Trajectory, Truth
 
 UNDECIDED_BY_STARTS = "not decided by the few starts of a quick run"
 """The beginning of the reason where the sampling noise is larger than the distance from a bound."""

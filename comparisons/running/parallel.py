@@ -6,11 +6,11 @@ from contextlib import ExitStack, contextmanager
 from threading import Event, Lock
 from typing import TypeVar
 
-from comparisons.results.interrupts import finished, interrupts_deferred
-from comparisons.running.inputs import EngineEntry, ignore
-from comparisons.running.processes import Closed, EngineProcesses, ResourceLimits
-from reference_impl.threads import usable_cores
-from scenarios import DropspinError
+from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.processes import Closed, EngineProcesses, ResourceLimits
+from dropspin.reference_impl.threads import usable_cores
+from dropspin.scenarios import DropspinError
 
 POLL_INTERVAL = 0.5  # s
 Piece = TypeVar("Piece")

@@ -20,15 +20,15 @@ from typing import Self, TypeVar, TypeVarTuple
 
 from pebble import ProcessExpired, ProcessPool
 
-from comparisons.engines.exceptions import described
-from comparisons.judging.verdicts import Verdict
-from comparisons.results.interrupts import finished, interrupts_deferred
-from comparisons.running.engine_process import PROCESSES, Failed, call, memory_for_data, run_and_count, start_process
-from comparisons.running.engine_run import EngineRun, run_engine
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.progress import OnSimulations
-from comparisons.running.recording import Breakdown
-from scenarios import DropspinError, Scenario
+from dropspin.comparisons.engines.exceptions import described
+from dropspin.comparisons.judging.verdicts import Verdict
+from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
+from dropspin.comparisons.running.engine_process import PROCESSES, Failed, call, memory_for_data, run_and_count, start_process
+from dropspin.comparisons.running.engine_run import EngineRun, run_engine
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.progress import OnSimulations
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.scenarios import DropspinError, Scenario
 
 Given = TypeVarTuple("Given")
 Result = TypeVar("Result")

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Diverged, Engine, KnownLimitation
-from comparisons.engines.exceptions import described, short
-from comparisons.engines.registry import engine as engine_named
-from comparisons.judging.verdicts import Verdict
-from comparisons.running.inputs import SceneLike, as_scene, verify_time_step
-from comparisons.running.progress import OnSimulations
-from comparisons.running.verification import (
+from dropspin.comparisons.engines.base import Diverged, Engine, KnownLimitation
+from dropspin.comparisons.engines.exceptions import described, short
+from dropspin.comparisons.engines.registry import engine as engine_named
+from dropspin.comparisons.judging.verdicts import Verdict
+from dropspin.comparisons.running.inputs import SceneLike, as_scene, verify_time_step
+from dropspin.comparisons.running.progress import OnSimulations
+from dropspin.comparisons.running.verification import (
     BuildMismatch,
     verified_batch,
     verified_lag,
@@ -27,8 +27,8 @@ from comparisons.running.verification import (
     verify_build,
     verify_starts,
 )
-from scenarios import DropspinError, Scenario, Trajectory
-from scenarios.state import PARTS
+from dropspin.scenarios import DropspinError, Scenario, Trajectory
+from dropspin.scenarios.state import PARTS
 
 Array = NDArray[np.float64]
 

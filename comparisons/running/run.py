@@ -7,26 +7,26 @@ from itertools import product
 from threading import Lock
 from typing import Any, NamedTuple
 
-from comparisons.engines.base import Engine
-from comparisons.engines.stand_in import code_of
-from comparisons.judging.verdicts import verify_expectations
-from comparisons.measuring.comparison import Comparison
-from comparisons.measuring.metrics import metrics_for
-from comparisons.results.provenance import provenance
-from comparisons.results.results import Results, joined
-from comparisons.running.belonging import verify_motion
-from comparisons.running.engine_process import Failed
-from comparisons.running.engine_run import Timing, time_engine
-from comparisons.running.entries import CONSTRUCTION, engine_entry
-from comparisons.running.forecast import Forecast, forecast
-from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
-from comparisons.running.parallel import as_jobs, work_in_parallel
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.progress import OnProgress, Progress
-from comparisons.running.recording import Breakdown
-from comparisons.running.scene_run import Timings, run_scene
-from comparisons.running.start_phases import StartPhase
-from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.stand_in import code_of
+from dropspin.comparisons.judging.verdicts import verify_expectations
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.results.provenance import provenance
+from dropspin.comparisons.results.results import Results, joined
+from dropspin.comparisons.running.belonging import verify_motion
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.engine_run import Timing, time_engine
+from dropspin.comparisons.running.entries import CONSTRUCTION, engine_entry
+from dropspin.comparisons.running.forecast import Forecast, forecast
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from dropspin.comparisons.running.parallel import as_jobs, work_in_parallel
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.progress import OnProgress, Progress
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.scene_run import Timings, run_scene
+from dropspin.comparisons.running.start_phases import StartPhase
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 
 DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
 

@@ -5,25 +5,25 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
-from comparisons.engines.base import calibrated_label
-from comparisons.judging.agreement import judge_agreement
-from comparisons.judging.convergence import Claim, ConvergenceStudy, attributed_to_setting
-from comparisons.judging.error_budget import is_sufficient
-from comparisons.judging.verdicts import Judgement
-from comparisons.measuring.comparison import Comparison
-from comparisons.measuring.metrics import METRICS
-from comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
-from comparisons.results.measurement import Case, Measurement, as_table
-from comparisons.results.results import Results, TrajectoryKey
-from comparisons.running.engine_run import EngineRun, Timing
-from comparisons.running.ensembles import judge_differences, judge_means
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
-from comparisons.running.processes import EngineProcesses
-from comparisons.running.progress import OnProgress, OnSimulations, Progress, reporter
-from comparisons.running.start_phases import StartPhase
-from comparisons.running.studies import study_engine
-from scenarios import Trajectory
+from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.judging.agreement import judge_agreement
+from dropspin.comparisons.judging.convergence import Claim, ConvergenceStudy, attributed_to_setting
+from dropspin.comparisons.judging.error_budget import is_sufficient
+from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
+from dropspin.comparisons.results.measurement import Case, Measurement, as_table
+from dropspin.comparisons.results.results import Results, TrajectoryKey
+from dropspin.comparisons.running.engine_run import EngineRun, Timing
+from dropspin.comparisons.running.ensembles import judge_differences, judge_means
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.progress import OnProgress, OnSimulations, Progress, reporter
+from dropspin.comparisons.running.start_phases import StartPhase
+from dropspin.comparisons.running.studies import study_engine
+from dropspin.scenarios import Trajectory
 
 Timings = Mapping[tuple[str, str, float], Timing]
 """By scene, engine and time step."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios import Scenario, Truth
+from dropspin.scenarios import Scenario, Truth
 
 START_PHASES, QUICK_START_PHASES = 32, 8
 REST_SHARE = 0.1

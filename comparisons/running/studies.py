@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
-from comparisons.engines.base import Engine
-from comparisons.judging.convergence import (
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.judging.convergence import (
     ADDED_STEPS,
     ARTEFACTS,
     Claim,
@@ -14,13 +14,13 @@ from comparisons.judging.convergence import (
     attributed_to_accuracy,
     study_convergence,
 )
-from comparisons.measuring.metrics import METRICS
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
-from comparisons.running.processes import EngineProcesses
-from comparisons.running.progress import OnProgress, Progress, reporter
-from comparisons.running.start_phases import StartPhase
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.progress import OnProgress, Progress, reporter
+from dropspin.comparisons.running.start_phases import StartPhase
 
 FEWEST_STEPS = 8
 """A run of fewer steps is not worth adding."""

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Engine, KnownLimitation, Simulation, numpy_array
-from comparisons.engines.exceptions import LONGEST, described, short
-from reference_impl.threads import share_out
-from scenarios import Scenario
-from scenarios.model import initial_states
-from scenarios.rotations import length
-from scenarios.state import ORIENTATION, PARTS, SPIN
-from scenarios.validation import shown
+from dropspin.comparisons.engines.base import Engine, KnownLimitation, Simulation, numpy_array
+from dropspin.comparisons.engines.exceptions import LONGEST, described, short
+from dropspin.reference_impl.threads import share_out
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.model import initial_states
+from dropspin.scenarios.rotations import length
+from dropspin.scenarios.state import ORIENTATION, PARTS, SPIN
+from dropspin.scenarios.validation import shown
 
 MULTIPLE = 8
 """Eps of the engine's precision by which numbers may differ from the scene's, relative to the largest number of a vector."""

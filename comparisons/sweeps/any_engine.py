@@ -4,17 +4,17 @@ from collections.abc import Hashable, Iterator
 
 import numpy as np
 
-from comparisons.engines.base import Engine
-from comparisons.measuring.batch import motions_side_by_side
-from comparisons.measuring.motions import Setup
-from comparisons.running.inputs import verify_time_step
-from comparisons.running.recording import Breakdown, Recording, divergence, record_batch, try_record
-from comparisons.running.verification import UNIT_TOLERANCE, verified_refusal
-from comparisons.sweeps.fields import with_fields
-from comparisons.sweeps.jobs import Jobs
-from comparisons.sweeps.outcomes import Outcomes, requested_metrics
-from scenarios import DropspinError, Scenario
-from scenarios.ensemble import spread_start
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.motions import Setup
+from dropspin.comparisons.running.inputs import verify_time_step
+from dropspin.comparisons.running.recording import Breakdown, Recording, divergence, record_batch, try_record
+from dropspin.comparisons.running.verification import UNIT_TOLERANCE, verified_refusal
+from dropspin.comparisons.sweeps.fields import with_fields
+from dropspin.comparisons.sweeps.jobs import Jobs
+from dropspin.comparisons.sweeps.outcomes import Outcomes, requested_metrics
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.ensemble import spread_start
 
 
 def run_in_batches(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:

@@ -14,21 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-import reference_impl
-from comparisons.engines.document import Document, reference_bodies, reference_world
-from comparisons.measuring.batch import motions_side_by_side
-from comparisons.measuring.motions import Setup
-from comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
-from comparisons.running.verification import UNIT_TOLERANCE
-from comparisons.sweeps.any_engine import scene_of
-from comparisons.sweeps.fields import Path, path_of, set_field, with_fields
-from comparisons.sweeps.jobs import OPTION, Jobs
-from comparisons.sweeps.outcomes import Outcomes, requested_metrics
-from scenarios import Scenario, SceneError, Trajectory
-from scenarios.body import Body
-from scenarios.ensemble import clearances, spread_starts
-from scenarios.model import TOUCHING, unit
-from scenarios.state import ORIENTATION, PARTS, POSITION
+from dropspin import reference_impl
+from dropspin.comparisons.engines.document import Document, reference_bodies, reference_world
+from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.motions import Setup
+from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
+from dropspin.comparisons.running.verification import UNIT_TOLERANCE
+from dropspin.comparisons.sweeps.any_engine import scene_of
+from dropspin.comparisons.sweeps.fields import Path, path_of, set_field, with_fields
+from dropspin.comparisons.sweeps.jobs import OPTION, Jobs
+from dropspin.comparisons.sweeps.outcomes import Outcomes, requested_metrics
+from dropspin.scenarios import Scenario, SceneError, Trajectory
+from dropspin.scenarios.body import Body
+from dropspin.scenarios.ensemble import clearances, spread_starts
+from dropspin.scenarios.model import TOUCHING, unit
+from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -264,7 +264,7 @@ def _starts(jobs: Jobs, scene: Scenario, columns: dict[Path, Array], vertices: A
 
 
 def _origins(scene: Scenario, starts: Array, resting_heights: Array) -> Array:
-    """Where the potential energy of each job is 0 [m], shape (B, 3): as `scenarios.mechanics.energy_origin`."""
+    """Where the potential energy of each job is 0 [m], shape (B, 3): as `dropspin.scenarios.mechanics.energy_origin`."""
     if scene.floor is None:
         return starts[:, POSITION]
     return np.outer(resting_heights, [0.0, 1.0, 0.0])

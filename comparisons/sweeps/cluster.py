@@ -8,10 +8,10 @@ import multiprocessing
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.sweeps.folder import SweepFolder
-from comparisons.sweeps.work import Part, Work, installed_versions
-from scenarios import DropspinError
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.sweeps.folder import SweepFolder
+from dropspin.comparisons.sweeps.work import Part, Work, installed_versions
+from dropspin.scenarios import DropspinError
 
 PARTS_PER_THREAD = 2
 """Parts submitted for each thread of a worker, so that the next one is there when one is finished."""

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from comparisons.engines.document import Document
-from comparisons.sweeps.any_engine import run_in_batches, run_single
-from comparisons.sweeps.arrays import run_batch
-from comparisons.sweeps.jobs import Sweep
-from comparisons.sweeps.outcomes import Outcomes, concatenated
+from dropspin.comparisons.engines.document import Document
+from dropspin.comparisons.sweeps.any_engine import run_in_batches, run_single
+from dropspin.comparisons.sweeps.arrays import run_batch
+from dropspin.comparisons.sweeps.jobs import Sweep
+from dropspin.comparisons.sweeps.outcomes import Outcomes, concatenated
 
 
 def run_jobs(sweep: Sweep, first: int, last: int) -> Outcomes:

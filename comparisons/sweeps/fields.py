@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Any
 
-from scenarios import DropspinError, Scenario
-from scenarios.errors import did_you_mean
-from scenarios.loading import FEATURES, from_table
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.errors import did_you_mean
+from dropspin.scenarios.loading import FEATURES, from_table
 
 TABLES = ("body", *(name for name in FEATURES if name != "expect"))
 Path = tuple[str | int, ...]

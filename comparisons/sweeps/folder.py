@@ -17,10 +17,10 @@ import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from comparisons.judging.verdicts import VERDICTS
-from comparisons.results.output import UNFINISHED, unfinished_folder
-from comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS
-from scenarios import DropspinError
+from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.results.output import UNFINISHED, unfinished_folder
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS
+from dropspin.scenarios import DropspinError
 
 DESCRIPTION = "sweep.json"
 PARTS_PER_FOLDER = 1000

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import to_json
 
-from comparisons.engines.base import Engine
-from comparisons.sweeps.axes import Drawn, Indices, SweepAxis
-from comparisons.sweeps.fields import content_of, path_of, set_field
-from scenarios import DropspinError, Scenario
-from scenarios.validation import shown
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis
+from dropspin.comparisons.sweeps.fields import content_of, path_of, set_field
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.validation import shown
 
 OPTION = "engine."
 KEY_DIGITS = 20

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
-from comparisons.running.parallel import work_in_parallel
-from comparisons.running.processes import EngineProcesses
-from comparisons.sweeps.folder import SweepFolder
-from comparisons.sweeps.work import Part, Work
-from reference_impl.threads import usable_cores
+from dropspin.comparisons.running.parallel import work_in_parallel
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.sweeps.folder import SweepFolder
+from dropspin.comparisons.sweeps.work import Part, Work
+from dropspin.reference_impl.threads import usable_cores
 
 
 def run_locally(work: Work, parts: Iterator[Part], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:

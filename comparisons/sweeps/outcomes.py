@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import METRICS, energy_drift, energy_gain, penetration
-from comparisons.measuring.motions import Motions
-from comparisons.running.recording import Breakdown
-from scenarios import Scenario, Trajectory, truth_for
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.metrics import METRICS, energy_drift, energy_gain, penetration
+from dropspin.comparisons.measuring.motions import Motions
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.scenarios import Scenario, Trajectory, truth_for
 
 Array = NDArray[np.float64]
 

@@ -6,15 +6,15 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from comparisons.running.cluster import connected
-from comparisons.running.inputs import ignore
-from comparisons.running.processes import ResourceLimits
-from comparisons.sweeps.cluster import run_on_cluster
-from comparisons.sweeps.folder import SweepFolder
-from comparisons.sweeps.jobs import Sweep
-from comparisons.sweeps.local import run_locally
-from comparisons.sweeps.work import Work
-from scenarios import DropspinError
+from dropspin.comparisons.running.cluster import connected
+from dropspin.comparisons.running.inputs import ignore
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.comparisons.sweeps.cluster import run_on_cluster
+from dropspin.comparisons.sweeps.folder import SweepFolder
+from dropspin.comparisons.sweeps.jobs import Sweep
+from dropspin.comparisons.sweeps.local import run_locally
+from dropspin.comparisons.sweeps.work import Work
+from dropspin.scenarios import DropspinError
 
 
 def run_sweep(

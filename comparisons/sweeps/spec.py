@@ -7,18 +7,18 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.running.entries import present_entry
-from comparisons.running.inputs import verify_time_step
-from comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
-from comparisons.sweeps.fields import NoSuchField, verify_field, with_fields
-from comparisons.sweeps.jobs import OPTION, Sweep, configured
-from comparisons.sweeps.outcomes import STANDARD_METRICS
-from scenarios import DropspinError, Scenario, SceneError, load
-from scenarios.body import Number, Positive, Table
-from scenarios.errors import UnknownName
-from scenarios.loading import TOO_LARGE, read_toml
-from scenarios.validation import shown, validated
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.inputs import verify_time_step
+from dropspin.comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
+from dropspin.comparisons.sweeps.fields import NoSuchField, verify_field, with_fields
+from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
+from dropspin.scenarios import DropspinError, Scenario, SceneError, load
+from dropspin.scenarios.body import Number, Positive, Table
+from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.loading import TOO_LARGE, read_toml
+from dropspin.scenarios.validation import shown, validated
 
 MOST_JOBS = 10**15
 WHOLE_NUMBERS = frozenset({"ensemble.size", "ensemble.seed"})

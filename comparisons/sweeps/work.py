@@ -10,18 +10,18 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from comparisons.engines.document import Document
-from comparisons.engines.stand_in import code_of
-from comparisons.results.provenance import code, provenance, versions
-from comparisons.running.engine_process import Failed
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import Breakdown
-from comparisons.sweeps.dispatch import run_jobs
-from comparisons.sweeps.folder import PARTS_PER_FOLDER, SweepFolder
-from comparisons.sweeps.jobs import Jobs, Sweep
-from comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS, Outcomes, concatenated
-from reference_impl import sources
+from dropspin.comparisons.engines.document import Document
+from dropspin.comparisons.engines.stand_in import code_of
+from dropspin.comparisons.results.provenance import code, provenance, versions
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.sweeps.dispatch import run_jobs
+from dropspin.comparisons.sweeps.folder import PARTS_PER_FOLDER, SweepFolder
+from dropspin.comparisons.sweeps.jobs import Jobs, Sweep
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS, Outcomes, concatenated
+from dropspin.reference_impl import sources
 
 LARGEST_PART = 4000  # jobs
 PART_TIME = 2.0

@@ -13,11 +13,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.judging.verdicts import Verdict
-from comparisons.measuring.differences import differences
-from comparisons.measuring.tolerances import EPS_PER_STEP, FEW_DRAWS, MATTERS, PERTURBATION
-from comparisons.running.recording import Breakdown
-from scenarios import Scenario
+from dropspin.comparisons.judging.verdicts import Verdict
+from dropspin.comparisons.measuring.differences import differences
+from dropspin.comparisons.measuring.tolerances import EPS_PER_STEP, FEW_DRAWS, MATTERS, PERTURBATION
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.scenarios import Scenario
 
 Array = NDArray[np.float64]
 Effects = Callable[[], list[Array]]

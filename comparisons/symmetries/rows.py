@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import pandas as pd
 
-from comparisons.judging.verdicts import BREAKDOWNS
-from comparisons.measuring.symmetries import BITWISE, kind_of
-from comparisons.measuring.tolerances import MATTERS
-from comparisons.results.measurement import Measurement, as_table
-from comparisons.results.results import Results
-from comparisons.symmetries.findings import BY_CHANCE, Finding
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.measuring.symmetries import BITWISE, kind_of
+from dropspin.comparisons.measuring.tolerances import MATTERS
+from dropspin.comparisons.results.measurement import Measurement, as_table
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.symmetries.findings import BY_CHANCE, Finding
 
 
 def with_symmetries(results: Results, findings: Sequence[Finding], dt: float) -> Results:

@@ -8,22 +8,22 @@ from itertools import chain, product
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Engine
-from comparisons.judging.verdicts import Verdict
-from comparisons.measuring.differences import differences
-from comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
-from comparisons.measuring.tolerances import perturbed
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
-from comparisons.running.parallel import results_in_parallel, started_crews
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import Breakdown, classify, divergence, record_batch, try_record
-from comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
-from reference_impl.threads import usable_cores
-from scenarios import DropspinError, Scenario
-from scenarios.state import POSITION, RATES
-from scenarios.transformations import AWAY, whole_steps, with_other_numbers
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.judging.verdicts import Verdict
+from dropspin.comparisons.measuring.differences import differences
+from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
+from dropspin.comparisons.measuring.tolerances import perturbed
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown, classify, divergence, record_batch, try_record
+from dropspin.comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
+from dropspin.reference_impl.threads import usable_cores
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.state import POSITION, RATES
+from dropspin.scenarios.transformations import AWAY, whole_steps, with_other_numbers
 
 Array = NDArray[np.float64]
 

@@ -13,18 +13,18 @@ from itertools import chain, combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.engines.base import Engine
-from comparisons.measuring.differences import differences
-from comparisons.measuring.motions import Motions
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
-from comparisons.running.parallel import results_in_parallel, started_crews
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import Breakdown
-from comparisons.symmetries.findings import Effects, Finding, Status, judged
-from comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
-from scenarios import DropspinError, Scenario, Trajectory
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.measuring.differences import differences
+from dropspin.comparisons.measuring.motions import Motions
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.symmetries.findings import Effects, Finding, Status, judged
+from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
+from dropspin.scenarios import DropspinError, Scenario, Trajectory
 
 Array = NDArray[np.float64]
 

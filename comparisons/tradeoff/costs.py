@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.engines.base import Diverged, Engine, numpy_array
-from comparisons.running.inputs import MOST_STEPS, EngineEntry
-from comparisons.running.recording import TimedSteps, time_per_step, time_steps
-from scenarios import Scenario
+from dropspin.comparisons.engines.base import Diverged, Engine, numpy_array
+from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
+from dropspin.comparisons.running.recording import TimedSteps, time_per_step, time_steps
+from dropspin.scenarios import Scenario
 
 LONG_ENOUGH = 2e-3
 """The smallest wall time of a timing [s]."""

@@ -11,17 +11,17 @@ from itertools import pairwise, takewhile
 
 import numpy as np
 
-from comparisons.engines.base import Diverged
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import METRICS
-from comparisons.running.engine_process import Failed
-from comparisons.running.inputs import MOST_STEPS, EngineEntry
-from comparisons.running.processes import EngineProcesses
-from comparisons.running.recording import record
-from comparisons.running.start_phases import StartPhase, start_phases
-from comparisons.running.verification import verified_refusal
-from comparisons.tradeoff.ladder import Ending, Ladder
-from scenarios import Scenario, truth_for
+from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.comparisons.running.verification import verified_refusal
+from dropspin.comparisons.tradeoff.ladder import Ending, Ladder
+from dropspin.scenarios import Scenario, truth_for
 
 DIVISIONS = (1, *(k * 2**j for j in range(22) for k in (2, 3)))
 """Numbers of steps per output interval, 1, 2, 3, 4, 6, 8, 12, …, each about 1.4 times the previous one."""

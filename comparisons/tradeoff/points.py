@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.tradeoff.costs import WORLDS
-from comparisons.tradeoff.ladder import Ladder
-from scenarios import Scenario
+from dropspin.comparisons.tradeoff.costs import WORLDS
+from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.scenarios import Scenario
 
 Array = NDArray[np.float64]
 

@@ -11,19 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from comparisons.engines.base import Engine
-from comparisons.measuring.metrics import leading_metric, metrics_for
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
-from comparisons.running.parallel import as_jobs, results_in_parallel
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, load, memory_per_world
-from comparisons.tradeoff.errors import BUDGET, errors_over_steps
-from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import CostPoint, TradeOff, spread
-from scenarios import DropspinError, Scenario, truth_for
-from scenarios.errors import UnknownName
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.measuring.metrics import leading_metric, metrics_for
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
+from dropspin.comparisons.running.parallel import as_jobs, results_in_parallel
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, load, memory_per_world
+from dropspin.comparisons.tradeoff.errors import BUDGET, errors_over_steps
+from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff, spread
+from dropspin.scenarios import DropspinError, Scenario, truth_for
+from dropspin.scenarios.errors import UnknownName
 
 IN_FLIGHT = (
     "document",

@@ -7,10 +7,10 @@ Cost: one detection and one impulse per step.
 Source: H. Wang, Rigid Body Dynamics, Algorithm 2, eq 10, 12 and section 3.2.
 """
 
-from reference_impl.contacts.response import impulse_response
-from reference_impl.floor_plane import along_normal, vertex
-from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import Vec3, any_, compiled, cross, select, transpose
+from dropspin.reference_impl.contacts.response import impulse_response
+from dropspin.reference_impl.floor_plane import along_normal, vertex
+from dropspin.reference_impl.quaternion import rotation_matrix
+from dropspin.reference_impl.vectors import Vec3, any_, compiled, cross, select, transpose
 
 ORDER = None
 RUNS_IN_LANES = True

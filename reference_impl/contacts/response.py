@@ -1,6 +1,6 @@
 """Eq 15: the change of the velocity of a point of the body by an impulse at that point."""
 
-from reference_impl.vectors import Mat3, Vec3, compiled, cross, transpose
+from dropspin.reference_impl.vectors import Mat3, Vec3, compiled, cross, transpose
 
 
 @compiled

@@ -17,10 +17,10 @@ import math
 
 import numpy as np
 
-from reference_impl.contacts.response import impulse_response
-from reference_impl.floor_plane import along_normal, vertex
-from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import Vec3, compiled, cross, transpose
+from dropspin.reference_impl.contacts.response import impulse_response
+from dropspin.reference_impl.floor_plane import along_normal, vertex
+from dropspin.reference_impl.quaternion import rotation_matrix
+from dropspin.reference_impl.vectors import Vec3, compiled, cross, transpose
 
 ORDER = None
 RUNS_IN_LANES = False

@@ -9,9 +9,9 @@ Cost: one pass over the vertices of a body that is near the floor.
 Source: the simplest stabilisation of J. Baumgarte, CMAME 1 (1972), and E. Catto, Iterative Dynamics (GDC 2005).
 """
 
-from reference_impl.floor_plane import N, along_normal, vertex
-from reference_impl.quaternion import rotation_matrix
-from reference_impl.vectors import any_, compiled, select
+from dropspin.reference_impl.floor_plane import N, along_normal, vertex
+from dropspin.reference_impl.quaternion import rotation_matrix
+from dropspin.reference_impl.vectors import any_, compiled, select
 
 ORDER = None
 RUNS_IN_LANES = True

@@ -12,9 +12,9 @@ Source: follows from eq 12 and 15; A. Chatterjee & A. Ruina, J. Applied Mechanic
 
 import math
 
-from reference_impl.floor_plane import N
-from reference_impl.laws import normal
-from reference_impl.vectors import compiled, dot, select, solve
+from dropspin.reference_impl.floor_plane import N
+from dropspin.reference_impl.laws import normal
+from dropspin.reference_impl.vectors import compiled, dot, select, solve
 
 ORDER = math.inf
 RUNS_IN_LANES = True

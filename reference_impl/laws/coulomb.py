@@ -16,9 +16,9 @@ Source: C. A. de Coulomb (1785); E. J. Routh, Elementary Rigid Dynamics (1905), 
 
 import math
 
-from reference_impl.floor_plane import N
-from reference_impl.laws import normal, note
-from reference_impl.vectors import compiled, dot, select
+from dropspin.reference_impl.floor_plane import N
+from dropspin.reference_impl.laws import normal, note
+from dropspin.reference_impl.vectors import compiled, dot, select
 
 ORDER = math.inf
 RUNS_IN_LANES = True

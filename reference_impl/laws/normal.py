@@ -9,8 +9,8 @@ Source: E. T. Whittaker, Analytical Dynamics, section 95.
 
 import math
 
-from reference_impl.floor_plane import N
-from reference_impl.vectors import compiled, dot
+from dropspin.reference_impl.floor_plane import N
+from dropspin.reference_impl.vectors import compiled, dot
 
 ORDER = math.inf
 RUNS_IN_LANES = True

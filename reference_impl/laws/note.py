@@ -12,8 +12,8 @@ Source: H. Wang, Rigid Body Dynamics, eq 11 to 17.
 
 import math
 
-from reference_impl.floor_plane import N, along_normal
-from reference_impl.vectors import compiled, select, solve
+from dropspin.reference_impl.floor_plane import N, along_normal
+from dropspin.reference_impl.vectors import compiled, select, solve
 
 ORDER = math.inf
 RUNS_IN_LANES = True

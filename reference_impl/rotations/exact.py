@@ -14,9 +14,9 @@ Source: L. D. Landau & E. M. Lifshitz, Mechanics, section 37; E. T. Whittaker, A
 
 import math
 
-from reference_impl.elliptic import r_f, r_j, sn_cn_dn
-from reference_impl.quaternion import conjugate, from_matrix, normalise, product, to_body, to_world
-from reference_impl.vectors import Mat3, Quat, Vec3, compiled, cross, dot, transpose
+from dropspin.reference_impl.elliptic import r_f, r_j, sn_cn_dn
+from dropspin.reference_impl.quaternion import conjugate, from_matrix, normalise, product, to_body, to_world
+from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled, cross, dot, transpose
 
 ORDER = math.inf
 RUNS_IN_LANES = False

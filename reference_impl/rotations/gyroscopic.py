@@ -10,9 +10,9 @@ Source: L. Euler (1758) for the equations; many engines take the term explicitly
 Bullet's btMultiBody.
 """
 
-from reference_impl.quaternion import to_body, to_world
-from reference_impl.rotations import note
-from reference_impl.vectors import compiled, cross
+from dropspin.reference_impl.quaternion import to_body, to_world
+from dropspin.reference_impl.rotations import note
+from dropspin.reference_impl.vectors import compiled, cross
 
 ORDER = 1.0
 RUNS_IN_LANES = True

@@ -9,9 +9,9 @@ Cost: `note`, two matrix products and one solution of a 3 x 3 system.
 Source: E. Catto, Numerical Methods (GDC 2015), "Gyroscopic torque"; Bullet's rigid bodies use the same method.
 """
 
-from reference_impl.quaternion import to_body, to_world
-from reference_impl.rotations import note
-from reference_impl.vectors import compiled, cross, cross_matrix, solve
+from dropspin.reference_impl.quaternion import to_body, to_world
+from dropspin.reference_impl.rotations import note
+from dropspin.reference_impl.vectors import compiled, cross, cross_matrix, solve
 
 ORDER = 1.0
 RUNS_IN_LANES = True

@@ -9,8 +9,8 @@ Cost: a few Newton steps, each with two matrix products and one solution of a 3 
 Source: E. Hairer, C. Lubich & G. Wanner, Geometric Numerical Integration (2006), IV.8 and VII.5.
 """
 
-from reference_impl.quaternion import normalise, product, to_body, to_world
-from reference_impl.vectors import Mat3, Quat, Vec3, any_, compiled, cross, cross_matrix, dot, select, solve
+from dropspin.reference_impl.quaternion import normalise, product, to_body, to_world
+from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, any_, compiled, cross, cross_matrix, dot, select, solve
 
 ORDER = 2.0
 RUNS_IN_LANES = True

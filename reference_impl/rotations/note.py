@@ -10,8 +10,8 @@ Cost: one quaternion product and one normalisation per step, the least of all ro
 Source: H. Wang, Rigid Body Dynamics, eq 6.
 """
 
-from reference_impl.quaternion import normalise, product
-from reference_impl.vectors import Quat, compiled
+from dropspin.reference_impl.quaternion import normalise, product
+from dropspin.reference_impl.vectors import Quat, compiled
 
 ORDER = None
 RUNS_IN_LANES = True

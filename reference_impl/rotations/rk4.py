@@ -9,8 +9,8 @@ Cost: four evaluations of the rates and one normalisation per step.
 Source: W. Kutta, Z. Math. Phys. 46 (1901).
 """
 
-from reference_impl.quaternion import normalise, product, to_body, to_world
-from reference_impl.vectors import Quat, compiled, cross
+from dropspin.reference_impl.quaternion import normalise, product, to_body, to_world
+from dropspin.reference_impl.vectors import Quat, compiled, cross
 
 ORDER = 4.0
 RUNS_IN_LANES = True

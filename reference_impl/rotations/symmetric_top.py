@@ -13,8 +13,8 @@ body; M. Suzuki, Phys. Lett. A 146 (1990), for the composition.
 
 import math
 
-from reference_impl.quaternion import conjugate, normalise, product, to_body, to_world
-from reference_impl.vectors import Quat, Vec3, compiled, dot, select
+from dropspin.reference_impl.quaternion import conjugate, normalise, product, to_body, to_world
+from dropspin.reference_impl.vectors import Quat, Vec3, compiled, dot, select
 
 ORDER = 4.0
 RUNS_IN_LANES = True

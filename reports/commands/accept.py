@@ -2,8 +2,8 @@
 
 import click
 
-from reports.commands.options import BASELINE, as_json
-from reports.terminal.safe import echo
+from dropspin.reports.commands.options import BASELINE, as_json
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("accept")
@@ -33,12 +33,12 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
 
     import pandas as pd
 
-    from comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
-    from comparisons.results.store import load_results
-    from reports.terminal.rows import json_rows
-    from reports.views.check import accepted_sentences
-    from scenarios import DropspinError
-    from scenarios.text import counted
+    from dropspin.comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
+    from dropspin.comparisons.results.store import load_results
+    from dropspin.reports.terminal.rows import json_rows
+    from dropspin.reports.views.check import accepted_sentences
+    from dropspin.scenarios import DropspinError
+    from dropspin.scenarios.text import counted
 
     if not reason.strip():
         raise click.UsageError("--reason is empty; give the reason why these results are accepted.")

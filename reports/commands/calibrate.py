@@ -5,9 +5,9 @@ from typing import Literal
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import as_json
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("calibrate")
@@ -31,11 +31,11 @@ def calibrate_command(
 
     MuJoCo's contact is a damper over one time step or, with -e mujoco[spring_steps=20], a spring over 20.
     """
-    from comparisons.calibration import calibrate
-    from reports.terminal.progress import status
-    from reports.terminal.rows import print_rows
-    from reports.views import calibrate as view
-    from scenarios import UnknownName
+    from dropspin.comparisons.calibration import calibrate
+    from dropspin.reports.terminal.progress import status
+    from dropspin.reports.terminal.rows import print_rows
+    from dropspin.reports.views import calibrate as view
+    from dropspin.scenarios import UnknownName
 
     if language is not None and json_output:
         raise click.UsageError("--as prints one text and --json prints all of them; give only one of these options.")

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reports.commands.options import BASELINE, as_json, summary_option, write_text
-from reports.terminal.safe import echo
+from dropspin.reports.commands.options import BASELINE, as_json, summary_option, write_text
+from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
-    from comparisons.regressions.checking import Checked
-    from reports.views.check import BaselineFile
-    from reports.views.failures import Failure
+    from dropspin.comparisons.regressions.checking import Checked
+    from dropspin.reports.views.check import BaselineFile
+    from dropspin.reports.views.failures import Failure
 
 
 @click.command("check")
@@ -29,15 +29,15 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
 
     Exit code: 0 nothing failed, 1 a check failed or an accepted result is worse, 2 bad input, 3 an engine broke down or is missing.
     """
-    from comparisons.regressions.baseline import load_baseline
-    from comparisons.regressions.checking import check
-    from comparisons.results.store import load_results
-    from reports.junit import junit_xml
-    from reports.markdown import check_markdown
-    from reports.terminal.rows import json_rows
-    from reports.views import check as view
-    from reports.views.failures import failures
-    from scenarios import DropspinError
+    from dropspin.comparisons.regressions.baseline import load_baseline
+    from dropspin.comparisons.regressions.checking import check
+    from dropspin.comparisons.results.store import load_results
+    from dropspin.reports.junit import junit_xml
+    from dropspin.reports.markdown import check_markdown
+    from dropspin.reports.terminal.rows import json_rows
+    from dropspin.reports.views import check as view
+    from dropspin.reports.views.failures import failures
+    from dropspin.scenarios import DropspinError
 
     if baseline is not None and no_baseline:
         raise click.UsageError("--baseline names a baseline and --no-baseline leaves it out; give only one of them.")
@@ -63,10 +63,10 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
 
 def print_checked(checked: "Checked", file: "BaselineFile | None", found: "list[Failure]") -> None:
     """Print the failures, then the outcome of the check; on GitHub's runners, also print annotations."""
-    from reports.terminal.rows import print_sentences
-    from reports.terminal.summary import print_failures
-    from reports.views import check as view
-    from reports.views.failures import grouped
+    from dropspin.reports.terminal.rows import print_sentences
+    from dropspin.reports.terminal.summary import print_failures
+    from dropspin.reports.views import check as view
+    from dropspin.reports.views.failures import grouped
 
     print_failures(grouped(checked.results, found, None if file is None else file.path))
     print_sentences([view.scope(file), *view.sentences(checked, file)])

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
-from reports.commands.options import as_json, summary_option, write_text
-from reports.terminal.safe import echo
+from dropspin.reports.commands.options import as_json, summary_option, write_text
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("compare")
@@ -22,11 +22,11 @@ def compare_command(old: str, new: str, summary: str | None, json_output: bool) 
 
     Exit code: 0 nothing is worse, 1 a result is worse, moved or gone, 2 bad input.
     """
-    from comparisons.regressions.comparing import compare
-    from comparisons.results.store import load_results
-    from reports.markdown import compare_markdown
-    from reports.terminal.rows import print_sentences
-    from reports.views import compare as view
+    from dropspin.comparisons.regressions.comparing import compare
+    from dropspin.comparisons.results.store import load_results
+    from dropspin.reports.markdown import compare_markdown
+    from dropspin.reports.terminal.rows import print_sentences
+    from dropspin.reports.views import compare as view
 
     later = load_results(Path(new))
     changes = compare(load_results(Path(old)), later)

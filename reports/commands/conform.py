@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import as_json, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
-    from comparisons.conformance.outcomes import CheckResult
+    from dropspin.comparisons.conformance.outcomes import CheckResult
 
 
 @click.command("conform")
@@ -30,11 +30,11 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
     """
     from rich.console import Console
 
-    from comparisons.conformance.checks import CHECKS, conform
-    from comparisons.running.entries import present_entry
-    from comparisons.running.processes import ResourceLimits
-    from reports.terminal.rows import print_row, print_sentences
-    from reports.views import conform as view
+    from dropspin.comparisons.conformance.checks import CHECKS, conform
+    from dropspin.comparisons.running.entries import present_entry
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.reports.terminal.rows import print_row, print_sentences
+    from dropspin.reports.views import conform as view
 
     chosen, console = present_entry(engine_name).adapter, Console()
     found: list[CheckResult] = []

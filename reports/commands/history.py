@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from reports.commands.options import as_json
-from reports.terminal.safe import echo
+from dropspin.reports.commands.options import as_json
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("history")
@@ -21,11 +21,11 @@ def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> No
 
     RUN is a folder that dropspin run -o wrote, or a folder of such folders. Runs are sorted by start time.
     """
-    from comparisons.regressions.history import history
-    from reports.output import folder_made
-    from reports.study_files import write_history
-    from reports.terminal.progress import status
-    from reports.views import history as view
+    from dropspin.comparisons.regressions.history import history
+    from dropspin.reports.output import folder_made
+    from dropspin.reports.study_files import write_history
+    from dropspin.reports.terminal.progress import status
+    from dropspin.reports.views import history as view
 
     with folder_made(output) as folder:
         with status("reading the runs"):
@@ -46,7 +46,7 @@ def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
     Raises:
         DropspinError: A given folder is neither a run nor a folder of runs.
     """
-    from scenarios import DropspinError
+    from dropspin.scenarios import DropspinError
 
     found: dict[str, Path] = {}
     for place in places:
@@ -62,8 +62,8 @@ def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
 
 def _load_runs(found: dict[str, Path]) -> dict[str, Any]:
     """The results of runs, by the name of the folder if it is unique, else by its path."""
-    from comparisons.results.store import load_results
-    from scenarios.text import printable
+    from dropspin.comparisons.results.store import load_results
+    from dropspin.scenarios.text import printable
 
     short = {place: printable(path.resolve().name) for place, path in found.items()}
     alike = Counter(short.values())

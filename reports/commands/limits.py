@@ -5,9 +5,9 @@ import os
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import POSITIVE, as_json, jobs_option, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import POSITIVE, as_json, jobs_option, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("limits")
@@ -49,15 +49,15 @@ def limits_command(
     The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them; this
     takes some minutes.
     """
-    from comparisons.robustness.axes import AXES
-    from comparisons.robustness.study import SCENES, find_limits
-    from comparisons.running.processes import ResourceLimits
-    from reports.output import folder_made
-    from reports.study_files import write_limits
-    from reports.terminal.progress import share_bar
-    from reports.terminal.rows import print_rows, print_sentences
-    from reports.views import limits as view
-    from scenarios import load
+    from dropspin.comparisons.robustness.axes import AXES
+    from dropspin.comparisons.robustness.study import SCENES, find_limits
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.reports.output import folder_made
+    from dropspin.reports.study_files import write_limits
+    from dropspin.reports.terminal.progress import share_bar
+    from dropspin.reports.terminal.rows import print_rows, print_sentences
+    from dropspin.reports.views import limits as view
+    from dropspin.scenarios import load
 
     loaded = [load(name) for name in scenes or SCENES]
     if len({scene.name for scene in loaded}) < len(loaded):

@@ -2,7 +2,7 @@
 
 import click
 
-from reports.commands.options import as_json
+from dropspin.reports.commands.options import as_json
 
 
 @click.command("list")
@@ -10,8 +10,8 @@ from reports.commands.options import as_json
 @as_json
 def list_command(what: str, json_output: bool) -> None:
     """List the scenes, the engines or the metrics."""
-    from reports.terminal.rows import print_rows
-    from reports.views import listings
+    from dropspin.reports.terminal.rows import print_rows
+    from dropspin.reports.views import listings
 
     rows = {"scenes": listings.scene_rows, "engines": listings.engine_rows, "metrics": listings.metric_rows}[what]
     print_rows(rows(), json_output, listings.LEFT_OUT_FIRST[what])

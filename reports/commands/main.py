@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from reports.commands import surroundings
-from reports.commands.interrupts import handle_interrupts, stop_if_interrupted
-from reports.terminal.streams import error_of, unfailing
+from dropspin.reports.commands import surroundings
+from dropspin.reports.commands.interrupts import handle_interrupts, stop_if_interrupted
+from dropspin.reports.terminal.streams import error_of, unfailing
 
 COMMANDS = {
     "accept": "Accept a run's results as the new baseline.",
@@ -101,12 +101,12 @@ def _run() -> int:
         raise OSError("a process has closed the pipe to it") from None
     except Exception as error:
         stop_if_interrupted()  # compiled code, such as the import of an engine, may turn an interrupt into another exception
-        from scenarios import DropspinError
+        from dropspin.scenarios import DropspinError
 
         if not isinstance(error, DropspinError):
             raise
         _say(_text(error))
-        from comparisons.engines.base import EngineBroken, EngineMissing
+        from dropspin.comparisons.engines.base import EngineBroken, EngineMissing
 
         return 3 if isinstance(error, EngineBroken | EngineMissing) else 2
 
@@ -118,7 +118,7 @@ def _text(error: Exception) -> str:
 
 def _say(message: str) -> None:
     """Print an error message as one line. Names in a file may have any length: of a longer line, the middle is left out."""
-    from reports.terminal.safe import echo
+    from dropspin.reports.terminal.safe import echo
 
     line = " ".join(message.splitlines())
     if len(line) > LONGEST_MESSAGE:
@@ -136,7 +136,7 @@ class _LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module = cmd_name.replace("-", "_")
-        command: click.Command = getattr(import_module(f"reports.commands.{module}"), f"{module}_command")
+        command: click.Command = getattr(import_module(f"dropspin.reports.commands.{module}"), f"{module}_command")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

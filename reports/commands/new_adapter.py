@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from reports.terminal.safe import echo
+from dropspin.reports.terminal.safe import echo
 
 TEMPLATE = Path(__file__).parents[1] / "adapter_template"
 NAME = r"[A-Za-z][A-Za-z0-9_]{0,59}"
@@ -22,8 +22,8 @@ def new_adapter_command(name: str, output: str) -> None:
 
     NAME is the name of a Python module, such as my_engine. The class in it is then MyEngine, and results have the name my-engine.
     """
-    from reports.output import folder_made
-    from scenarios import DropspinError
+    from dropspin.reports.output import folder_made
+    from dropspin.scenarios import DropspinError
 
     adapter = _class_name(name)
     names = {"my_engine": name, "MyEngine": adapter, "my-engine": name.replace("_", "-")}
@@ -49,9 +49,9 @@ def _class_name(name: str) -> str:
     Raises:
         DropspinError: A module or an engine cannot have the name, or has it already.
     """
-    from comparisons.engines.registry import engine_names
-    from scenarios import DropspinError
-    from scenarios.validation import shown
+    from dropspin.comparisons.engines.registry import engine_names
+    from dropspin.scenarios import DropspinError
+    from dropspin.scenarios.validation import shown
 
     if not re.fullmatch(NAME, name) or keyword.iskeyword(name):
         raise DropspinError(

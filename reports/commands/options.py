@@ -23,8 +23,8 @@ def write_text(path: str, text: str, *, append: bool = False) -> None:
     Raises:
         DropspinError: The file cannot be written.
     """
-    from comparisons.results.output import written_whole
-    from scenarios import DropspinError
+    from dropspin.comparisons.results.output import written_whole
+    from dropspin.scenarios import DropspinError
 
     target = Path(path)
     if not append and (target.is_file() or not target.exists()):

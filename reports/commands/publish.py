@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from reports.terminal.safe import echo
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("publish")
@@ -17,9 +17,9 @@ def publish_command(record: str, output: str) -> None:
     RECORD is the folder that dropspin record wrote. The site needs no server and no network. In a folder of the documentation's site, it
     links to the documentation.
     """
-    from comparisons.record.findings import others, read
-    from reports.html.record import INDEX, Site, files_of_site
-    from reports.run_folder import replaced_folder
+    from dropspin.comparisons.record.findings import others, read
+    from dropspin.reports.html.record import INDEX, Site, files_of_site
+    from dropspin.reports.run_folder import replaced_folder
 
     found = read(record)
     docs = "../" if (Path(output).resolve().parent / "problems.html").is_file() else ""

@@ -2,9 +2,9 @@
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import jobs_option, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import jobs_option, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("record")
@@ -29,11 +29,11 @@ def record_command(
     pip, or npm, lists the releases and installs each into a temporary environment, in which the same scenes are run with the same
     settings. A release that the record has already is not run again.
     """
-    from comparisons.record.plan import load_plan
-    from comparisons.record.store import Record
-    from comparisons.record.study import Release, record
-    from comparisons.running.parallel import as_jobs
-    from scenarios.text import counted
+    from dropspin.comparisons.record.plan import load_plan
+    from dropspin.comparisons.record.store import Record
+    from dropspin.comparisons.record.study import Release, record
+    from dropspin.comparisons.running.parallel import as_jobs
+    from dropspin.scenarios.text import counted
 
     if sent and (engines or releases):
         raise click.UsageError("--merge runs nothing; leave out --engine and --release.")

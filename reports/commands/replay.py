@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import POSITIVE
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import POSITIVE
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("replay")
@@ -26,14 +26,14 @@ def replay_command(
     On the page you can play the motions at any speed, go to any time, rotate the view, and see contacts and impulses. The page is one
     file and needs no network.
     """
-    from comparisons.results.output import written_whole
-    from comparisons.results.store import load_results
-    from reports.html.replay import replay_page
-    from reports.plots.figures import time_charts
-    from reports.replay import replay_of
-    from reports.replay.clip import write_clip
-    from reports.terminal.progress import share_bar
-    from scenarios import DropspinError
+    from dropspin.comparisons.results.output import written_whole
+    from dropspin.comparisons.results.store import load_results
+    from dropspin.reports.html.replay import replay_page
+    from dropspin.reports.plots.figures import time_charts
+    from dropspin.reports.replay import replay_of
+    from dropspin.reports.replay.clip import write_clip
+    from dropspin.reports.terminal.progress import share_bar
+    from dropspin.scenarios import DropspinError
 
     if gif is not None and Path(gif).suffix.lower() != ".gif":
         raise click.UsageError(f"--gif {gif}: the file name must end in .gif.")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from reports.terminal.safe import echo
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("report")
@@ -25,9 +25,9 @@ def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -
 
     The new report has only the studies and plots given in this call. A replay in the folder is kept.
     """
-    from comparisons.results.store import load_results
-    from reports.run_folder import fill, run_folder
-    from reports.sections import read_section
+    from dropspin.comparisons.results.store import load_results
+    from dropspin.reports.run_folder import fill, run_folder
+    from dropspin.reports.sections import read_section
 
     sections = [read_section(folder) for folder in dict.fromkeys(studies)]
     results = load_results(Path(run))

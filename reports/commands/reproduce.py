@@ -5,9 +5,9 @@ import os
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import as_json, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("reproduce")
@@ -23,14 +23,14 @@ def reproduce_command(names: tuple[str, ...], time_limit: float, output: str, js
 
     Exit code 1: a value differs that is claimed to be reproducible.
     """
-    from comparisons.published.sources import sources
-    from comparisons.published.study import reproduce
-    from comparisons.running.processes import ResourceLimits
-    from reports.output import folder_made
-    from reports.study_files import write_reproduced
-    from reports.terminal.progress import share_bar
-    from reports.terminal.rows import print_rows, print_sentences
-    from reports.views import reproduce as view
+    from dropspin.comparisons.published.sources import sources
+    from dropspin.comparisons.published.study import reproduce
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.reports.output import folder_made
+    from dropspin.reports.study_files import write_reproduced
+    from dropspin.reports.terminal.progress import share_bar
+    from dropspin.reports.terminal.rows import print_rows, print_sentences
+    from dropspin.reports.views import reproduce as view
 
     chosen = sources(names)
     with folder_made(output) as folder:

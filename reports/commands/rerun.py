@@ -4,8 +4,8 @@ import json
 
 import click
 
-from reports.commands.options import as_json, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.options import as_json, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("rerun")
@@ -22,11 +22,11 @@ def rerun_command(engine: str, release: str, scene: str, folder: str, time_limit
     temporary environment. The exit code is 1 if a motion differs from that of the record; then it is said which versions or which
     processor differ.
     """
-    from comparisons.record.plan import load_plan
-    from comparisons.record.rerun import rerun
-    from reports.terminal.progress import status
-    from reports.terminal.rows import print_rows, print_sentences
-    from reports.views import rerun as view
+    from dropspin.comparisons.record.plan import load_plan
+    from dropspin.comparisons.record.rerun import rerun
+    from dropspin.reports.terminal.progress import status
+    from dropspin.reports.terminal.rows import print_rows, print_sentences
+    from dropspin.reports.views import rerun as view
 
     with status(f"installing {engine.partition('[')[0]} {release}, and simulating {scene}"):
         found = rerun(folder, load_plan(), engine, release, scene, time_limit=time_limit)

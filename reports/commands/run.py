@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, baseline_option, jobs_option, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import as_json, baseline_option, jobs_option, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
-    from comparisons.regressions.checking import Checked
-    from comparisons.results.results import Results
-    from comparisons.running.forecast import Forecast
-    from comparisons.running.progress import Progress
-    from reports.views.check import BaselineFile
-    from scenarios import Scenario
+    from dropspin.comparisons.regressions.checking import Checked
+    from dropspin.comparisons.results.results import Results
+    from dropspin.comparisons.running.forecast import Forecast
+    from dropspin.comparisons.running.progress import Progress
+    from dropspin.reports.views.check import BaselineFile
+    from dropspin.scenarios import Scenario
 
 CORE_ENGINES = ("document", "mujoco", "pybullet")
 
@@ -74,15 +74,15 @@ def run_command(
 
     Exit code: 0 nothing failed, 1 a check failed, 2 bad input, 3 an engine broke down, or a named engine is missing.
     """
-    from comparisons.regressions.baseline import load_baseline
-    from reports.commands.check import print_checked
-    from reports.terminal.rows import json_rows
-    from reports.terminal.run_table import print_table
-    from reports.terminal.summary import print_summary
-    from reports.views.check import BaselineFile
-    from reports.views.failures import failures
-    from scenarios import load
-    from scenarios.draw import draw
+    from dropspin.comparisons.regressions.baseline import load_baseline
+    from dropspin.reports.commands.check import print_checked
+    from dropspin.reports.terminal.rows import json_rows
+    from dropspin.reports.terminal.run_table import print_table
+    from dropspin.reports.terminal.summary import print_summary
+    from dropspin.reports.views.check import BaselineFile
+    from dropspin.reports.views.failures import failures
+    from dropspin.scenarios import load
+    from dropspin.scenarios.draw import draw
 
     if seed is not None and count is None:
         raise click.UsageError("--seed has an effect only with random scenes; add --draw N.")
@@ -126,13 +126,13 @@ def _run(
     test_symmetries: bool,
 ) -> "Results":
     """Run the scenes and write the run; a run that is interrupted or cannot be written keeps the scenes that were measured."""
-    from comparisons.running.processes import ResourceLimits
-    from comparisons.running.run import DEFAULT_DTS, run, what_changed
-    from comparisons.symmetries.rows import with_symmetries
-    from reports.commands.symmetries import with_progress
-    from reports.run_folder import MeasuredScenes, fill, run_folder
-    from reports.terminal.progress import progress_bar, status
-    from scenarios.text import counted
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.comparisons.running.run import DEFAULT_DTS, run, what_changed
+    from dropspin.comparisons.symmetries.rows import with_symmetries
+    from dropspin.reports.commands.symmetries import with_progress
+    from dropspin.reports.run_folder import MeasuredScenes, fill, run_folder
+    from dropspin.reports.terminal.progress import progress_bar, status
+    from dropspin.scenarios.text import counted
 
     measured, chosen, steps = MeasuredScenes(output), engines or CORE_ENGINES, dts or DEFAULT_DTS
     has_begun = False
@@ -176,7 +176,7 @@ def _run(
 
 
 def _show_forecast(found: "Forecast", show_line: "Callable[[str], None]") -> None:
-    from reports.views.run import forecast_sentence
+    from dropspin.reports.views.run import forecast_sentence
 
     if sentence := forecast_sentence(found):
         show_line(sentence)
@@ -190,9 +190,9 @@ def _with_request(results: "Results", engines: tuple[str, ...], drawn: dict[str,
 
 def _checked(results: "Results", file: "BaselineFile | None", json_output: bool) -> "Checked":
     """Compare a written run with the baseline. If the run covers no accepted result, its rows are printed before the error message."""
-    from comparisons.regressions.checking import NothingAccepted, check
-    from reports.terminal.rows import json_rows
-    from scenarios import DropspinError
+    from dropspin.comparisons.regressions.checking import NothingAccepted, check
+    from dropspin.reports.terminal.rows import json_rows
+    from dropspin.scenarios import DropspinError
 
     try:
         return check(results, None if file is None else file.baseline)
@@ -205,6 +205,6 @@ def _checked(results: "Results", file: "BaselineFile | None", json_output: bool)
 
 def _core() -> "list[Scenario]":
     """The scenes of the core catalogue."""
-    from scenarios import load, names
+    from dropspin.scenarios import load, names
 
     return [scene for scene in map(load, names()) if "core" in scene.tags]

@@ -2,7 +2,7 @@
 
 import click
 
-from reports.commands.options import as_json
+from dropspin.reports.commands.options import as_json
 
 
 @click.command("show")
@@ -14,9 +14,9 @@ from reports.commands.options import as_json
 @as_json
 def show_command(scene: str, engine_name: str | None, dt: float, json_output: bool) -> None:
     """Show a scene: what it models, its exact solution and its expectations; or the settings of an engine for the scene."""
-    from reports.terminal.rows import print_rows
-    from reports.views import show
-    from scenarios import load
+    from dropspin.reports.terminal.rows import print_rows
+    from dropspin.reports.views import show
+    from dropspin.scenarios import load
 
     loaded = load(scene)
     print_rows(show.scene_rows(loaded) if engine_name is None else show.built_rows(loaded, engine_name, dt), json_output, ["why"])

@@ -4,9 +4,9 @@ import json
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import as_json, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("sweep")
@@ -25,13 +25,13 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, t
 
     Exit code: 0 all jobs were run, 2 bad input, 3 an engine broke down in a job or is missing.
     """
-    from comparisons.running.processes import ResourceLimits
-    from comparisons.sweeps.running import count, run_sweep
-    from comparisons.sweeps.spec import load_sweep
-    from reports.terminal.progress import jobs_bar
-    from reports.terminal.rows import print_rows
-    from reports.views import sweep as view
-    from scenarios.text import counted
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.comparisons.sweeps.running import count, run_sweep
+    from dropspin.comparisons.sweeps.spec import load_sweep
+    from dropspin.reports.terminal.progress import jobs_bar
+    from dropspin.reports.terminal.rows import print_rows
+    from dropspin.reports.views import sweep as view
+    from dropspin.scenarios.text import counted
 
     asked = load_sweep(spec)
     try:

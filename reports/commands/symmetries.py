@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, jobs_option, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import as_json, jobs_option, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from comparisons.running.processes import ResourceLimits
-    from comparisons.symmetries.findings import Finding
-    from scenarios import Scenario
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.comparisons.symmetries.findings import Finding
+    from dropspin.scenarios import Scenario
 
 
 @click.command("symmetries")
@@ -37,13 +37,13 @@ def symmetries_command(
 
     Exit code: 0 whatever is found, 2 bad input; `dropspin run --symmetries` judges.
     """
-    from comparisons.running.processes import ResourceLimits
-    from comparisons.symmetries.study import SCENES
-    from reports.output import folder_made
-    from reports.study_files import write_symmetries
-    from reports.terminal.rows import print_rows, print_sentences
-    from reports.views import symmetries as view
-    from scenarios import load
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.comparisons.symmetries.study import SCENES
+    from dropspin.reports.output import folder_made
+    from dropspin.reports.study_files import write_symmetries
+    from dropspin.reports.terminal.rows import print_rows, print_sentences
+    from dropspin.reports.views import symmetries as view
+    from dropspin.scenarios import load
 
     with folder_made(output) as folder:
         loaded = [load(name) for name in scenes or SCENES]
@@ -63,8 +63,8 @@ def with_progress(
     scenes: "Iterable[Scenario]", engines: "Iterable[str]", dt: float, resources: "ResourceLimits", jobs: int | None
 ) -> "list[Finding]":
     """The findings of the study, which shows its progress and stops at an interrupt."""
-    from comparisons.symmetries.study import symmetries
-    from reports.terminal.progress import share_bar
+    from dropspin.comparisons.symmetries.study import symmetries
+    from dropspin.reports.terminal.progress import share_bar
 
     with share_bar("symmetries") as progress:
 

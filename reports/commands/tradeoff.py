@@ -5,9 +5,9 @@ import os
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import POSITIVE, WholeNumbers, as_json, jobs_option, seconds_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import POSITIVE, WholeNumbers, as_json, jobs_option, seconds_option
+from dropspin.reports.terminal.safe import echo
 
 
 @click.command("tradeoff")
@@ -52,13 +52,13 @@ def tradeoff_command(
 
     The default is the scene spin-asymmetric, with engines and methods that give different results for it.
     """
-    from comparisons.tradeoff.study import tradeoff
-    from reports.output import folder_made
-    from reports.study_files import write_tradeoff
-    from reports.terminal.progress import share_bar
-    from reports.terminal.rows import print_rows, print_sentences
-    from reports.views import tradeoff as view
-    from scenarios import load
+    from dropspin.comparisons.tradeoff.study import tradeoff
+    from dropspin.reports.output import folder_made
+    from dropspin.reports.study_files import write_tradeoff
+    from dropspin.reports.terminal.progress import share_bar
+    from dropspin.reports.terminal.rows import print_rows, print_sentences
+    from dropspin.reports.views import tradeoff as view
+    from dropspin.scenarios import load
 
     loaded, found = [load(name) for name in scenes or ("spin-asymmetric",)], []
     with folder_made(output) as folder:

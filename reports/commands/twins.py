@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from reports.commands.interrupts import stop_if_interrupted
-from reports.commands.options import as_json, jobs_option, time_limit_option
-from reports.terminal.safe import echo
+from dropspin.reports.commands.interrupts import stop_if_interrupted
+from dropspin.reports.commands.options import as_json, jobs_option, time_limit_option
+from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
-    from comparisons.symmetries.twins import TwinFinding
+    from dropspin.comparisons.symmetries.twins import TwinFinding
 
 
 @click.command("twins")
@@ -28,8 +28,8 @@ def twins_command(
     The motions of each pair of engines are compared at every time step: from which step on they differ at all, by how much before and
     after the first contact, and whether rounding explains it. No exact solution is needed.
     """
-    from reports.terminal.rows import print_rows, print_sentences
-    from reports.views import twins as view
+    from dropspin.reports.terminal.rows import print_rows, print_sentences
+    from dropspin.reports.views import twins as view
 
     found = _with_progress(scenes, engines, dt, time_limit, jobs)
     if json_output:
@@ -43,9 +43,9 @@ def _with_progress(
     scenes: tuple[str, ...], engines: tuple[str, ...], dt: float, time_limit: float, jobs: int | None
 ) -> "list[TwinFinding]":
     """The findings of the study, which shows its progress and stops at an interrupt."""
-    from comparisons.running.processes import ResourceLimits
-    from comparisons.symmetries.twins import twins
-    from reports.terminal.progress import share_bar
+    from dropspin.comparisons.running.processes import ResourceLimits
+    from dropspin.comparisons.symmetries.twins import twins
+    from dropspin.reports.terminal.progress import share_bar
 
     with share_bar("twins") as progress:
 

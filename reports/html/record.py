@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.tolerances import scale
-from comparisons.record import findings
-from comparisons.record.findings import Case, Change, Other, Release, leading, problem, relative_error
-from reports.pages import page
-from reports.plots.chart import Chart, Line
-from reports.plots.chart_data import chart_data
-from reports.plots.colours import engine_styles
-from reports.views import numbers
-from reports.views import record as view
-from reports.views.scene import modelled
-from scenarios import truth_for
-from scenarios.problems import identifier
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.record import findings
+from dropspin.comparisons.record.findings import Case, Change, Other, Release, leading, problem, relative_error
+from dropspin.reports.pages import page
+from dropspin.reports.plots.chart import Chart, Line
+from dropspin.reports.plots.chart_data import chart_data
+from dropspin.reports.plots.colours import engine_styles
+from dropspin.reports.views import numbers
+from dropspin.reports.views import record as view
+from dropspin.reports.views.scene import modelled
+from dropspin.scenarios import truth_for
+from dropspin.scenarios.problems import identifier
 
 GENERATOR = '<meta name="generator" content="dropspin publish">'
 INDEX = "index.html"

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from reports.pages import page
-from reports.plots.chart import Chart
-from reports.plots.chart_data import chart_data
-from reports.replay import Replay, as_data
+from dropspin.reports.pages import page
+from dropspin.reports.plots.chart import Chart
+from dropspin.reports.plots.chart_data import chart_data
+from dropspin.reports.replay import Replay, as_data
 
 
 def replay_page(replays: Sequence[Replay], charts: Sequence[Sequence[Chart]]) -> str:

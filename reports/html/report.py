@@ -5,33 +5,33 @@ from typing import Any
 
 import pandas as pd
 
-from comparisons.judging.convergence import STUDIES
-from comparisons.judging.verdicts import MARKS
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.tolerances import scale
-from comparisons.results.ensembles import ENSEMBLE_METRICS
-from comparisons.results.provenance import first_settings
-from comparisons.results.results import NEGLIGIBLE, Results
-from comparisons.results.stored_table import OF_SYMMETRIES
-from comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
-from reports.pages import page
-from reports.plots.chart import Chart
-from reports.plots.chart_data import chart_data
-from reports.plots.colours import engine_colours
-from reports.plots.convergence import INTERVAL_WIDTH, PREDICTED
-from reports.plots.figures import CHARTS, report_charts
-from reports.plots.spins import wobbles_freely
-from reports.replay import as_data, replay_of
-from reports.sections import Section
-from reports.views import numbers
-from reports.views.contacts import worst_contacts
-from reports.views.error_budget import error_budgets
-from reports.views.leading_errors import leading_errors, step_times
-from reports.views.matrix import legend_of_marks
-from reports.views.run import Overview
-from reports.views.scene import left_out, modelled
-from scenarios import truth_for
-from scenarios.problems import identifier
+from dropspin.comparisons.judging.convergence import STUDIES
+from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
+from dropspin.comparisons.results.provenance import first_settings
+from dropspin.comparisons.results.results import NEGLIGIBLE, Results
+from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
+from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
+from dropspin.reports.pages import page
+from dropspin.reports.plots.chart import Chart
+from dropspin.reports.plots.chart_data import chart_data
+from dropspin.reports.plots.colours import engine_colours
+from dropspin.reports.plots.convergence import INTERVAL_WIDTH, PREDICTED
+from dropspin.reports.plots.figures import CHARTS, report_charts
+from dropspin.reports.plots.spins import wobbles_freely
+from dropspin.reports.replay import as_data, replay_of
+from dropspin.reports.sections import Section
+from dropspin.reports.views import numbers
+from dropspin.reports.views.contacts import worst_contacts
+from dropspin.reports.views.error_budget import error_budgets
+from dropspin.reports.views.leading_errors import leading_errors, step_times
+from dropspin.reports.views.matrix import legend_of_marks
+from dropspin.reports.views.run import Overview
+from dropspin.reports.views.scene import left_out, modelled
+from dropspin.scenarios import truth_for
+from dropspin.scenarios.problems import identifier
 
 
 def html_report(results: Results, summary: Overview, sections: Sequence[Section] = ()) -> str:

@@ -4,10 +4,10 @@ A plot function creates no figure and no legend; it labels its lines, so that `a
 plot with the code that draws it.
 """
 
-from reports.plots.bounces import bounce_ladder, plot_bounce_ladder
-from reports.plots.chart import Chart, Line, draw, figure_of
-from reports.plots.convergence import error_over_dt, plot_error_over_dt
-from reports.plots.ensembles import (
+from dropspin.reports.plots.bounces import bounce_ladder, plot_bounce_ladder
+from dropspin.reports.plots.chart import Chart, Line, draw, figure_of
+from dropspin.reports.plots.convergence import error_over_dt, plot_error_over_dt
+from dropspin.reports.plots.ensembles import (
     angular_momentum_of_ensemble,
     energy_of_ensemble,
     plot_angular_momentum_of_ensemble,
@@ -15,12 +15,12 @@ from reports.plots.ensembles import (
     plot_rest_of_ensemble,
     rest_of_ensemble,
 )
-from reports.plots.growth import error_growth, plot_error_growth
-from reports.plots.history import plot_history
-from reports.plots.limits import failure_modes, plot_failure_modes
-from reports.plots.over_time import Quantity, angular_momentum_length, height, over_time, plot_over_time, quantities, tilt
-from reports.plots.spins import plot_polhode, polhode
-from reports.plots.tradeoff import error_over_cost, plot_tradeoff
+from dropspin.reports.plots.growth import error_growth, plot_error_growth
+from dropspin.reports.plots.history import plot_history
+from dropspin.reports.plots.limits import failure_modes, plot_failure_modes
+from dropspin.reports.plots.over_time import Quantity, angular_momentum_length, height, over_time, plot_over_time, quantities, tilt
+from dropspin.reports.plots.spins import plot_polhode, polhode
+from dropspin.reports.plots.tradeoff import error_over_cost, plot_tradeoff
 
 __all__ = [
     "Chart",

@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison
-from comparisons.results.results import Results
-from reports.plots.chart import Chart, Line, draw
-from reports.plots.colours import EXACT
-from reports.plots.style import Array, at_one_step, step_of
-from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
-from scenarios.mechanics import apex
+from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.colours import EXACT
+from dropspin.reports.plots.style import Array, at_one_step, step_of
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+from dropspin.scenarios.mechanics import apex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

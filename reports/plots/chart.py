@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers, load_matplotlib
+from dropspin.reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers, load_matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

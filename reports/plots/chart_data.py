@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from reports.plots.chart import Chart, Line
-from reports.plots.style import Array
+from dropspin.reports.plots.chart import Chart, Line
+from dropspin.reports.plots.style import Array
 
 DIGITS = 6
 """Number of significant digits of positions along an axis."""

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
-from comparisons.results.results import Results
-from reports.plots.chart import Chart, Line, draw
-from reports.plots.colours import engine_styles
-from reports.plots.style import Array, metric_label
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.colours import engine_styles
+from dropspin.reports.plots.style import Array, metric_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from comparisons.results.results import Results
-from reports.plots.chart import Chart, Line, draw
-from reports.plots.style import TIME, Array, at_one_step, stride
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.style import TIME, Array, at_one_step, stride
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,26 +3,26 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from comparisons.judging.verdicts import FAILURES
-from comparisons.results.results import Results
-from comparisons.robustness.study import RobustnessStudy
-from reports.plots.bounces import bounce_ladder
-from reports.plots.chart import Chart, add_legend, panels
-from reports.plots.convergence import error_over_dt
-from reports.plots.ensembles import angular_momentum_of_ensemble, energy_of_ensemble, rest_of_ensemble
-from reports.plots.growth import error_growth
-from reports.plots.history import plot_history
-from reports.plots.limits import failure_modes
-from reports.plots.over_time import over_time, quantities
-from reports.plots.spins import polhode, wobbles_freely
-from reports.plots.tradeoff import error_over_cost, throughput
-from scenarios import truth_for
+from dropspin.comparisons.judging.verdicts import FAILURES
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.reports.plots.bounces import bounce_ladder
+from dropspin.reports.plots.chart import Chart, add_legend, panels
+from dropspin.reports.plots.convergence import error_over_dt
+from dropspin.reports.plots.ensembles import angular_momentum_of_ensemble, energy_of_ensemble, rest_of_ensemble
+from dropspin.reports.plots.growth import error_growth
+from dropspin.reports.plots.history import plot_history
+from dropspin.reports.plots.limits import failure_modes
+from dropspin.reports.plots.over_time import over_time, quantities
+from dropspin.reports.plots.spins import polhode, wobbles_freely
+from dropspin.reports.plots.tradeoff import error_over_cost, throughput
+from dropspin.scenarios import truth_for
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from comparisons.regressions.history import History
-    from comparisons.tradeoff.points import TradeOff
+    from dropspin.comparisons.regressions.history import History
+    from dropspin.comparisons.tradeoff.points import TradeOff
 
 CONVERGENCE = (
     "energy_error",

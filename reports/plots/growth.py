@@ -4,14 +4,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.errors_over_time import ERRORS
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
-from comparisons.results.results import Results
-from reports.plots.chart import Chart, Line, draw
-from reports.plots.style import ROUNDING, TIME, Array, at_one_step, metric_label, stride
-from scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.errors_over_time import ERRORS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.style import ROUNDING, TIME, Array, at_one_step, metric_label, stride
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, UnknownName, truth_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,7 @@ def error_growth(results: Results, scene_name: str, metric: str) -> Chart:
     Args:
         results: The run.
         scene_name: One of its scenes; it must have an exact solution.
-        metric: A key of `comparisons.measuring.errors_over_time.ERRORS`, such as `orientation_error`.
+        metric: A key of `dropspin.comparisons.measuring.errors_over_time.ERRORS`, such as `orientation_error`.
 
     Raises:
         DropspinError: The scene has no exact solution.

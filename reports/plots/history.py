@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.regressions.history import History
-from reports.plots.colours import engine_colours
-from reports.plots.style import metric_label, power, thinner
+from dropspin.comparisons.regressions.history import History
+from dropspin.reports.plots.colours import engine_colours
+from dropspin.reports.plots.style import metric_label, power, thinner
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.robustness.axes import Axis
-from comparisons.robustness.failure_modes import FAILURE_MODES
-from comparisons.robustness.scan import AxisScan
-from comparisons.robustness.study import RobustnessStudy
-from reports.plots.chart import Chart, Line, draw
+from dropspin.comparisons.robustness.axes import Axis
+from dropspin.comparisons.robustness.failure_modes import FAILURE_MODES
+from dropspin.comparisons.robustness.scan import AxisScan
+from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.reports.plots.chart import Chart, Line, draw
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.results.results import Results
-from reports.plots.chart import FLAT, Chart, Line, draw
-from reports.plots.colours import EXACT
-from reports.plots.style import MOST_POINTS, TIME, Array, at_one_step, stride
-from scenarios import Scenario, Trajectory, Truth, truth_for
-from scenarios.mechanics import angular_momentum, energy
-from scenarios.rotations import angle_between_orientations, rotate
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.chart import FLAT, Chart, Line, draw
+from dropspin.reports.plots.colours import EXACT
+from dropspin.reports.plots.style import MOST_POINTS, TIME, Array, at_one_step, stride
+from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
+from dropspin.scenarios.mechanics import angular_momentum, energy
+from dropspin.scenarios.rotations import angle_between_orientations, rotate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from comparisons.results.results import Results
-from reports.plots.chart import Chart, Line, draw
-from reports.plots.colours import EXACT
-from reports.plots.style import MOST_POINTS, Array, at_one_step, stride
-from scenarios import DropspinError, Scenario, Trajectory, truth_for
-from scenarios.rotations import cross, unrotate
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.colours import EXACT
+from dropspin.reports.plots.style import MOST_POINTS, Array, at_one_step, stride
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
+from dropspin.scenarios.rotations import cross, unrotate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

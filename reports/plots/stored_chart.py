@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from scenarios.text import Text
+from dropspin.scenarios.text import Text
 
 MOST_POINTS = 100_000
 FLOAT = 4  # bytes

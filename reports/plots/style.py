@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.results.ensembles import ENSEMBLE_METRICS
-from comparisons.results.results import Results
-from reports.plots.colours import engine_styles
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.colours import engine_styles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.plots.chart import Chart, Line, draw
-from reports.plots.colours import engine_styles
-from reports.plots.style import metric_label
+from dropspin.reports.plots.chart import Chart, Line, draw
+from dropspin.reports.plots.colours import engine_styles
+from dropspin.reports.plots.style import metric_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from comparisons.tradeoff.points import CostPoint, TradeOff
+    from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff
 
 
 def error_over_cost(found: "TradeOff", worlds: int | None = None) -> Chart:

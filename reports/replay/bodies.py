@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Body, hull_corners
+from dropspin.scenarios.body import Body, hull_corners
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.results.output import written_whole
-from reports.replay.bodies import Outline, outline
-from reports.replay.motions import Motion, Replay
-from scenarios import DropspinError
-from scenarios.rotations import rotate
+from dropspin.comparisons.results.output import written_whole
+from dropspin.reports.replay.bodies import Outline, outline
+from dropspin.reports.replay.motions import Motion, Replay
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.rotations import rotate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

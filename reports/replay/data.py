@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.plots.colours import EXACT
-from reports.replay.bodies import outline
-from reports.replay.motions import Motion, Replay, axis_and_angle
-from scenarios.rotations import about
+from dropspin.reports.plots.colours import EXACT
+from dropspin.reports.replay.bodies import outline
+from dropspin.reports.replay.motions import Motion, Replay, axis_and_angle
+from dropspin.scenarios.rotations import about
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.measuring.comparison import Comparison, exactly
-from comparisons.results.results import Results
-from reports.plots.colours import EXACT, engine_colours
-from scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
-from scenarios.mechanics import angular_momentum
-from scenarios.rotations import about, angle_between_orientations, conjugate, cross, dot, multiply
+from dropspin.comparisons.measuring.comparison import Comparison, exactly
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.plots.colours import EXACT, engine_colours
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+from dropspin.scenarios.mechanics import angular_momentum
+from dropspin.scenarios.rotations import about, angle_between_orientations, conjugate, cross, dot, multiply
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -10,10 +10,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Task, TaskProgressColum
 from rich.progress import Progress as Bar
 from rich.text import Text
 
-from comparisons.running.progress import OnProgress, Progress
-from reports.terminal.safe import echo, safe, styled
-from reports.views.numbers import in_ms
-from scenarios.text import counted
+from dropspin.comparisons.running.progress import OnProgress, Progress
+from dropspin.reports.terminal.safe import echo, safe, styled
+from dropspin.reports.views.numbers import in_ms
+from dropspin.scenarios.text import counted
 
 
 class RunProgress(NamedTuple):

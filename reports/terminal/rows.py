@@ -11,7 +11,7 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 
-from reports.terminal.safe import echo, styled
+from dropspin.reports.terminal.safe import echo, styled
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,15 +8,15 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from comparisons.judging.agreement import NO_EVIDENCE
-from comparisons.judging.verdicts import MARKS
-from comparisons.measuring.metrics import METRICS
-from comparisons.results.ensembles import QUICK_MEMBERS
-from comparisons.results.results import Results
-from reports.terminal.safe import styled
-from reports.terminal.summary import print_summary
-from reports.views.findings import orders
-from reports.views.numbers import formatted, trend, word
+from dropspin.comparisons.judging.agreement import NO_EVIDENCE
+from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.terminal.safe import styled
+from dropspin.reports.terminal.summary import print_summary
+from dropspin.reports.views.findings import orders
+from dropspin.reports.views.numbers import formatted, trend, word
 
 NUMBER_WIDTH = 9  # of -1.23e-04; a narrow terminal folds names and splits the table, but never cuts a number
 NAME_WIDTH, GAP = 20, 3

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenarios.text import printable
+from dropspin.scenarios.text import printable
 
 if TYPE_CHECKING:
     from rich.text import Text

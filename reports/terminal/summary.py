@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from rich.cells import cell_len
 from rich.console import Console
 
-from comparisons.results.results import Results
-from reports.terminal.rows import aligned, print_sentence
-from reports.terminal.safe import styled
-from reports.views.failures import FailureGroup, grouped
-from reports.views.matrix import Matrix, matrix
-from reports.views.run import overview
-from scenarios.text import counted
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.terminal.rows import aligned, print_sentence
+from dropspin.reports.terminal.safe import styled
+from dropspin.reports.views.failures import FailureGroup, grouped
+from dropspin.reports.views.matrix import Matrix, matrix
+from dropspin.reports.views.run import overview
+from dropspin.scenarios.text import counted
 
 MOST_SENTENCES = 6
 """Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""

@@ -4,8 +4,8 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from comparisons.calibration import Calibration, Measured
-from scenarios import DropspinError
+from dropspin.comparisons.calibration import Calibration, Measured
+from dropspin.scenarios import DropspinError
 
 Rows = list[dict[str, str]]
 

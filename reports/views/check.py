@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES
-from comparisons.regressions.baseline import Baseline
-from comparisons.regressions.checking import KNOWN_FAILURE, SCENE_CHANGED, Checked
-from comparisons.regressions.values import broke_down, comparable_results, regressed
-from comparisons.results.provenance import versions_behind
-from comparisons.results.results import Results
-from reports.views.failures import Failure
-from reports.views.findings import counts, verdict_sentence
-from reports.views.numbers import failing
-from scenarios.text import counted
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
+from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.checking import KNOWN_FAILURE, SCENE_CHANGED, Checked
+from dropspin.comparisons.regressions.values import broke_down, comparable_results, regressed
+from dropspin.comparisons.results.provenance import versions_behind
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.views.failures import Failure
+from dropspin.reports.views.findings import counts, verdict_sentence
+from dropspin.reports.views.numbers import failing
+from dropspin.scenarios.text import counted
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 MOST_ANNOTATIONS = 10

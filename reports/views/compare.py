@@ -6,13 +6,13 @@ from typing import Any
 
 import pandas as pd
 
-from comparisons.regressions.comparing import Changes
-from comparisons.regressions.motions import EqualMotions
-from comparisons.regressions.speed import SpeedChange
-from comparisons.results.results import Results
-from reports.views.failures import reproduce_scenes
-from reports.views.numbers import formatted, subject
-from scenarios.text import counted
+from dropspin.comparisons.regressions.comparing import Changes
+from dropspin.comparisons.regressions.motions import EqualMotions
+from dropspin.comparisons.regressions.speed import SpeedChange
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.views.failures import reproduce_scenes
+from dropspin.reports.views.numbers import formatted, subject
+from dropspin.scenarios.text import counted
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
 """The heading of each kind of change, the worst kind first."""

@@ -3,9 +3,9 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from comparisons.conformance.outcomes import CheckResult
-from reports.views.numbers import failing
-from scenarios.text import counted
+from dropspin.comparisons.conformance.outcomes import CheckResult
+from dropspin.reports.views.numbers import failing
+from dropspin.scenarios.text import counted
 
 WRONG = frozenset({"failed", "crashed", "timed_out"})
 

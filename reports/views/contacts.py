@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from comparisons.measuring.contacts import RESIDUALS, contacts
-from comparisons.measuring.requirements import obeys_contact_laws
-from comparisons.results.results import Results
-from reports.views.numbers import formatted
+from dropspin.comparisons.measuring.contacts import RESIDUALS, contacts
+from dropspin.comparisons.measuring.requirements import obeys_contact_laws
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.views.numbers import formatted
 
 
 @np.errstate(all="ignore")  # an engine may return 1e300

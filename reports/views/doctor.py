@@ -3,13 +3,13 @@
 import sys
 from collections.abc import Sequence
 
-from comparisons.results.provenance import processor, versions
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import engine_entry
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from comparisons.running.recording import simulate
-from scenarios import DropspinError, load
+from dropspin.comparisons.results.provenance import processor, versions
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import simulate
+from dropspin.scenarios import DropspinError, load
 
 Rows = list[dict[str, str]]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from comparisons.judging.convergence import ARTEFACTS, SATURATION
-from comparisons.results.results import NEGLIGIBLE, Results, is_undecided
-from reports.views.numbers import formatted, observed_order
+from dropspin.comparisons.judging.convergence import ARTEFACTS, SATURATION
+from dropspin.comparisons.results.results import NEGLIGIBLE, Results, is_undecided
+from dropspin.reports.views.numbers import formatted, observed_order
 
 OF = ["metric", "engine"]
 EXPLAINED = {"known": "Expected", "limited": "Known limitation"}

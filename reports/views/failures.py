@@ -6,14 +6,14 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from comparisons.judging.convergence import STUDIES
-from comparisons.judging.verdicts import FAILURES
-from comparisons.measuring.symmetries import kind_of
-from comparisons.regressions.causes import WrongParameter, causes
-from comparisons.results.results import Results
-from comparisons.running.processes import ResourceLimits
-from reports.views.numbers import bound, formatted, step, subject, word
-from scenarios.text import counted, rounded
+from dropspin.comparisons.judging.convergence import STUDIES
+from dropspin.comparisons.judging.verdicts import FAILURES
+from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.regressions.causes import WrongParameter, causes
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.reports.views.numbers import bound, formatted, step, subject, word
+from dropspin.scenarios.text import counted, rounded
 
 Row = Mapping[Hashable, Any]
 MOST_NAMES = 4

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from comparisons.engines.base import calibrated_label
-from comparisons.judging.convergence import ARTEFACTS, JUMPING
-from comparisons.judging.error_budget import is_determined, is_sufficient
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, SEVERITY
-from comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
-from comparisons.running.measured import UNDECIDED_BY_STARTS
-from reports.views.leading_errors import step_times
-from reports.views.numbers import duration, failing, formatted, in_ms, quantity
-from scenarios.text import counted
+from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
+from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, SEVERITY
+from dropspin.comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
+from dropspin.comparisons.running.measured import UNDECIDED_BY_STARTS
+from dropspin.reports.views.leading_errors import step_times
+from dropspin.reports.views.numbers import duration, failing, formatted, in_ms, quantity
+from dropspin.scenarios.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,8 +1,8 @@
 """The output of `dropspin history`: the runs in which results changed."""
 
-from comparisons.regressions.history import History, Move
-from reports.views.numbers import formatted, subject
-from scenarios.text import counted
+from dropspin.comparisons.regressions.history import History, Move
+from dropspin.reports.views.numbers import formatted, subject
+from dropspin.scenarios.text import counted
 
 MOST_RESULTS = 6
 """Largest number of results listed for one run; the table in the file has all of them."""

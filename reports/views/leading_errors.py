@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.tolerances import scale
-from comparisons.results.results import Results
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.results.results import Results
 
 
 @dataclass(frozen=True)

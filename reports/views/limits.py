@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.robustness.axes import AXES, Axis
-from comparisons.robustness.scan import AxisScan, ScanPoint
-from comparisons.robustness.study import RobustnessStudy
-from reports.views.numbers import left_out
-from scenarios.text import rounded
+from dropspin.comparisons.robustness.axes import AXES, Axis
+from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint
+from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.reports.views.numbers import left_out
+from dropspin.scenarios.text import rounded
 
 ACCURATE_AND_STABLE = "Accurate: sound at every smaller tested time step. Stable: there, errors beyond the tolerance are the only failures."
 COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")

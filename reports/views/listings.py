@@ -1,9 +1,9 @@
 """The output of `dropspin list`: the scenes, the engines, the metrics."""
 
-from scenarios.catalogue_truths import CATALOGUE_TRUTHS
-from scenarios.errors import DropspinError
-from scenarios.loading import load, names
-from scenarios.problems import identifier
+from dropspin.scenarios.catalogue_truths import CATALOGUE_TRUTHS
+from dropspin.scenarios.errors import DropspinError
+from dropspin.scenarios.loading import load, names
+from dropspin.scenarios.problems import identifier
 
 Rows = list[dict[str, str]]
 LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs", "unit")}
@@ -26,9 +26,9 @@ def scene_rows() -> Rows:
 
 def engine_rows() -> Rows:
     """The engines that can be chosen by name, with their options."""
-    from comparisons.engines.registry import engine_names
-    from comparisons.engines.stand_in import StandIn
-    from comparisons.running.entries import present_entry
+    from dropspin.comparisons.engines.registry import engine_names
+    from dropspin.comparisons.engines.stand_in import StandIn
+    from dropspin.comparisons.running.entries import present_entry
 
     rows = []
     for name in engine_names():
@@ -47,8 +47,8 @@ def engine_rows() -> Rows:
 
 def metric_rows() -> Rows:
     """The metrics of one motion, then those of an ensemble."""
-    from comparisons.measuring.metrics import METRICS
-    from comparisons.results.ensembles import ENSEMBLE_METRICS
+    from dropspin.comparisons.measuring.metrics import METRICS
+    from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 
     of_one = [
         {"metric": metric.name, "unit": metric.unit, "needs": metric.needs, "definition": metric.definition} for metric in METRICS.values()

@@ -4,10 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
-from comparisons.results.results import UNDECIDED, Results, Status
-from reports.views.leading_errors import leading_errors
-from reports.views.numbers import formatted, in_ms, quantity, unit
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
+from dropspin.comparisons.results.results import UNDECIDED, Results, Status
+from dropspin.reports.views.leading_errors import leading_errors
+from dropspin.reports.views.numbers import formatted, in_ms, quantity, unit
 
 MOST_SCENES = 24
 """Largest number of rows. Of more scenes, those in which no engine has a finding are left out first, then those with the least severe

@@ -4,10 +4,10 @@ import math
 from collections.abc import Mapping
 from functools import cache
 
-from comparisons.judging.error_budget import is_determined
-from comparisons.judging.verdicts import WORDS
-from comparisons.measuring.symmetries import kind_of
-from scenarios.text import counted, rounded
+from dropspin.comparisons.judging.error_budget import is_determined
+from dropspin.comparisons.judging.verdicts import WORDS
+from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.scenarios.text import counted, rounded
 
 
 def formatted(value: float) -> str:
@@ -85,7 +85,7 @@ def subject(metric: str, kind: str, truth: str = "") -> str:
 
 @cache
 def _accepted_kinds() -> dict[str, str]:
-    from comparisons.regressions.checking import ACCEPTED
+    from dropspin.comparisons.regressions.checking import ACCEPTED
 
     return {text: kind for kind, text in ACCEPTED.items()}
 

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.judging.verdicts import MARKS
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.tolerances import scale
-from comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
-from reports.views.leading_errors import level
-from reports.views.numbers import duration, formatted, in_ms, word
+from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
+from dropspin.reports.views.leading_errors import level
+from dropspin.reports.views.numbers import duration, formatted, in_ms, word
 
 GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}
 """What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""

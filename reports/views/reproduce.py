@@ -7,10 +7,10 @@ from dataclasses import asdict, fields
 from itertools import groupby
 from typing import Any, get_args
 
-from comparisons.judging.verdicts import BREAKDOWNS
-from comparisons.published.results import Result, Status
-from comparisons.published.sources import Source
-from scenarios.text import counted
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.published.results import Result, Status
+from dropspin.comparisons.published.sources import Source
+from dropspin.scenarios.text import counted
 
 COLUMNS = tuple(field.name for field in fields(Result))
 STATUSES: tuple[Status, ...] = get_args(Status)

@@ -3,11 +3,11 @@
 import math
 from typing import Any
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.record.findings import Case, leading
-from comparisons.record.rerun import Again
-from reports.views.numbers import in_ms, quantity, unit, word
-from scenarios.text import counted
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.record.findings import Case, leading
+from dropspin.comparisons.record.rerun import Again
+from dropspin.reports.views.numbers import in_ms, quantity, unit, word
+from dropspin.scenarios.text import counted
 
 
 def table(found: Again, scene: str) -> list[dict[str, str]]:

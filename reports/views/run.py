@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from comparisons.results.ensembles import QUICK_MEMBERS
-from comparisons.results.results import Results, Status
-from comparisons.running.forecast import Forecast
-from comparisons.running.measured import UNDECIDED_BY_STARTS
-from comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
-from reports.views.failures import Failure, failures, reproduce_drawn
-from reports.views.findings import (
+from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
+from dropspin.comparisons.results.results import Results, Status
+from dropspin.comparisons.running.forecast import Forecast
+from dropspin.comparisons.running.measured import UNDECIDED_BY_STARTS
+from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
+from dropspin.reports.views.failures import Failure, failures, reproduce_drawn
+from dropspin.reports.views.findings import (
     Counts,
     ProfileComparison,
     asymptotic_errors,
@@ -18,7 +18,7 @@ from reports.views.findings import (
     profile_comparisons,
     verdict_sentence,
 )
-from scenarios.text import counted
+from dropspin.scenarios.text import counted
 
 
 @dataclass(frozen=True)

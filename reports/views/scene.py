@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenarios.model import Scenario
+from dropspin.scenarios.model import Scenario
 
 
 def modelled(scene: Scenario) -> list[str]:

@@ -4,18 +4,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from comparisons.engines.base import EngineBroken
-from comparisons.judging.verdicts import verify_expectations
-from reports.views.numbers import bound
-from reports.views.scene import left_out, modelled
-from scenarios import Scenario, Truth, truth_for
-from scenarios.model import Expectation
-from scenarios.problems import identifier
-from scenarios.state import VELOCITY
-from scenarios.truths.impact_laws import FRICTION_LAWS, law_of
+from dropspin.comparisons.engines.base import EngineBroken
+from dropspin.comparisons.judging.verdicts import verify_expectations
+from dropspin.reports.views.numbers import bound
+from dropspin.reports.views.scene import left_out, modelled
+from dropspin.scenarios import Scenario, Truth, truth_for
+from dropspin.scenarios.model import Expectation
+from dropspin.scenarios.problems import identifier
+from dropspin.scenarios.state import VELOCITY
+from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of
 
 if TYPE_CHECKING:
-    from comparisons.running.inputs import EngineEntry
+    from dropspin.comparisons.running.inputs import EngineEntry
 
 Rows = list[dict[str, str]]
 
@@ -77,10 +77,10 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     Raises:
         DropspinError: The engine cannot run, or breaks down while it builds the scene.
     """
-    from comparisons.running.engine_process import Failed
-    from comparisons.running.entries import present_entry
-    from comparisons.running.inputs import verify_time_step
-    from comparisons.running.processes import EngineProcesses, ResourceLimits
+    from dropspin.comparisons.running.engine_process import Failed
+    from dropspin.comparisons.running.entries import present_entry
+    from dropspin.comparisons.running.inputs import verify_time_step
+    from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 
     verify_time_step(scene, dt)
     entry = present_entry(engine_name)
@@ -93,7 +93,7 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
 
 def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
     """The model that an engine builds; runs in the engine's process."""
-    from comparisons.running.verification import verified_refusal, verified_settings, verify_build
+    from dropspin.comparisons.running.verification import verified_refusal, verified_settings, verify_build
 
     engine = entry.adapter
     refusal = verified_refusal(engine.declines(scene))

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.judging.verdicts import BREAKDOWNS
-from comparisons.sweeps.running import read_sweep_parts
-from reports.views.numbers import formatted, word
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.sweeps.running import read_sweep_parts
+from dropspin.reports.views.numbers import formatted, word
 
 WORST_OF = ("energy_drift", "energy_gain", "penetration")
 LEFT_OUT_FIRST = tuple(f"worst {name.replace('_', ' ')}" for name in reversed(WORST_OF))

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
-from comparisons.measuring.symmetries import NAMES
-from comparisons.symmetries.findings import STATUSES, Finding, Status
+from dropspin.comparisons.measuring.symmetries import NAMES
+from dropspin.comparisons.symmetries.findings import STATUSES, Finding, Status
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
 MARKS: dict[Status, str] = {"kept": "✓", "rounding": "≈", "nearly kept": "~", "lost": "✗", "not run": "–"}

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.measuring.metrics import METRICS
-from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
-from reports.views.numbers import duration, formatted, left_out
-from scenarios.text import counted, rounded
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
+from dropspin.reports.views.numbers import duration, formatted, left_out
+from dropspin.scenarios.text import counted, rounded
 
 BUSY = 0.5
 """Other threads per processor from which on a machine counts as busy: on one with two processors, one other thread."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from comparisons.symmetries.twins import LEVELS, TwinFinding
+from dropspin.comparisons.symmetries.twins import LEVELS, TwinFinding
 
 LEGEND = (
     "Steps are the first after which the motions differ at all, and by more than each size, of angles in radians, and relative to sizes "

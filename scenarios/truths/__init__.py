@@ -2,19 +2,19 @@
 
 from functools import lru_cache
 
-from scenarios.errors import DropspinError
-from scenarios.model import Scenario
-from scenarios.truths.bounce import bounce_ladder
-from scenarios.truths.corner_impact import corner_impact
-from scenarios.truths.coulomb_slide import coulomb_slide
-from scenarios.truths.coulomb_turn import coulomb_turn
-from scenarios.truths.flight import flight
-from scenarios.truths.impact_laws import LAWS, Law
-from scenarios.truths.rocking import rocking
-from scenarios.truths.rolling import rolling
-from scenarios.truths.slipping import slipping
-from scenarios.truths.top import top
-from scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.errors import DropspinError
+from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.truths.bounce import bounce_ladder
+from dropspin.scenarios.truths.corner_impact import corner_impact
+from dropspin.scenarios.truths.coulomb_slide import coulomb_slide
+from dropspin.scenarios.truths.coulomb_turn import coulomb_turn
+from dropspin.scenarios.truths.flight import flight
+from dropspin.scenarios.truths.impact_laws import LAWS, Law
+from dropspin.scenarios.truths.rocking import rocking
+from dropspin.scenarios.truths.rolling import rolling
+from dropspin.scenarios.truths.slipping import slipping
+from dropspin.scenarios.truths.top import top
+from dropspin.scenarios.truths.truth import Impact, Truth
 
 __all__ = ["LAWS", "Impact", "Law", "Truth", "truth_for"]
 

@@ -17,11 +17,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Sphere
-from scenarios.model import TOUCHING, Floor, Scenario
-from scenarios.rotations import rotate, unrotate
-from scenarios.truths.flight import TURNS_OVER, flight_states
-from scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
+from dropspin.scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 

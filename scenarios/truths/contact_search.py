@@ -25,10 +25,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import TOUCHING
-from scenarios.rotations import cross, rotate, unrotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
-from scenarios.truths.flight import Flight
+from dropspin.scenarios.model import TOUCHING
+from dropspin.scenarios.rotations import cross, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
+from dropspin.scenarios.truths.flight import Flight
 
 Array = NDArray[np.float64]
 

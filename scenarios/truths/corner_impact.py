@@ -19,14 +19,14 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Sphere
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY
-from scenarios.truths.contact_search import Contact, ContactSearch
-from scenarios.truths.flight import TURNS_OVER, Flight, flight_states
-from scenarios.truths.impact_laws import Law, law_of, velocities_after
-from scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY
+from dropspin.scenarios.truths.contact_search import Contact, ContactSearch
+from dropspin.scenarios.truths.flight import TURNS_OVER, Flight, flight_states
+from dropspin.scenarios.truths.impact_laws import Law, law_of, velocities_after
+from dropspin.scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 

@@ -17,12 +17,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Sphere
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import rotate
-from scenarios.state import POSITION, SPIN, VELOCITY
-from scenarios.truths.dry_friction import dry_friction
-from scenarios.truths.truth import Truth
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import POSITION, SPIN, VELOCITY
+from dropspin.scenarios.truths.dry_friction import dry_friction
+from dropspin.scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 

@@ -26,11 +26,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Box
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import about, multiply, rotate, unrotate
-from scenarios.state import ORIENTATION, UP, VELOCITY
-from scenarios.truths.truth import Truth
+from dropspin.scenarios.body import Box
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY
+from dropspin.scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import Scenario
-from scenarios.rotations import about, multiply
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from scenarios.trajectory import Trajectory
+from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.rotations import about, multiply
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import Damping, Scenario
-from scenarios.state import ORIENTATION, PARTS, SPIN
-from scenarios.truths.free_rotor import FreeRotor, free_rotor
-from scenarios.truths.truth import Truth
+from dropspin.scenarios.model import Damping, Scenario
+from dropspin.scenarios.state import ORIENTATION, PARTS, SPIN
+from dropspin.scenarios.truths.free_rotor import FreeRotor, free_rotor
+from dropspin.scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.mechanics import is_diagonal, principal_axes
-from scenarios.rotations import about, cross, multiply
-from scenarios.truths.elliptic import Jacobi, argument, integral_of_sn2, jacobi, quarter_period
-from scenarios.truths.rotor_horizon import EPS, horizon, spin_rounding
+from dropspin.scenarios.mechanics import is_diagonal, principal_axes
+from dropspin.scenarios.rotations import about, cross, multiply
+from dropspin.scenarios.truths.elliptic import Jacobi, argument, integral_of_sn2, jacobi, quarter_period
+from dropspin.scenarios.truths.rotor_horizon import EPS, horizon, spin_rounding
 
 Array = NDArray[np.float64]
 SMALLEST_M1 = 1e-290

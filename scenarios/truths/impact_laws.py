@@ -22,11 +22,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Sphere
-from scenarios.model import Floor, Scenario
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
-from scenarios.truths.friction_impact import Restitution, cone_impulse, integrated_impulse
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from dropspin.scenarios.truths.friction_impact import Restitution, cone_impulse, integrated_impulse
 
 Array = NDArray[np.float64]
 Law = Literal["note", "normal", "poisson", "clamped", "coulomb", "cone", "integrated-newton", "integrated-poisson", "integrated-energy"]

@@ -31,12 +31,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import about, multiply
-from scenarios.state import ORIENTATION, UP, VELOCITY
-from scenarios.truths.elliptic import argument, jacobi
-from scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
-from scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import about, multiply
+from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY
+from dropspin.scenarios.truths.elliptic import argument, jacobi
+from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
+from dropspin.scenarios.truths.truth import Impact, Truth
 
 Array = NDArray[np.float64]
 

@@ -23,13 +23,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.body import Sphere
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import about, multiply
-from scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
-from scenarios.truths.coulomb_slide import LEVEL
-from scenarios.truths.dry_friction import Motion, dry_friction
-from scenarios.truths.truth import Truth
+from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import about, multiply
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
+from dropspin.scenarios.truths.coulomb_slide import LEVEL
+from dropspin.scenarios.truths.dry_friction import Motion, dry_friction
+from dropspin.scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
 
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import about, multiply
-from scenarios.state import ORIENTATION, POSITION, UP, VELOCITY
-from scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
-from scenarios.truths.truth import Truth
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import about, multiply
+from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY
+from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
+from dropspin.scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import rotate, unrotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, UP
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ it.
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.model import TOUCHING, Scenario
-from scenarios.rotations import multiply, rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from scenarios.truths.truth import Truth
+from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.rotations import multiply, rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.truths.truth import Truth
 
 Array = NDArray[np.float64]
 

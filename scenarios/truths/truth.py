@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenarios.trajectory import Trajectory
+from dropspin.scenarios.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 States = Callable[[Array], Array]

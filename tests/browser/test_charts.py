@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from scenarios.mechanics import energy
+from dropspin.scenarios.mechanics import energy
 
 ENGINES = ["document", "mujoco"]
 DT = 4e-3

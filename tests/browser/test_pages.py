@@ -19,13 +19,13 @@ from support.cli import dropspin
 from support.scenes import with_few_members
 
 import dropspin as ds
-from reports.plots.chart import Chart, Line
-from reports.plots.colours import EXACT
-from reports.plots.figures import CHARTS
-from reports.replay import as_data, replay_of
-from reports.sections import Section
-from reports.views.run import overview
-from scenarios.rotations import about, angle_between_orientations, multiply
+from dropspin.reports.plots.chart import Chart, Line
+from dropspin.reports.plots.colours import EXACT
+from dropspin.reports.plots.figures import CHARTS
+from dropspin.reports.replay import as_data, replay_of
+from dropspin.reports.sections import Section
+from dropspin.reports.views.run import overview
+from dropspin.scenarios.rotations import about, angle_between_orientations, multiply
 
 ENGINES = ["document", "mujoco", "pybullet"]
 PAGES = ("report.html", "replay.html")
@@ -69,7 +69,7 @@ def write_pages(place):
     # Two studies of one scene have pictures of the same name.
     sections = [study, Section("Where engines break down", study.parts)]
     with pytest.MonkeyPatch.context() as patch:  # 16 of 32 start phases take two thirds of the time
-        patch.setattr("comparisons.running.start_phases.START_PHASES", 16)
+        patch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 16)
         results = ds.run([*map(with_few_members, SCENES), ds.load(failing)], ENGINES)
     made = ds.write_report(results, place / "run", sections).parent
     assert dropspin("replay", made, "--no-open", cwd=place).returncode == 0

@@ -10,8 +10,8 @@ from PIL import Image
 from support.cli import dropspin
 
 import dropspin as ds
-from reports.plots.colours import engine_colours
-from scenarios.rotations import angle_between_orientations, rotate
+from dropspin.reports.plots.colours import engine_colours
+from dropspin.scenarios.rotations import angle_between_orientations, rotate
 
 ENGINES = ["document", "mujoco", "pybullet"]
 SCENES = ["drop-box-corner", "drop-box-anyhow", "spin-asymmetric", "spin-principal-500"]

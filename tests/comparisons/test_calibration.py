@@ -8,12 +8,12 @@ import sys
 import numpy as np
 import pytest
 
-from comparisons import calibration
-from comparisons.calibration import calibrate, drop
-from comparisons.engines.mujoco_contact import damping_ratio
-from comparisons.engines.registry import engine
-from comparisons.running.recording import simulate
-from scenarios import DropspinError, load
+from dropspin.comparisons import calibration
+from dropspin.comparisons.calibration import calibrate, drop
+from dropspin.comparisons.engines.mujoco_contact import damping_ratio
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.recording import simulate
+from dropspin.scenarios import DropspinError, load
 
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95)
 STEPS = (1 / 60, 1 / 240, 1e-3)
@@ -24,7 +24,7 @@ CASES = [
     for number, e in enumerate(RESTITUTIONS)
     for place, dt in enumerate(STEPS)
 ]
-WITHOUT_DROPSPIN = "import sys\nassert not {'comparisons', 'scenarios', 'reports', 'reference_impl'} & set(sys.modules)\n"
+WITHOUT_DROPSPIN = "import sys\nassert 'dropspin' not in sys.modules\n"
 
 
 def value(found, name):

@@ -8,17 +8,17 @@ import pytest
 from support.accuracy_options import InnerStep
 from support.engines import Exact, ExactSimulation
 
-from comparisons.engines.base import BatchSimulation, Diverged
-from comparisons.measuring.metrics import METRICS, leading_metric
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.recording import simulate
-from comparisons.running.run import measure
-from comparisons.tradeoff import costs, errors, study
-from comparisons.tradeoff.errors import DIVISIONS, output_interval
-from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import CostPoint, TradeOff, spread
-from comparisons.tradeoff.study import tradeoff
-from scenarios import DropspinError, load
+from dropspin.comparisons.engines.base import BatchSimulation, Diverged
+from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.run import measure
+from dropspin.comparisons.tradeoff import costs, errors, study
+from dropspin.comparisons.tradeoff.errors import DIVISIONS, output_interval
+from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff, spread
+from dropspin.comparisons.tradeoff.study import tradeoff
+from dropspin.scenarios import DropspinError, load
 
 SPIN = load("spin-asymmetric")
 
@@ -432,7 +432,7 @@ CLOCK = {"now": 0.0, "calls": 0}
 
 def test_cost_of_a_round_is_that_of_the_least_disturbed_timing(monkeypatch):
     """By a clock that only the engine advances; the call, whose time is subtracted, is disturbed too."""
-    monkeypatch.setattr("comparisons.running.recording.time.perf_counter", lambda: CLOCK["now"])
+    monkeypatch.setattr("dropspin.comparisons.running.recording.time.perf_counter", lambda: CLOCK["now"])
     assert costs.cost(EngineEntry("disturbed", Disturbed()), SPIN, 0.01) == pytest.approx(STEP / 0.01, rel=1e-9)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import tomlkit
 from support.adapters import DRIFTING
 
-from scenarios.loading import CATALOGUE, names
+from dropspin.scenarios.loading import CATALOGUE, names
 
 CATALOGUE_FILES = {name: (CATALOGUE / f"{name}.toml").read_bytes() for name in names()}
 BALL: dict[str, Any] = {

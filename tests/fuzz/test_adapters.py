@@ -123,7 +123,7 @@ SPEC = 'scenes = ["drift.toml"]\nengines = ["mine:Mine", "document"]\ndts = [0.0
 
 def run_with(changes, command):
     """Run a command with an adapter that is changed."""
-    with surroundings() as work, mock.patch("comparisons.running.processes.WALL_TIME_FACTOR", 3.0):
+    with surroundings() as work, mock.patch("dropspin.comparisons.running.processes.WALL_TIME_FACTOR", 3.0):
         for name, text in {"drift.toml": DRIFT_FILE, "ball.toml": BALL_FILE, "spec.toml": SPEC}.items():
             (work / name).write_text(text)
         (work / "mine.py").write_text("\n".join([ADAPTER, EVIL, *changes, ""]))

@@ -6,10 +6,10 @@ import click
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dropspin.reports.commands.main import COMMANDS, dropspin
 from fuzz.campaign import cases
 from fuzz.cases import fill, run, run_alone, surroundings
 from fuzz.strategies import NUMBERS, TEXTS
-from reports.commands.main import COMMANDS, dropspin
 
 SOUND = {
     "engine_name": ["mujoco", "document", "mujoco[integrator=rk4]"],

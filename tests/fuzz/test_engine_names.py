@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comparisons.engines.registry import BUILT_IN, engine
+from dropspin.comparisons.engines.registry import BUILT_IN, engine
 from fuzz.campaign import cases
 from fuzz.cases import run, surroundings
 from fuzz.inputs import ADAPTER, BALL_FILE, DRIFT_FILE, SPEC, toml

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.run_folders import replace_file
 
-from comparisons.results.run_file import signed
+from dropspin.comparisons.results.run_file import signed
 from fuzz.campaign import cases
 from fuzz.cases import fill, run, surroundings
 from fuzz.strategies import JSON, TEXTS, damaged, edited

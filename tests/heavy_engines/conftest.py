@@ -1,6 +1,6 @@
 """The option --engine: the engine whose adapter is tested, in an environment that has it."""
 
-from comparisons.results.provenance import versions
+from dropspin.comparisons.results.provenance import versions
 
 
 def pytest_addoption(parser):

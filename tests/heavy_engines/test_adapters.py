@@ -8,11 +8,11 @@ import pytest
 from support import cli
 from support.findings import verify_findings
 
-import scenarios
-from comparisons.conformance.checks import CHECKS
-from comparisons.engines.registry import engine
-from comparisons.running.recording import simulate
-from comparisons.running.run import measure
+from dropspin import scenarios
+from dropspin.comparisons.conformance.checks import CHECKS
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.run import measure
 
 STEPS = 100
 DT = 2e-3

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-import scenarios
-from comparisons.engines.rapier_js_node import node
-from comparisons.engines.registry import engine
-from comparisons.running.engine_process import Failed
-from comparisons.running.entries import engine_entry
-from comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin import scenarios
+from dropspin.comparisons.engines.rapier_js_node import node
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 
 DT = 2e-3
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support.transcription import update
 
-import reference_impl
-from reference_impl import Body, Floor, World
-from reference_impl.state import ORIENTATION, SPIN, VELOCITY
+from dropspin import reference_impl
+from dropspin.reference_impl import Body, Floor, World
+from dropspin.reference_impl.state import ORIENTATION, SPIN, VELOCITY
 
 GRAVITY = np.array([0.0, -9.8, 0.0])
 STEPS = 50

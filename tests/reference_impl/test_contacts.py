@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import reference_impl
-from reference_impl import Body, Floor, Methods, World
-from reference_impl.state import ORIENTATION, SPIN, VELOCITY
+from dropspin import reference_impl
+from dropspin.reference_impl import Body, Floor, Methods, World
+from dropspin.reference_impl.state import ORIENTATION, SPIN, VELOCITY
 
 G = np.array([0.0, -9.8, 0.0])
 STICKS = np.inf
@@ -89,7 +89,7 @@ def test_sequential_leaves_no_vertex_approaching(law, friction, e):
 
 def test_sequential_warns_if_it_did_not_converge():
     """Infinite friction at several vertices need not have a solution; each step converges or warns."""
-    from reference_impl import UnsolvedContact
+    from dropspin.reference_impl import UnsolvedContact
 
     methods, unsolved = Methods(law="coulomb", contact="sequential"), 0
     for body, state in random_contacts(200):

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.methods import COVERING
 
-import reference_impl
-from reference_impl import Body, Floor, Methods, World, lanes
-from reference_impl.state import ORIENTATION, SPIN, VELOCITY
+from dropspin import reference_impl
+from dropspin.reference_impl import Body, Floor, Methods, World, lanes
+from dropspin.reference_impl.state import ORIENTATION, SPIN, VELOCITY
 
 G = np.array([0.0, -9.8, 0.0])
 POINTS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.1, 0.2, 0.3]

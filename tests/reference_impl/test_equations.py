@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-import reference_impl
-from reference_impl.body import Floor, World
-from reference_impl.contacts.mean import apply_impulse
-from reference_impl.contacts.response import impulse_response
-from reference_impl.laws import note
-from reference_impl.parameters import pack, read_body
-from reference_impl.quaternion import normalise, product, rotation_matrix
-from reference_impl.vectors import Mat3, Quat, Vec3, cross, cross_matrix, dot, solve
+from dropspin import reference_impl
+from dropspin.reference_impl.body import Floor, World
+from dropspin.reference_impl.contacts.mean import apply_impulse
+from dropspin.reference_impl.contacts.response import impulse_response
+from dropspin.reference_impl.laws import note
+from dropspin.reference_impl.parameters import pack, read_body
+from dropspin.reference_impl.quaternion import normalise, product, rotation_matrix
+from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, cross, cross_matrix, dot, solve
 
 numbers = st.floats(-3, 3, allow_subnormal=False)
 vectors = arrays(float, 3, elements=numbers)

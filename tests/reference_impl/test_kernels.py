@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from support.methods import COVERING, FURTHER
 
-import reference_impl
-from reference_impl import Body, Floor, Methods, World
-from reference_impl.kernels import recording_kernel
-from reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
-from reference_impl.state import ORIENTATION
+from dropspin import reference_impl
+from dropspin.reference_impl import Body, Floor, Methods, World
+from dropspin.reference_impl.kernels import recording_kernel
+from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+from dropspin.reference_impl.state import ORIENTATION
 
 PACKAGE = Path(reference_impl.__file__).parent
 KINDS, BODIES = 5, 19  # 19 bodies of 5 kinds: more than fill the lanes, and not a multiple of their number
@@ -64,7 +64,7 @@ def interpreted(monkeypatch):
     def call(function, *arguments):
         with monkeypatch.context() as patched:
             patched.setattr(numba.config, "DISABLE_JIT", 1)
-            patched.setattr(sys.modules["reference_impl.simulate"], "recording_kernel", recording_kernel.__wrapped__)
+            patched.setattr(sys.modules["dropspin.reference_impl.simulate"], "recording_kernel", recording_kernel.__wrapped__)
             return function(*arguments)
 
     return call
@@ -108,7 +108,7 @@ def test_kernels_are_interpreted_if_the_user_disables_jit(interpreted):
 def test_ensemble_has_the_same_bits_on_a_processor_without_avx():
     """There are fewer lanes, and every body has the same bits."""
     program = (
-        "import test_kernels as t\nfrom reference_impl import lanes\n"
+        "import test_kernels as t\nfrom dropspin.reference_impl import lanes\n"
         "print(lanes.WIDTH, t.reference_impl.simulate(*t.tumbling(t.ALL, None), t.STEPS, threads=1).tobytes().hex())"
     )
     plain = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYTHONPATH": str(Path(__file__).parents[1])}
@@ -141,10 +141,10 @@ FALL = """
 import numba, sys
 before = numba.config.CACHE_DIR
 import numpy as np
-import reference_impl as r
+import dropspin.reference_impl as r
 body = r.Body(1.0, np.eye(3), np.zeros((1, 3)), 0.1)
 rows = r.simulate(np.array([0, 9, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.]), body, r.World(np.array([0, -1, 0])), 1.0, 1)
-from reference_impl.kernels import Parts, recording_kernel
+from dropspin.reference_impl.kernels import Parts, recording_kernel
 kernel = recording_kernel(r.Methods(), Parts(gravity=True, forces=False, damping=False, floor=False, turning=False), 1)
 print(rows[-1, 8], sum(kernel.stats.cache_hits.values()), numba.config.CACHE_DIR == before)
 """
@@ -171,7 +171,8 @@ def fall():
 @pytest.fixture
 def package(tmp_path):
     """A folder with a copy of the package and no cache."""
-    shutil.copytree(PACKAGE, tmp_path / "reference_impl", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, tmp_path / "dropspin" / "reference_impl", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "dropspin" / "__init__.py").touch()
     return tmp_path
 
 
@@ -179,11 +180,11 @@ def test_edited_source_is_compiled_anew(package, fall):
     """A second process takes the kernel from the cache; an edit in a file that the kernel only imports makes it stale."""
     assert fall(package) == ["-1.0", "0", "True"]
     assert fall(package) == ["-1.0", "1", "True"]
-    step = package / "reference_impl" / "step.py"
+    step = package / "dropspin" / "reference_impl" / "step.py"
     step.write_text(step.read_text().replace("v = v + dt * gravity", "v = v + (2.0 * dt) * gravity"))
     assert fall(package) == ["-2.0", "0", "True"]
     assert fall(package) == ["-2.0", "1", "True"]
-    law = package / "reference_impl" / "laws" / "note.py"
+    law = package / "dropspin" / "reference_impl" / "laws" / "note.py"
     law.write_text(law.read_text() + "# in a folder of the package\n")
     assert fall(package) == ["-2.0", "0", "True"]
 
@@ -205,7 +206,8 @@ def test_user_s_cache_setting_survives_first_use_in_many_threads():
     """Kernels declared at once by several threads leave numba's setting unchanged."""
     program = (
         "import sys, numba\nsys.setswitchinterval(1e-6)\nfrom concurrent.futures import ThreadPoolExecutor\n"
-        "from reference_impl.kernels import Parts, recording_kernel\nfrom reference_impl import Methods\nbefore = numba.config.CACHE_DIR\n"
+        "from dropspin.reference_impl.kernels import Parts, recording_kernel\n"
+        "from dropspin.reference_impl import Methods\nbefore = numba.config.CACHE_DIR\n"
         "parts = Parts(True, False, False, True, True)\n"
         "with ThreadPoolExecutor(8) as pool:\n"
         "    list(pool.map(lambda law: recording_kernel(Methods(law=law), parts, 1), ['note', 'normal', 'poisson', 'coulomb'] * 8))\n"

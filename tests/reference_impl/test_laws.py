@@ -8,11 +8,11 @@ from numba import njit
 from scipy.optimize import differential_evolution, minimize
 from scipy.spatial.transform import Rotation
 
-import reference_impl
-from reference_impl import Body, Floor, Methods, World
-from reference_impl.contacts.response import impulse_response
-from reference_impl.laws import clamped, coulomb, normal, note, poisson
-from reference_impl.vectors import Mat3, Vec3, dot, solve
+from dropspin import reference_impl
+from dropspin.reference_impl import Body, Floor, Methods, World
+from dropspin.reference_impl.contacts.response import impulse_response
+from dropspin.reference_impl.laws import clamped, coulomb, normal, note, poisson
+from dropspin.reference_impl.vectors import Mat3, Vec3, dot, solve
 
 G = np.array([0.0, -9.8, 0.0])
 LAWS = {"note": note, "normal": normal, "poisson": poisson, "clamped": clamped, "coulomb": coulomb}

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-import reference_impl.state
-import scenarios.state
-from comparisons.engines import base
-from reference_impl import Body, Floor, Methods, World, simulate
-from reference_impl.methods import COLLIDE, CONTACTS, CORRECTIONS, LAWS, ROTATIONS
+import dropspin.reference_impl.state
+import dropspin.scenarios.state
+from dropspin.comparisons.engines import base
+from dropspin.reference_impl import Body, Floor, Methods, World, simulate
+from dropspin.reference_impl.methods import COLLIDE, CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 
 LEAVES = [*ROTATIONS.values(), *LAWS.values(), *CONTACTS.values(), *(leaf for leaf in CORRECTIONS.values() if leaf)]
 
@@ -74,4 +74,4 @@ def test_discretisations_shared_with_other_engines_have_the_same_names():
 
 def test_state_layouts_of_the_two_packages_agree():
     for name in ("POSITION", "ORIENTATION", "VELOCITY", "SPIN"):
-        assert getattr(reference_impl.state, name) == getattr(scenarios.state, name)
+        assert getattr(dropspin.reference_impl.state, name) == getattr(dropspin.scenarios.state, name)

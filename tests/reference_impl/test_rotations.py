@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import reference_impl
-from reference_impl import Body, Methods, World
-from reference_impl.elliptic import r_c1, r_f, r_j, sn_cn_dn
-from reference_impl.methods import ROTATIONS
-from reference_impl.state import ORIENTATION, SPIN
-from scenarios.rotations import angle_between_orientations, rotate, unrotate
-from scenarios.truths.free_rotor import free_rotor
+from dropspin import reference_impl
+from dropspin.reference_impl import Body, Methods, World
+from dropspin.reference_impl.elliptic import r_c1, r_f, r_j, sn_cn_dn
+from dropspin.reference_impl.methods import ROTATIONS
+from dropspin.reference_impl.state import ORIENTATION, SPIN
+from dropspin.scenarios.rotations import angle_between_orientations, rotate, unrotate
+from dropspin.scenarios.truths.free_rotor import free_rotor
 
 POINTS = np.array([[0.1, 0.1, 0.1], [-0.1, -0.1, -0.1]])
 IDENTITY, TILTED = np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.5, 0.5, 0.5, 0.5])
@@ -119,7 +119,7 @@ def test_energy_drift_of_each_rotation():
 
 def test_rotations_do_not_depend_on_the_body_frame():
     """A body in a rotated frame, whose inertia tensor is not diagonal, turns alike."""
-    from scenarios.rotations import multiply
+    from dropspin.scenarios.rotations import multiply
 
     frame = np.array([0.1, -0.5, 0.3, 0.8]) / np.linalg.norm([0.1, -0.5, 0.3, 0.8])
     axes = rotate(frame, np.eye(3)).T

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import reference_impl
-from reference_impl import Body, Floor, World
-from reference_impl.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin import reference_impl
+from dropspin.reference_impl import Body, Floor, World
+from dropspin.reference_impl.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 G = np.array([0.0, -9.8, 0.0])
 HALF = np.array([0.1, 0.2, 0.3])

@@ -13,8 +13,8 @@ from support import cli
 from support.findings import PAGE, findings, heavy_engine, verify_findings
 
 import dropspin as ds
-from reports.commands.main import COMMANDS, dropspin
-from scenarios import body, model
+from dropspin.reports.commands.main import COMMANDS, dropspin
+from dropspin.scenarios import body, model
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "reference_impl" / "README.md"]
@@ -138,10 +138,10 @@ def test_commands_of_the_pages_exist_with_their_options(page):
 
 def quoted_constants():
     """By page, phrases with the constants of the code that they quote."""
-    from comparisons.robustness import runner
-    from comparisons.robustness import study as limits
-    from comparisons.running.start_phases import START_PHASES
-    from comparisons.tradeoff import costs, errors, points, study
+    from dropspin.comparisons.robustness import runner
+    from dropspin.comparisons.robustness import study as limits
+    from dropspin.comparisons.running.start_phases import START_PHASES
+    from dropspin.comparisons.tradeoff import costs, errors, points, study
 
     ladder = [
         f"exceeds `--budget` ({errors.BUDGET:g} s)",
@@ -188,7 +188,7 @@ def rows_of(heading):
 
 def public_members(kind):
     """The fields, properties and methods that a class of dropspin has, without private ones."""
-    own = [base for base in kind.__mro__ if base.__module__.partition(".")[0] in ("scenarios", "comparisons")]
+    own = [base for base in kind.__mro__ if base.__module__.startswith(("dropspin.scenarios", "dropspin.comparisons"))]
     names = {name for base in own for name in [*vars(base), *inspect.get_annotations(base)]} - {"model_config"}
     return {name for name in names if not name.startswith("_")}
 

@@ -6,8 +6,8 @@ import json
 import pytest
 from support.cli import dropspin
 
-from comparisons.results.output import written_whole
-from reports.output import folder_made, write_table
+from dropspin.comparisons.results.output import written_whole
+from dropspin.reports.output import folder_made, write_table
 
 
 @pytest.mark.parametrize("verb", ["limits", "tradeoff"])

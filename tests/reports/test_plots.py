@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from comparisons.results.measurement import as_table
-from comparisons.results.store import save
-from reports import plots
-from reports.plots.colours import EXACT, engine_styles
-from reports.plots.figures import ensemble_charts
-from reports.plots.spins import VIEWS, energy_ellipsoid, facing, polhode_paths
-from reports.plots.style import power
-from scenarios import Trajectory, members, truth_for
-from scenarios.mechanics import energy, kinetic_energy
-from scenarios.rotations import about, multiply, rotate, unrotate
+from dropspin.comparisons.results.measurement import as_table
+from dropspin.comparisons.results.store import save
+from dropspin.reports import plots
+from dropspin.reports.plots.colours import EXACT, engine_styles
+from dropspin.reports.plots.figures import ensemble_charts
+from dropspin.reports.plots.spins import VIEWS, energy_ellipsoid, facing, polhode_paths
+from dropspin.reports.plots.style import power
+from dropspin.scenarios import Trajectory, members, truth_for
+from dropspin.scenarios.mechanics import energy, kinetic_energy
+from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 
 DT = 1e-3
 

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from support.problem_sheets import END, INDEX, START, index_table, sheet, sheet_path
 
-from scenarios.problems import problems
+from dropspin.scenarios.problems import problems
 
 VALUE = re.compile(r"(?<=\| )-?\d+\.\d{6,}(?= \|)")
 """A printed value of an exact solution, which is the only content of its cell."""

@@ -5,7 +5,7 @@ import re
 import pytest
 from support.published_page import END, PAGE, START, output_of
 
-from comparisons.published.sources import source_names
+from dropspin.comparisons.published.sources import source_names
 
 SLOW = ("gazebo-boxes", "simbenchmark-bouncing")
 """Sources that take seconds, and whose tables have values of an engine that need not be installed."""

@@ -12,16 +12,16 @@ from PIL import Image
 from support.cli import dropspin
 
 import dropspin as ds
-from comparisons.results.store import save
-from reports.commands.replay import replay_command
-from reports.html.replay import replay_page
-from reports.plots.colours import EXACT
-from reports.replay import replay_of
-from reports.replay.clip import write_clip
-from reports.replay.motions import MOST_FRAMES, _stride, floor_impulses, impact_rows
-from scenarios import DropspinError, Trajectory, truth_for
-from scenarios.mechanics import angular_momentum
-from scenarios.rotations import about, angle_between_orientations, multiply, rotate
+from dropspin.comparisons.results.store import save
+from dropspin.reports.commands.replay import replay_command
+from dropspin.reports.html.replay import replay_page
+from dropspin.reports.plots.colours import EXACT
+from dropspin.reports.replay import replay_of
+from dropspin.reports.replay.clip import write_clip
+from dropspin.reports.replay.motions import MOST_FRAMES, _stride, floor_impulses, impact_rows
+from dropspin.scenarios import DropspinError, Trajectory, truth_for
+from dropspin.scenarios.mechanics import angular_momentum
+from dropspin.scenarios.rotations import about, angle_between_orientations, multiply, rotate
 
 
 @pytest.fixture(scope="module")

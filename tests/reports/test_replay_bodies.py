@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from reports.replay.bodies import outline
-from scenarios.rotations import rotate
+from dropspin.reports.replay.bodies import outline
+from dropspin.scenarios.rotations import rotate
 
 SOLIDS = {
     "box": ({"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0}, 6, 8 * 0.1 * 0.2 * 0.3),

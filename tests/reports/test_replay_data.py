@@ -9,11 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import dropspin as ds
-from reports.replay import Replay, as_data, replay_of
-from reports.replay.data import quantised
-from reports.replay.motions import MOST_FRAMES, Impacts, Motion
-from scenarios import Trajectory, truth_for
-from scenarios.rotations import about, angle_between_orientations
+from dropspin.reports.replay import Replay, as_data, replay_of
+from dropspin.reports.replay.data import quantised
+from dropspin.reports.replay.motions import MOST_FRAMES, Impacts, Motion
+from dropspin.scenarios import Trajectory, truth_for
+from dropspin.scenarios.rotations import about, angle_between_orientations
 
 LARGEST = float(np.finfo(np.float32).max)
 

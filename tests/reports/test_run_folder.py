@@ -16,21 +16,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from comparisons.results.store import load_results
-from comparisons.running.run import run
-from reports import run_folder
-from reports.html.replay import replay_page
-from reports.html.report import html_report
-from reports.markdown import run_markdown
-from reports.plots import figures
-from reports.plots.figures import report_charts
-from reports.replay import replay_of
-from reports.run_folder import write_report
-from reports.terminal.run_table import print_table
-from reports.views.findings import profile_comparisons
-from reports.views.numbers import formatted
-from reports.views.run import overview
-from scenarios import DropspinError, load
+from dropspin.comparisons.results.store import load_results
+from dropspin.comparisons.running.run import run
+from dropspin.reports import run_folder
+from dropspin.reports.html.replay import replay_page
+from dropspin.reports.html.report import html_report
+from dropspin.reports.markdown import run_markdown
+from dropspin.reports.plots import figures
+from dropspin.reports.plots.figures import report_charts
+from dropspin.reports.replay import replay_of
+from dropspin.reports.run_folder import write_report
+from dropspin.reports.terminal.run_table import print_table
+from dropspin.reports.views.findings import profile_comparisons
+from dropspin.reports.views.numbers import formatted
+from dropspin.reports.views.run import overview
+from dropspin.scenarios import DropspinError, load
 
 NASTY = "<script>alert(1)</script>$x_{"
 

@@ -8,10 +8,10 @@ import pytest
 from support.cli import TERMINAL, dropspin
 
 import dropspin as ds
-from reports.terminal.rows import print_rows
-from reports.terminal.summary import print_summary
-from reports.views.matrix import MOST_SCENES, matrix
-from reports.views.run import overview
+from dropspin.reports.terminal.rows import print_rows
+from dropspin.reports.terminal.summary import print_summary
+from dropspin.reports.views.matrix import MOST_SCENES, matrix
+from dropspin.reports.views.run import overview
 
 
 @pytest.fixture(scope="module")

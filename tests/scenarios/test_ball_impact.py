@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from scenarios import load, truth_for
-from scenarios.mechanics import lowest_height
-from scenarios.state import RATES, SPIN, VELOCITY
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import lowest_height
+from dropspin.scenarios.state import RATES, SPIN, VELOCITY
 
 
 def ball_with_spin(friction, inertia="solid"):

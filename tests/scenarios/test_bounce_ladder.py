@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios import load, truth_for
-from scenarios.rotations import about, multiply, rotate
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.rotations import about, multiply, rotate
 
 
 def ball(restitution=0.5, height=1.0, g=9.8, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), duration=3.0, **floor):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from scenarios import load, truth_for
-from scenarios.rotations import rotate
-from scenarios.truths.contact_search import ContactSearch
-from scenarios.truths.flight import flight_states
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.truths.contact_search import ContactSearch
+from dropspin.scenarios.truths.flight import flight_states
 
 
 def floating_ball(height, **start):

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from scenarios import load, truth_for
-from scenarios.mechanics import angular_momentum, energy, lowest_height
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, RATES, SPIN, VELOCITY
-from scenarios.trajectory import Trajectory
-from scenarios.transformations import in_units
-from scenarios.truths.flight import flight_states
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import angular_momentum, energy, lowest_height
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, VELOCITY
+from dropspin.scenarios.trajectory import Trajectory
+from dropspin.scenarios.transformations import in_units
+from dropspin.scenarios.truths.flight import flight_states
 
 UP = np.array([0.0, 1.0, 0.0])
 

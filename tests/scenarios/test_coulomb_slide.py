@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenarios import load, truth_for
+from dropspin.scenarios import load, truth_for
 
 
 def sliding(friction=0.3, velocity=(3.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), height=0.1, half=(0.3, 0.1, 0.2), **more):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scenarios import load, truth_for
-from scenarios.rotations import rotate
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.rotations import rotate
 
 HALF = np.array([0.3, 0.1, 0.2])
 

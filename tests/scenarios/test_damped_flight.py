@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 from support.taylor import free_rotor as taylor_rotor
 
-from scenarios import load, truth_for
-from scenarios.rotations import angle_between_orientations, unrotate
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.rotations import angle_between_orientations, unrotate
 
 TIMES = [0.0, 1e-3, 0.5, 2.0, 10.0]
 

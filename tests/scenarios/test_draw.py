@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from scenarios import DropspinError, SceneError, load, truth_for
-from scenarios.draw import draw, drawn_scene
-from scenarios.families import FAMILIES, GRAVITY, LENGTH, MASS, RESTITUTION, Draws
-from scenarios.mechanics import is_diagonal
+from dropspin.scenarios import DropspinError, SceneError, load, truth_for
+from dropspin.scenarios.draw import draw, drawn_scene
+from dropspin.scenarios.families import FAMILIES, GRAVITY, LENGTH, MASS, RESTITUTION, Draws
+from dropspin.scenarios.mechanics import is_diagonal
 
 
 @pytest.fixture(scope="module")

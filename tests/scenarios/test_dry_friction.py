@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from scenarios.truths.dry_friction import dry_friction
+from dropspin.scenarios.truths.dry_friction import dry_friction
 
 START = np.array([1.5, 0.0, -2.0])
 

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from scenarios.truths.elliptic import argument, integral_of_sn2, jacobi, quarter_period
+from dropspin.scenarios.truths.elliptic import argument, integral_of_sn2, jacobi, quarter_period
 
 M1 = [1.0, 0.9, 0.5, 1e-3, 1e-8, 4e-18, 4e-26]
 
@@ -66,7 +66,7 @@ def test_integral_of_sn2_matches_quadrature(m1, n):
 
 def test_sn_of_a_tiny_argument_is_the_argument():
     """Where cn/sn would overflow, in the exact solutions and in the kernels."""
-    from reference_impl.elliptic import sn_cn_dn
+    from dropspin.reference_impl.elliptic import sn_cn_dn
 
     for u in (1e-110, 1e-160, 1e-300, -1e-200):
         found = jacobi(np.array([u]), 0.3)

@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from scenarios import SceneError, load, members
-from scenarios.state import ORIENTATION
+from dropspin.scenarios import SceneError, load, members
+from dropspin.scenarios.state import ORIENTATION
 
 
 def scene_with(**ensemble):

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support import taylor
 
-from scenarios.rotations import angle_between_orientations, multiply, rotate, unrotate
-from scenarios.truths.free_rotor import AsymmetricTop, free_rotor, principal_spin
+from dropspin.scenarios.rotations import angle_between_orientations, multiply, rotate, unrotate
+from dropspin.scenarios.truths.free_rotor import AsymmetricTop, free_rotor, principal_spin
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 TILTED = np.array([0.5, 0.5, 0.5, 0.5])  # a unit quaternion that doubles hold exactly, and that only permutes axes
@@ -119,7 +119,7 @@ def test_motion_can_be_restarted_at_any_time(inertia, spin, start, pause):
 
 def test_symmetric_top_reduces_to_two_rotations():
     """A body with two equal moments: R(t) = exp(t L/A) R₀ exp(t (1 - C/A) ω₃ e₃), to 1e-12 rad."""
-    from scenarios.rotations import about
+    from dropspin.scenarios.rotations import about
 
     A, C, spin, t = 1.0, 1.5, np.array([0.4, -0.3, 2.0]), np.linspace(0, 30, 50)
     orientation, _ = free_rotor(np.diag([A, A, C]), TILTED, rotate(TILTED, spin))(t)

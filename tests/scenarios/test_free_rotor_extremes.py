@@ -5,10 +5,10 @@ import pytest
 from mpmath import matrix, mp, mpf
 from support import taylor
 
-from scenarios import load, truth_for
-from scenarios.rotations import angle_between_orientations, rotate
-from scenarios.truths.free_rotor import free_rotor
-from scenarios.truths.rotor_horizon import EPS, TOLERANCE
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.rotations import angle_between_orientations, rotate
+from dropspin.scenarios.truths.free_rotor import free_rotor
+from dropspin.scenarios.truths.rotor_horizon import EPS, TOLERANCE
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 TURNED = np.array([0.5, 10.0, 40.0])  # rad, about

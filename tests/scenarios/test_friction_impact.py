@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from scenarios import load, truth_for
-from scenarios.mechanics import energy
-from scenarios.state import VELOCITY
-from scenarios.trajectory import Trajectory
-from scenarios.truths.friction_impact import cone_impulse, integrated_impulse
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import energy
+from dropspin.scenarios.state import VELOCITY
+from dropspin.scenarios.trajectory import Trajectory
+from dropspin.scenarios.truths.friction_impact import cone_impulse, integrated_impulse
 
 UP = np.array([0.0, 1.0, 0.0])
 ENDS = ("newton", "poisson", "energy")

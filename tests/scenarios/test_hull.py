@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scenarios import load
-from scenarios.body import hull_corners
-from scenarios.mechanics import lowest_height, offset_of
-from scenarios.trajectory import Trajectory
+from dropspin.scenarios import load
+from dropspin.scenarios.body import hull_corners
+from dropspin.scenarios.mechanics import lowest_height, offset_of
+from dropspin.scenarios.trajectory import Trajectory
 
 SKEW = Rotation.from_quat([0.2, 0.5, -0.3, 0.7]).as_matrix()
 GRID = np.stack(np.meshgrid(np.arange(5.0), np.arange(4.0)), axis=-1).reshape(-1, 2)

@@ -9,11 +9,11 @@ from hypothesis.extra.numpy import arrays
 from mpmath import mp, mpf
 from support.taylor import free_rotor as taylor_rotor
 
-from scenarios import load, truth_for
-from scenarios.model import Floor
-from scenarios.state import ORIENTATION, POSITION, RATES
-from scenarios.truths import LAWS
-from scenarios.truths.impact_laws import FRICTION_LAWS, law_of, velocities_after
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.model import Floor
+from dropspin.scenarios.state import ORIENTATION, POSITION, RATES
+from dropspin.scenarios.truths import LAWS
+from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of, velocities_after
 
 vectors = arrays(float, 3, elements=st.floats(-3, 3, allow_subnormal=False))
 INERTIA, MASS = np.diag([0.3, 0.5, 0.6]), 1.3
@@ -138,7 +138,7 @@ def test_flight_and_first_impact_match_forty_digits(name, law):
 
 
 def lowest_corner(scene, impact):
-    from scenarios.rotations import rotate
+    from dropspin.scenarios.rotations import rotate
 
     return int(np.argmin(rotate(impact.before[ORIENTATION], scene.body.vertices)[:, 1]))
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import scenarios
-from scenarios import SceneError, load
+from dropspin import scenarios
+from dropspin.scenarios import SceneError, load
 
 MALFORMED = sorted((Path(__file__).parent / "malformed").glob("*.toml"))
 BALL = {"duration": 1.0, "body": {"shape": "sphere", "radius": 0.1, "mass": 1.0}}

@@ -2,8 +2,8 @@
 
 import pytest
 
-from scenarios import SceneError, load, names
-from scenarios.problems import identifier, problems
+from dropspin.scenarios import SceneError, load, names
+from dropspin.scenarios.problems import identifier, problems
 
 CHANGED = """The definition of {0.identifier} ({0.scene}) is not the one in scenarios/problems.toml.
 If the change is not intended, undo it. If it is, the problem has a new definition: set version = {1} and digest = "{2}", say in

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from support.event_driven import integrate
 
-from scenarios import load, truth_for
-from scenarios.mechanics import lowest_height
-from scenarios.rotations import angle_between_orientations
-from scenarios.state import ORIENTATION, POSITION, RATES
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import lowest_height
+from dropspin.scenarios.rotations import angle_between_orientations
+from dropspin.scenarios.state import ORIENTATION, POSITION, RATES
 
 SHORT = 1e-6  # of the first flight: impacts up to the first flight that is shorter must be in the solution
 PULLS = "the impact law would have the floor pull"

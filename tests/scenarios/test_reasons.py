@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from comparisons.engines.registry import BUILT_IN
-from scenarios import load, names
+from dropspin.comparisons.engines.registry import BUILT_IN
+from dropspin.scenarios import load, names
 
 NAMES = {engine: engine for engine in BUILT_IN} | {"document": "wang", "pybullet": "bullet"}
 """What a text calls an engine, in lower case."""

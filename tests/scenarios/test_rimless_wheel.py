@@ -12,10 +12,10 @@ from mpmath import mp, mpf
 from support.scenes import G, prism, regular
 from support.taylor import Solution
 
-from scenarios import load, truth_for
-from scenarios.mechanics import energy
-from scenarios.rotations import about, multiply, rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import energy
+from dropspin.scenarios.rotations import about, multiply, rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN
 
 UP = np.array([0.0, 1.0, 0.0])
 IRREGULAR = ([0.0, -0.21], [0.13, -0.16], [0.22, 0.02], [-0.02, 0.2], [-0.18, -0.06]), (0.5, 0.7, 0.4, 0.6, 0.8)

@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from scenarios import load, truth_for
-from scenarios.mechanics import energy
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import energy
 
 RADIUS = 0.1
 

@@ -12,10 +12,10 @@ from mpmath import mp, mpf
 from support.scenes import standing
 from support.taylor import Solution
 
-from scenarios import load, truth_for
-from scenarios.mechanics import energy
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, POSITION, SPIN
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import energy
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN
 
 AXES = list(permutations(range(3)))
 

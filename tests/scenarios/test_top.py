@@ -6,9 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from scenarios import load, truth_for
-from scenarios.mechanics import angular_momentum, energy
-from scenarios.rotations import about, multiply, rotate
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.mechanics import angular_momentum, energy
+from dropspin.scenarios.rotations import about, multiply, rotate
 
 H, MASS, G = 0.1, 2.0, 9.8
 TO_CENTRE = np.array([H, H, H])

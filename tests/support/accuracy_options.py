@@ -6,10 +6,10 @@ from typing import ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from comparisons.engines.base import Engine, NumericOption, Simulation
-from comparisons.engines.document import Document
-from scenarios.rotations import cross, multiply, rotate, unrotate
-from scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.comparisons.engines.base import Engine, NumericOption, Simulation
+from dropspin.comparisons.engines.document import Document
+from dropspin.scenarios.rotations import cross, multiply, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
 LEAST_REBOUND = 1e-6
 """Rebounds below this speed [m/s] end on the floor."""

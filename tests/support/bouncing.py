@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.engines.base import Engine
-from scenarios import Scenario
-from scenarios.rotations import about, multiply
+from dropspin.comparisons.engines.base import Engine
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import about, multiply
 from support.sampled import Sampled, undistorted
 
 Array = np.ndarray

@@ -7,8 +7,8 @@ import time
 
 import numpy as np
 
-from comparisons.running.processes import ResourceLimits
-from scenarios import load
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.scenarios import load
 from support.engines import Exact
 
 BALL = load("drop-ball")

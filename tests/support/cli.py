@@ -35,7 +35,7 @@ def dropspin(*arguments: object, cwd: Path | str, stdout: TextIO | None = None, 
 
     Its output goes to `stdout` and `stderr`, or into the result.
     """
-    from reports.commands.main import main
+    from dropspin.reports.commands.main import main
 
     out, err = io.StringIO(), io.StringIO()
     code: object = 0

@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.engines.base import Engine, Simulation
-from comparisons.engines.registry import engine
-from comparisons.running.run import DEFAULT_DTS, run
-from scenarios import load
-from scenarios.model import Damping, Scenario
-from scenarios.state import VELOCITY
+from dropspin.comparisons.engines.base import Engine, Simulation
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.run import DEFAULT_DTS, run
+from dropspin.scenarios import load
+from dropspin.scenarios.model import Damping, Scenario
+from dropspin.scenarios.state import VELOCITY
 from support.fault_suite import (
     Made,
     with_body,

@@ -10,16 +10,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.engines.base import Engine
-from comparisons.engines.registry import engine as engine_named
-from comparisons.judging.convergence import ARTEFACTS, DESYNCHRONISED, JUMPING, SATURATION, Claim, SeriesPoint, study_convergence
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metric import Metric
-from comparisons.measuring.metrics import metrics_for
-from comparisons.measuring.tolerances import negligible
-from comparisons.running.recording import record
-from comparisons.running.start_phases import start_phases
-from scenarios import Scenario, Truth, load, truth_for
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.registry import engine as engine_named
+from dropspin.comparisons.judging.convergence import ARTEFACTS, DESYNCHRONISED, JUMPING, SATURATION, Claim, SeriesPoint, study_convergence
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.metric import Metric
+from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.measuring.tolerances import negligible
+from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.start_phases import start_phases
+from dropspin.scenarios import Scenario, Truth, load, truth_for
 from support.fault_suite import with_body, with_coefficient, with_gravity, with_restitution
 from support.interval_coverage import LARGE, Outcome
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from comparisons.engines.base import BatchSimulation, Diverged, Engine, Simulation
-from scenarios import load, names, truth_for
-from scenarios.rotations import multiply
+from dropspin.comparisons.engines.base import BatchSimulation, Diverged, Engine, Simulation
+from dropspin.scenarios import load, names, truth_for
+from dropspin.scenarios.rotations import multiply
 
 SLOW = tuple(name for name in names() if "slow" in load(name).tags)
 QUICK = tuple(name for name in names() if name not in SLOW)
@@ -129,7 +129,7 @@ class HeavyInertia(Exact):
     name = "heavy-inertia"
 
     def prepare(self, scene, dt):
-        from comparisons.engines.base import AsBuilt
+        from dropspin.comparisons.engines.base import AsBuilt
 
         simulation = ExactSimulation(scene, dt)
         body = scene.body

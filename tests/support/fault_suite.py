@@ -21,13 +21,13 @@ from rich.progress import track
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-import scenarios
-from comparisons.engines.base import Engine
-from comparisons.running.run import run
-from scenarios.body import Box
-from scenarios.model import Damping
-from scenarios.rotations import about, conjugate, multiply, rotate, unrotate
-from scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
+from dropspin import scenarios
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.running.run import run
+from dropspin.scenarios.body import Box
+from dropspin.scenarios.model import Damping
+from dropspin.scenarios.rotations import about, conjugate, multiply, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
 from support.bouncing import Bouncing, bounced, coulomb, pyramid
 from support.bouncing import with_restitution as with_restitution_of
 from support.sampled import Sampled, undistorted
@@ -386,7 +386,7 @@ def landings(share):
     """Landings on an edge take only a share of the angular velocity that they should take."""
 
     def plant(scene):
-        rocking = import_module("scenarios.truths.rocking")  # the package has a function of this name
+        rocking = import_module("dropspin.scenarios.truths.rocking")  # the package has a function of this name
         ratio = rocking._ratio
         with mock.patch.object(rocking, "_ratio", lambda *edges: 1.0 - share * (1.0 - ratio(*edges))):
             wrong = rocking.rocking(scene)

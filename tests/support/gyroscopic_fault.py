@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from comparisons.engines.base import Simulation
-from comparisons.engines.document import DocumentSimulation
-from comparisons.engines.mujoco_simulation import MuJoCoSimulation
-from comparisons.engines.pybullet_simulation import PyBulletSimulation
-from scenarios.rotations import rotate
-from scenarios.state import ORIENTATION, SPIN, VELOCITY
+from dropspin.comparisons.engines.base import Simulation
+from dropspin.comparisons.engines.document import DocumentSimulation
+from dropspin.comparisons.engines.mujoco_simulation import MuJoCoSimulation
+from dropspin.comparisons.engines.pybullet_simulation import PyBulletSimulation
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, SPIN, VELOCITY
 from support.fault_suite import Made, WrongRotor
 
 STEPS_OF_A_TURN = 8

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.judging.error_budget import error_budget, vector_budget
+from dropspin.comparisons.judging.error_budget import error_budget, vector_budget
 from support.error_series import FAMILIES, HELD_OUT, OTHERS, PLAIN, Series
 from support.misleading_series import HELD_OUT_KINDS, KINDS, STEPS, steps_of
 

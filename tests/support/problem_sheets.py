@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.measuring.metrics import METRICS
-from scenarios import load, truth_for
-from scenarios.problems import problems
-from scenarios.state import ORIENTATION, PARTS, RATES
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.problems import problems
+from dropspin.scenarios.state import ORIENTATION, PARTS, RATES
 from support.problem_statements import CONVENTIONS, KINDS, laws, number, statement
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from comparisons.engines.base import Engine
-from comparisons.engines.registry import engine
-from scenarios import load
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.registry import engine
+from dropspin.scenarios import load
 
 TODAY = datetime.date(2026, 3, 1)
 SCENES = [load(name) for name in ("drop-ball", "drop-ball-backspin", "drop-box-corner", "fall-spin")]

@@ -3,8 +3,8 @@
 ENGINES = """
 import os
 import numpy as np
-from comparisons.engines.base import Engine, Simulation
-from scenarios import truth_for
+from dropspin.comparisons.engines.base import Engine, Simulation
+from dropspin.scenarios import truth_for
 
 print("imported", file=open("imports.log", "a"))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from comparisons.results.run_file import FILE, TABLE, signed
+from dropspin.comparisons.results.run_file import FILE, TABLE, signed
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-import scenarios
-from comparisons.engines.base import Simulation
+from dropspin import scenarios
+from dropspin.comparisons.engines.base import Simulation
 
 
 class Sampled(Simulation):

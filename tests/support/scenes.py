@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from scenarios import load
-from scenarios.rotations import about, multiply, rotate
+from dropspin.scenarios import load
+from dropspin.scenarios.rotations import about, multiply, rotate
 
 UP, AXIS = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 G = 9.8

@@ -2,8 +2,8 @@
 
 from itertools import product
 
-from comparisons.record.store import Record, machine
-from scenarios import load
+from dropspin.comparisons.record.store import Record, machine
+from dropspin.scenarios import load
 
 HOSTILE = "<img src=x onerror=alert(1)>"
 SCENES = {"spin-asymmetric": ("orientation_error", "rad"), "drop-ball": ("bounce_height_error", "1")}

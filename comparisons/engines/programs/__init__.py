@@ -5,8 +5,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from scenarios import Scenario
-from scenarios.body import Box, Sphere
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.body import Box, Sphere
 
 
 @cache

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.conformance import motion, waiting
-from comparisons.conformance.checks import CHECKS, conform, run_check
-from comparisons.conformance.clock import check_velocity_lag
-from comparisons.conformance.outcomes import CheckFailed
-from comparisons.conformance.probes import PROBES
-from comparisons.engines.base import KnownLimitation, Simulation
-from comparisons.engines.document import Document
-from comparisons.engines.pybullet_engine import PyBullet
-from comparisons.engines.registry import engine
-from comparisons.running import recording
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.recording import time_steps
-from comparisons.running.run import run
-from scenarios import load
-from scenarios.errors import UnknownName
+from dropspin.comparisons.conformance import motion, waiting
+from dropspin.comparisons.conformance.checks import CHECKS, conform, run_check
+from dropspin.comparisons.conformance.clock import check_velocity_lag
+from dropspin.comparisons.conformance.outcomes import CheckFailed
+from dropspin.comparisons.conformance.probes import PROBES
+from dropspin.comparisons.engines.base import KnownLimitation, Simulation
+from dropspin.comparisons.engines.document import Document
+from dropspin.comparisons.engines.pybullet_engine import PyBullet
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running import recording
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import time_steps
+from dropspin.comparisons.running.run import run
+from dropspin.scenarios import load
+from dropspin.scenarios.errors import UnknownName
 
 PAGE = Path(__file__).parents[3] / "docs" / "bring-your-engine.md"
 ADAPTER = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
@@ -359,7 +359,7 @@ def test_known_limitation_explains_errors_within_its_numbers_only():
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_friction_fault_exceeds_the_known_limitation(factor, monkeypatch):
     """MuJoCo with half or twice the friction fails; with the right friction its limitation explains the error."""
-    from comparisons.engines import mujoco_engine
+    from dropspin.comparisons.engines import mujoco_engine
 
     scene, contact = load("slide-box"), mujoco_engine.contact
     sound = run(scene, "mujoco", 1e-3).table.set_index("metric")

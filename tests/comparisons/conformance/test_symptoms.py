@@ -6,10 +6,10 @@ from support import engines as made
 from support.bouncing import Bouncing, coulomb, pyramid, with_restitution
 from support.fault_suite import FAULTS
 
-from comparisons.conformance.checks import run_check
-from comparisons.conformance.probes import PROBES
-from comparisons.running.inputs import EngineEntry
-from scenarios import truth_for
+from dropspin.comparisons.conformance.checks import run_check
+from dropspin.comparisons.conformance.probes import PROBES
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.scenarios import truth_for
 
 BALLS = tuple(probe.name for probe in PROBES if probe.name.endswith(" ball") or probe.name.endswith(" floor"))
 SQUARED = "restitution appears to be squared; an engine that multiplies the values of two bodies needs 1 for the floor"

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.engines import base
-from comparisons.engines.adapter_code import built_in_code
+from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines.adapter_code import built_in_code
 
 HERE = Path(base.__file__).parent
 

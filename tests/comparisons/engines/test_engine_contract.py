@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from support.engines import QUICK
 
-import scenarios
-from comparisons.engines.mujoco_versions import refusal_of_meshes
-from comparisons.engines.registry import engine, engine_names
-from comparisons.running.recording import simulate
-from comparisons.running.run import measure
-from comparisons.running.verification import verify_build
-from scenarios import DropspinError, UnknownName
+from dropspin import scenarios
+from dropspin.comparisons.engines.mujoco_versions import refusal_of_meshes
+from dropspin.comparisons.engines.registry import engine, engine_names
+from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.run import measure
+from dropspin.comparisons.running.verification import verify_build
+from dropspin.scenarios import DropspinError, UnknownName
 
 ENGINES = [
     "document", "mujoco", "mujoco[integrator=rk4]", "mujoco[integrator=implicitfast]", "mujoco[profile=default]",
@@ -75,7 +75,7 @@ def test_scene_gives_the_same_bits_after_and_beside_others(name):
 
 def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
     """MuJoCo logs warnings to a file by default; a run that diverges must raise instead."""
-    from comparisons.engines.base import Diverged
+    from dropspin.comparisons.engines.base import Diverged
 
     monkeypatch.chdir(tmp_path)
     wild = {
@@ -102,7 +102,7 @@ def test_nothing_is_written_to_the_working_directory(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("restitution", "dt"), list(product([0.0, 0.3, 0.5, 0.8, 0.95], [1 / 60, 1 / 240, 1 / 1000, 1 / 4000])))
 def test_restitution_of_calibrated_engines(name, restitution, dt):
     """Within 1e-4 at every step (measured: MuJoCo 4e-6 at 1/60 s, its impedance; PyBullet 1e-16)."""
-    from comparisons.running.run import measure
+    from dropspin.comparisons.running.run import measure
 
     scene = scenarios.load("drop-ball")
     scene = scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": restitution}), "duration": 1.0})

@@ -3,7 +3,7 @@
 import pytest
 
 import dropspin as ds
-from comparisons.engines.registry import engine
+from dropspin.comparisons.engines.registry import engine
 
 
 @pytest.mark.parametrize(

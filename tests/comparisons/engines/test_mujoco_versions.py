@@ -8,17 +8,17 @@ import sys
 import numpy as np
 import pytest
 
-import scenarios
-from comparisons.calibration import calibrate
-from comparisons.engines import mujoco_engine
-from comparisons.engines.base import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
-from comparisons.engines.mujoco_versions import flight_of, numbers_of
-from comparisons.engines.registry import engine
-from comparisons.regressions.comparing import compare
-from comparisons.regressions.history import history
-from comparisons.results.store import load_results
-from comparisons.running.recording import simulate
-from scenarios.mechanics import kinetic_energy
+from dropspin import scenarios
+from dropspin.comparisons.calibration import calibrate
+from dropspin.comparisons.engines import mujoco_engine
+from dropspin.comparisons.engines.base import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
+from dropspin.comparisons.engines.mujoco_versions import flight_of, numbers_of
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.regressions.comparing import compare
+from dropspin.comparisons.regressions.history import history
+from dropspin.comparisons.results.store import load_results
+from dropspin.comparisons.running.recording import simulate
+from dropspin.scenarios.mechanics import kinetic_energy
 
 FREE_BODY = """
 duration = 5.0
@@ -153,7 +153,7 @@ def older(version, folder):
 
 def with_version(there, *arguments, cwd):
     """Run the command with the packages in a folder first on the path."""
-    program = f"import sys; sys.path.insert(0, {str(there)!r}); from reports.commands.main import main; main()"
+    program = f"import sys; sys.path.insert(0, {str(there)!r}); from dropspin.reports.commands.main import main; main()"
     return subprocess.run([sys.executable, "-P", "-c", program, *arguments], cwd=cwd, capture_output=True, text=True, check=False)
 
 

@@ -5,10 +5,10 @@ from importlib.metadata import PackageNotFoundError
 
 import pytest
 
-from comparisons.engines import registry
-from comparisons.engines.base import EngineMissing
-from comparisons.engines.npm_packages import npm_package, npm_version
-from comparisons.results.provenance import versions
+from dropspin.comparisons.engines import registry
+from dropspin.comparisons.engines.base import EngineMissing
+from dropspin.comparisons.engines.npm_packages import npm_package, npm_version
+from dropspin.comparisons.results.provenance import versions
 
 PACKAGE = "@dimforge/rapier3d-compat"
 

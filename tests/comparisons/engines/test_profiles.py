@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.engines.base import calibrated_label
-from comparisons.engines.registry import engine
-from comparisons.running.recording import record, simulate
-from comparisons.running.run import run
-from scenarios import DropspinError, Trajectory, load, truth_for
-from scenarios.mechanics import kinetic_energy
+from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.recording import record, simulate
+from dropspin.comparisons.running.run import run
+from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
+from dropspin.scenarios.mechanics import kinetic_energy
 
 SPIN = load("spin-asymmetric").model_copy(update={"duration": 2.0})
 

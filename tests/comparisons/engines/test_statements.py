@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from comparisons.engines.registry import engine
-from scenarios import load
+from dropspin.comparisons.engines.registry import engine
+from dropspin.scenarios import load
 
 TENSOR = np.array([[1.0, 0.3, 0.0], [0.3, 2.0, 0.0], [0.0, 0.0, 2.5]])
 ASKEW = {"shape": "vertices", "points": [[0.2, 0.0, 0.1], [-0.1, 0.3, 0.0], [0.0, -0.2, 0.25], [0.1, 0.1, -0.3]], "mass": 2.7}

@@ -7,8 +7,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from comparisons.judging.convergence import Claim, SeriesPoint, study_convergence
-from comparisons.measuring.metric import Average
+from dropspin.comparisons.judging.convergence import Claim, SeriesPoint, study_convergence
+from dropspin.comparisons.measuring.metric import Average
 
 STEPS = [8e-3, 4e-3, 2e-3]
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from support import engine_coverage, interval_coverage
 
 import dropspin as ds
-from comparisons.judging.error_budget import error_budget
-from comparisons.judging.mixtures import student_t
+from dropspin.comparisons.judging.error_budget import error_budget
+from dropspin.comparisons.judging.mixtures import student_t
 
 H = np.array([4e-3, 2e-3, 1e-3])
 FIVE = 1e-3 * 2.0 ** np.arange(4, -1, -1)

@@ -6,11 +6,11 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from comparisons.judging.horizon import with_horizon
-from comparisons.judging.verdicts import Judgement
-from comparisons.measuring.comparison import BeyondHorizon, Unresolved
-from comparisons.measuring.metrics import METRICS
-from scenarios import truth_for
+from dropspin.comparisons.judging.horizon import with_horizon
+from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.measuring.comparison import BeyondHorizon, Unresolved
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.scenarios import truth_for
 
 TILTED = np.array([0.2, -0.3, 0.1, 0.9]) / np.linalg.norm([0.2, -0.3, 0.1, 0.9])
 LIMIT = r"compared up to t = 6\.8 s, where the exact solution ends: rounding of the initial state determines when the body turns over"
@@ -18,7 +18,7 @@ LIMIT = r"compared up to t = 6\.8 s, where the exact solution ends: rounding of 
 
 def spinning(**changes):
     """A body that spins about its unstable axis, in a tilted attitude, so that rounding decides when it turns over."""
-    from scenarios.rotations import rotate
+    from dropspin.scenarios.rotations import rotate
 
     content = {
         "name": "unstable",

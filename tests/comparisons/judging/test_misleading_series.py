@@ -8,7 +8,7 @@ from support import interval_coverage
 from support.misleading_series import CLOSE, STEPS
 
 import dropspin as ds
-from comparisons.judging.series import is_clear_power, most_informative
+from dropspin.comparisons.judging.series import is_clear_power, most_informative
 
 H = np.array([4e-3, 2e-3, 1e-3])
 FIVE = 0.5 ** np.arange(5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import interval_coverage
 
-from comparisons.judging.error_budget import error_budget, vector_budget
+from dropspin.comparisons.judging.error_budget import error_budget, vector_budget
 
 H = np.array([4e-3, 2e-3, 1e-3])
 FIVE = 1e-3 * 2.0 ** np.arange(4, -1, -1)

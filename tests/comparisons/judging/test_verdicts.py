@@ -4,10 +4,17 @@ import math
 
 import pytest
 
-import scenarios
-from comparisons.engines.base import KnownLimitation
-from comparisons.judging.verdicts import HOLDS_AGAIN, Judgement, judge, judge_asymptotic_error, verify_expectations, with_limitations
-from comparisons.measuring.metrics import METRICS
+from dropspin import scenarios
+from dropspin.comparisons.engines.base import KnownLimitation
+from dropspin.comparisons.judging.verdicts import (
+    HOLDS_AGAIN,
+    Judgement,
+    judge,
+    judge_asymptotic_error,
+    verify_expectations,
+    with_limitations,
+)
+from dropspin.comparisons.measuring.metrics import METRICS
 
 
 def scene_that_expects(*expectations):

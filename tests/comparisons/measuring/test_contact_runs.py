@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from comparisons.measuring.batch import motions_side_by_side
-from comparisons.measuring.comparison import Comparison
-from comparisons.measuring.metrics import METRICS
-from comparisons.measuring.motions import Motions, Setup
-from comparisons.running.run import measure
-from scenarios import Trajectory, load, truth_for
+from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.motions import Motions, Setup
+from dropspin.comparisons.running.run import measure
+from dropspin.scenarios import Trajectory, load, truth_for
 
 G, R, H, E = 9.8, 0.1, 1.0, 0.5
 BALL = load(

@@ -8,10 +8,10 @@ import pytest
 from support.engines import QUICK
 
 import dropspin as ds
-import scenarios
-from comparisons.measuring.contacts import RESIDUALS, contact_residuals
-from comparisons.measuring.requirements import obeys_contact_laws
-from scenarios import Trajectory, truth_for
+from dropspin import scenarios
+from dropspin.comparisons.measuring.contacts import RESIDUALS, contact_residuals
+from dropspin.comparisons.measuring.requirements import obeys_contact_laws
+from dropspin.scenarios import Trajectory, truth_for
 
 DT = 1e-3
 F, G, V = 0.3, 9.8, 3.0

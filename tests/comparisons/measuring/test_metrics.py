@@ -5,12 +5,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 from support.engines import QUICK
 
-import scenarios
-from comparisons.measuring.comparison import Comparison, Unresolved
-from comparisons.measuring.metrics import METRICS
-from comparisons.running.run import measure
-from scenarios import Trajectory, truth_for
-from scenarios.rotations import about, multiply
+from dropspin import scenarios
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.running.run import measure
+from dropspin.scenarios import Trajectory, truth_for
+from dropspin.scenarios.rotations import about, multiply
 
 DT = 1e-3
 FIELDS = ("position", "orientation", "velocity", "angular_velocity")

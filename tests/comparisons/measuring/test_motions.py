@@ -4,11 +4,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from comparisons.measuring.batch import motions_side_by_side
-from comparisons.measuring.metrics import energy_drift, energy_gain, penetration
-from comparisons.measuring.motions import Motions, Setup
-from comparisons.sweeps.outcomes import standard_metrics
-from scenarios import Trajectory, load
+from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.metrics import energy_drift, energy_gain, penetration
+from dropspin.comparisons.measuring.motions import Motions, Setup
+from dropspin.comparisons.sweeps.outcomes import standard_metrics
+from dropspin.scenarios import Trajectory, load
 
 DT = 0.01
 BALL = {

@@ -7,9 +7,9 @@ from mpmath import mp, mpf
 from support.engines import QUICK
 
 import dropspin as ds
-import scenarios
-from scenarios import discrete_flight, load
-from scenarios.state import PARTS
+from dropspin import scenarios
+from dropspin.scenarios import discrete_flight, load
+from dropspin.scenarios.state import PARTS
 
 ENGINES = ["document", "document[rotation=exact]", "mujoco", "pybullet"]
 FREE = [name for name in QUICK if load(name).floor is None]

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from comparisons.published.printed import agreement
+from dropspin.comparisons.published.printed import agreement
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,13 @@ import mpmath
 import numpy as np
 import pytest
 
-from comparisons.published import formulas, study
-from comparisons.published.formulas import FORMULAS, kane, nesc_brick
-from comparisons.published.quantities import quantity
-from comparisons.published.sources import DATA, source_names, sources
-from comparisons.running.processes import ResourceLimits
-from reports.views.reproduce import exit_code
-from scenarios import Trajectory, UnknownName
+from dropspin.comparisons.published import formulas, study
+from dropspin.comparisons.published.formulas import FORMULAS, kane, nesc_brick
+from dropspin.comparisons.published.quantities import quantity
+from dropspin.comparisons.published.sources import DATA, source_names, sources
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.reports.views.reproduce import exit_code
+from dropspin.scenarios import Trajectory, UnknownName
 
 
 def only(name, tool, case="", **changes):
@@ -170,7 +170,7 @@ def test_a_wrong_constant_of_a_formula_differs(monkeypatch):
 
 @pytest.mark.parametrize(("why_not", "outcome"), [("", ("not run", "missing")), ("no reason", ("not reproducible", ""))])
 def test_a_missing_engine_costs_its_rows_only(why_not, outcome, monkeypatch):
-    monkeypatch.setattr("comparisons.engines.registry.find_spec", lambda name: None)
+    monkeypatch.setattr("dropspin.comparisons.engines.registry.find_spec", lambda name: None)
     results = reproduced(monkeypatch, only("fmi-bouncing-ball", "FMU", by="drake", why_not=why_not), *sources(["housner-block"]))
     assert {(one.status, one.verdict) for one in results[:4]} == {outcome}
     assert {one.status for one in results[4:]} == {"reproduced", "error of the source"}

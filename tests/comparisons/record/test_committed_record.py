@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from comparisons.record.store import stored
+from dropspin.comparisons.record.store import stored
 
 RECORD = Path(__file__).parents[3] / "record"
 

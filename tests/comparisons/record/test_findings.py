@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.record.findings import NEGLIGIBLE, Case, Release, changes, digits, periods, profile, read, successive
-from comparisons.record.plan import load_plan
-from comparisons.record.store import Record, machine
-from comparisons.running.entries import engine_entry
-from scenarios import DropspinError, load
+from dropspin.comparisons.record.findings import NEGLIGIBLE, Case, Release, changes, digits, periods, profile, read, successive
+from dropspin.comparisons.record.plan import load_plan
+from dropspin.comparisons.record.store import Record, machine
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.scenarios import DropspinError, load
 
 LABEL, SCENE, DT, METRIC = "mujoco", "spin-asymmetric", 0.01, "orientation_error"
 

@@ -5,10 +5,10 @@ from threading import Event
 
 import pytest
 
-from comparisons.record import environments
-from comparisons.record.environments import NotMeasured, measured
-from comparisons.record.plan import Plan
-from scenarios import DropspinError
+from dropspin.comparisons.record import environments
+from dropspin.comparisons.record.environments import NotMeasured, measured
+from dropspin.comparisons.record.plan import Plan
+from dropspin.scenarios import DropspinError
 
 NPM = Plan.model_validate(
     {

@@ -16,14 +16,14 @@ import pytest
 from support.cli import assert_refused, dropspin
 
 import dropspin as ds
-from comparisons.engines.registry import BUILT_IN
-from comparisons.record import environments, release, study
-from comparisons.record.environments import NotMeasured, measured, without_paths
-from comparisons.record.plan import Plan, load_plan
-from comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, Stored, machine
-from comparisons.results.stored_files import sha256
-from comparisons.running.recording import TimedSteps
-from scenarios import DropspinError, load
+from dropspin.comparisons.engines.registry import BUILT_IN
+from dropspin.comparisons.record import environments, release, study
+from dropspin.comparisons.record.environments import NotMeasured, measured, without_paths
+from dropspin.comparisons.record.plan import Plan, load_plan
+from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, Stored, machine
+from dropspin.comparisons.results.stored_files import sha256
+from dropspin.comparisons.running.recording import TimedSteps
+from dropspin.scenarios import DropspinError, load
 
 RELEASES = ["1.0", "1.1", "1.2"]
 PLAN = Plan.model_validate(

@@ -6,10 +6,10 @@ from functools import cache
 import pytest
 from support.releases import DTS, RELEASES, SCENES, TODAY, Candidate, longer, part, relabelled
 
-from comparisons.engines.registry import engine
-from comparisons.regressions.baseline import Baseline, accept
-from comparisons.results.store import load_results, save
-from comparisons.running.run import run
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.regressions.baseline import Baseline, accept
+from dropspin.comparisons.results.store import load_results, save
+from dropspin.comparisons.running.run import run
 
 
 @pytest.fixture(scope="session", autouse=True)

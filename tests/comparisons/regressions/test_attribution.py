@@ -2,7 +2,7 @@
 
 import pytest
 
-from comparisons.regressions.attribution import attribute
+from dropspin.comparisons.regressions.attribution import attribute
 
 STAMP = {
     "versions": {"dropspin": "1", "numpy": "2", "numba": "3", "scipy": "4"},

@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 from support.releases import SCENES, TODAY, WITH_FLOOR, Broken, Candidate, Euler, TooLively, failing, part
 
-from comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
-from comparisons.regressions.checking import check
-from comparisons.regressions.values import KEY
-from scenarios import DropspinError
+from dropspin.comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
+from dropspin.comparisons.regressions.checking import check
+from dropspin.comparisons.regressions.values import KEY
+from dropspin.scenarios import DropspinError
 
 
 @pytest.fixture(scope="module")

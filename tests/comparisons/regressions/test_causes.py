@@ -8,16 +8,16 @@ from support.fault_suite import FAULTS as PLANTED
 from support.fault_suite import Made, with_body, with_gravity, with_restitution
 from support.releases import TODAY, WithoutGyroscopicTerm, relabelled
 
-from comparisons.regressions.baseline import Baseline, accept
-from comparisons.regressions.causes import causes
-from comparisons.regressions.checking import check
-from comparisons.regressions.parameters import PARAMETERS
-from comparisons.running.run import run
-from reports.markdown import check_markdown
-from reports.terminal.summary import print_failures
-from reports.views.failures import failures, grouped
-from scenarios import load
-from scenarios.rotations import about, rotate
+from dropspin.comparisons.regressions.baseline import Baseline, accept
+from dropspin.comparisons.regressions.causes import causes
+from dropspin.comparisons.regressions.checking import check
+from dropspin.comparisons.regressions.parameters import PARAMETERS
+from dropspin.comparisons.running.run import run
+from dropspin.reports.markdown import check_markdown
+from dropspin.reports.terminal.summary import print_failures
+from dropspin.reports.views.failures import failures, grouped
+from dropspin.scenarios import load
+from dropspin.scenarios.rotations import about, rotate
 
 SLOWER = "Coulomb coefficient 1 % too high or gravity 1 % too high or direction of gravity wrong by 0.003 rad"
 """Each slows a sliding box alike."""

@@ -28,12 +28,12 @@ from support.releases import (
     relabelled,
 )
 
-import scenarios
-from comparisons.engines import mujoco_simulation
-from comparisons.regressions.baseline import Baseline, accept
-from comparisons.regressions.checking import NothingAccepted, check
-from comparisons.regressions.values import KEY, comparable_results
-from comparisons.running.run import run
+from dropspin import scenarios
+from dropspin.comparisons.engines import mujoco_simulation
+from dropspin.comparisons.regressions.baseline import Baseline, accept
+from dropspin.comparisons.regressions.checking import NothingAccepted, check
+from dropspin.comparisons.regressions.values import KEY, comparable_results
+from dropspin.comparisons.running.run import run
 
 
 @pytest.mark.parametrize(

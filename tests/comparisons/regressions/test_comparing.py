@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support.releases import DTS, SCENES, TURNING, Candidate, WithoutGyroscopicTerm, part, released
 
-from comparisons.regressions.comparing import compare
-from comparisons.regressions.speed import speed_changes
-from comparisons.running.run import run
-from scenarios import DropspinError
+from dropspin.comparisons.regressions.comparing import compare
+from dropspin.comparisons.regressions.speed import speed_changes
+from dropspin.comparisons.running.run import run
+from dropspin.scenarios import DropspinError
 
 
 def test_new_release_without_changes(before, release):

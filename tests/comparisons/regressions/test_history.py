@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from support.releases import TURNING, Broken, Candidate, Euler, part, released
 
-from comparisons.regressions.history import history
-from scenarios import DropspinError
+from dropspin.comparisons.regressions.history import history
+from dropspin.scenarios import DropspinError
 
 
 def dated(*runs):

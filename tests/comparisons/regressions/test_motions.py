@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.regressions.comparing import compare
-from comparisons.regressions.motions import EqualMotions, equal_motions
-from comparisons.running.run import run
+from dropspin.comparisons.regressions.comparing import compare
+from dropspin.comparisons.regressions.motions import EqualMotions, equal_motions
+from dropspin.comparisons.running.run import run
 
 DT = 4e-3
 

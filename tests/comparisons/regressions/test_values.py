@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comparisons.measuring.metric import Average
-from comparisons.measuring.tolerances import tolerance
-from comparisons.regressions.values import KEY, changes, comparable_results
-from scenarios import load
+from dropspin.comparisons.measuring.metric import Average
+from dropspin.comparisons.measuring.tolerances import tolerance
+from dropspin.comparisons.regressions.values import KEY, changes, comparable_results
+from dropspin.scenarios import load
 
 
 @given(

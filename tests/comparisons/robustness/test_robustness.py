@@ -12,17 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.engines import Exact, ExactSimulation, FrozenSimulation
 
-from comparisons.engines.registry import engine
-from comparisons.robustness.axes import AXES
-from comparisons.robustness.failure_modes import SOUND, ExtendedMotion, clamped, diagnose, held_speeds
-from comparisons.robustness.operating_point import OperatingPoint
-from comparisons.robustness.runner import Runner
-from comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
-from comparisons.robustness.study import RobustnessStudy, find_limits
-from comparisons.robustness.transformations import in_nominal_units
-from comparisons.running.entries import engine_entry
-from comparisons.running.processes import EngineProcesses, ResourceLimits
-from scenarios import DropspinError, Trajectory, load, truth_for
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.robustness.axes import AXES
+from dropspin.comparisons.robustness.failure_modes import SOUND, ExtendedMotion, clamped, diagnose, held_speeds
+from dropspin.comparisons.robustness.operating_point import OperatingPoint
+from dropspin.comparisons.robustness.runner import Runner
+from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
+from dropspin.comparisons.robustness.study import RobustnessStudy, find_limits
+from dropspin.comparisons.robustness.transformations import in_nominal_units
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
 
 DT = 5e-3
 SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support.engines import Crashing, Declining, Exact, ExactSimulation, Frozen, turned_by
 
-from comparisons.robustness.study import find_limits
-from comparisons.running.processes import ResourceLimits
-from scenarios import load
+from dropspin.comparisons.robustness.study import find_limits
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.scenarios import load
 
 QUICK = ResourceLimits(processor_time=20.0)
 SPIN = load("spin-principal")

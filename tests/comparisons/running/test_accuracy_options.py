@@ -5,12 +5,12 @@ import math
 import pytest
 from support.accuracy_options import Adaptive, InnerStep, Substeps
 
-from comparisons.conformance.checks import conform
-from comparisons.engines.base import NumericOption
-from comparisons.engines.document import Document
-from comparisons.running.run import run
-from scenarios import load
-from scenarios.errors import DropspinError, UnknownName
+from dropspin.comparisons.conformance.checks import conform
+from dropspin.comparisons.engines.base import NumericOption
+from dropspin.comparisons.engines.document import Document
+from dropspin.comparisons.running.run import run
+from dropspin.scenarios import load
+from dropspin.scenarios.errors import DropspinError, UnknownName
 
 SOUND = (Adaptive, InnerStep, Substeps)
 SPIN = load(

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.engines.registry import engine
-from comparisons.running.recording import record, record_batch
-from scenarios import load
-from scenarios.model import differ_in_start_alone
-from scenarios.transformations import with_other_numbers
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.recording import record, record_batch
+from dropspin.scenarios import load
+from dropspin.scenarios.model import differ_in_start_alone
+from dropspin.scenarios.transformations import with_other_numbers
 
 DT = 1e-3
 SCENES = (

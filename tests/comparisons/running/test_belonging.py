@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from comparisons.engines.registry import engine as engine_named
-from comparisons.running.recording import record
-from comparisons.running.run import measure
-from scenarios import DropspinError, Trajectory, load, truth_for
+from dropspin.comparisons.engines.registry import engine as engine_named
+from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.run import measure
+from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
 
 DT = 1e-3
 BALL = load(

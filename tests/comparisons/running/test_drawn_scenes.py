@@ -5,7 +5,7 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from scenarios import transformations
+from dropspin.scenarios import transformations
 
 pytestmark = pytest.mark.usefixtures("few_start_phases")
 

@@ -6,13 +6,13 @@ from scipy import stats
 from support import engines as made
 
 import dropspin as ds
-from comparisons.engines.base import Engine
-from comparisons.engines.registry import engine
-from comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
-from comparisons.results.store import load_results, save
-from comparisons.running.ensembles import judge_differences, judge_means, run_ensemble
-from comparisons.running.recording import record_batch
-from scenarios import load, members
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
+from dropspin.comparisons.results.store import load_results, save
+from dropspin.comparisons.running.ensembles import judge_differences, judge_means, run_ensemble
+from dropspin.comparisons.running.recording import record_batch
+from dropspin.scenarios import load, members
 
 SCENE = load("drop-box-anyhow")
 FEW = SCENE.model_copy(update={"ensemble": SCENE.ensemble.model_copy(update={"size": 5}), "expect": (), "duration": 0.6})

@@ -4,12 +4,12 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from comparisons.running.engine_run import Timing, run_engine
-from comparisons.running.entries import engine_entry
-from comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
-from comparisons.running.inputs import EngineEntry
-from comparisons.running.start_phases import StartPhase, start_phases
-from reports.views.run import forecast_sentence
+from dropspin.comparisons.running.engine_run import Timing, run_engine
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.reports.views.run import forecast_sentence
 
 DT = 8e-3
 SCENES = ("drop-ball", "spin-principal", "roll-prism", "drop-box-anyhow")

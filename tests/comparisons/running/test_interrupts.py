@@ -7,15 +7,15 @@ import sys
 import pytest
 from filelock import FileLock
 
-from comparisons.results.interrupts import interrupts_deferred
-from comparisons.results.output import unfinished_folder
+from dropspin.comparisons.results.interrupts import interrupts_deferred
+from dropspin.comparisons.results.output import unfinished_folder
 
 PLANTED = """
 import os, signal, time
 from concurrent.futures import _base
 
-from comparisons.running.parallel import work_in_parallel
-from comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.parallel import work_in_parallel
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which jobs in the background of a shell ignore
 take = _base._AcquireFutures.__enter__

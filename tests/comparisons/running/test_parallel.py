@@ -10,8 +10,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from comparisons.running import processes
-from comparisons.running.parallel import results_in_parallel
+from dropspin.comparisons.running import processes
+from dropspin.comparisons.running.parallel import results_in_parallel
 
 SCENES = ["drop-ball", "spin-asymmetric", "fall-tilted"]
 DTS = [8e-3, 4e-3, 2e-3]

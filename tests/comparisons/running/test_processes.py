@@ -18,8 +18,8 @@ from support import engines as made
 from support.cli import dropspin
 
 import dropspin as ds
-from comparisons.running.entries import engine_entry
-from comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 
 BALL, SPIN, TIGHT = breaking.BALL, breaking.SPIN, breaking.TIGHT
 TESTS = Path(__file__).parents[2]
@@ -71,7 +71,9 @@ def test_sleeping_engine_is_ended_by_the_wall_clock():
     assert (row["verdict"], row["reason"]) == ("timed_out", "not done after 1 s of wall time")
 
 
-@pytest.mark.parametrize("where", ["comparisons.running.processes.ProcessPool", "comparisons.running.processes.ProcessPool.schedule"])
+@pytest.mark.parametrize(
+    "where", ["dropspin.comparisons.running.processes.ProcessPool", "dropspin.comparisons.running.processes.ProcessPool.schedule"]
+)
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EAGAIN])
 def test_system_that_starts_no_process_is_not_blamed_on_the_output_folder(where, code, tmp_path, monkeypatch):
     """Such as shared memory that is full or read-only, and a limit of processes."""

@@ -6,10 +6,10 @@ from itertools import pairwise
 from support import engines as made
 
 import dropspin as ds
-from comparisons.running import processes
-from comparisons.running.engine_run import run_engine
-from comparisons.running.entries import engine_entry
-from comparisons.running.start_phases import start_phases
+from dropspin.comparisons.running import processes
+from dropspin.comparisons.running.engine_run import run_engine
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.start_phases import start_phases
 
 DT = 0.01
 BALL = ds.load("drop-ball")

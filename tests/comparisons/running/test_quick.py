@@ -8,9 +8,9 @@ from support import engines as made
 from support.cli import assert_refused, dropspin
 
 import dropspin as ds
-from comparisons.results.ensembles import QUICK_MEMBERS
-from comparisons.running.measured import UNDECIDED_BY_STARTS
-from comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
+from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
+from dropspin.comparisons.running.measured import UNDECIDED_BY_STARTS
+from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 
 DT = 8e-3
 BALL = ds.load("drop-ball").model_dump(exclude={"expect"}, exclude_none=True)
@@ -53,7 +53,7 @@ class Single(made.Exact):
     ],
 )
 def test_number_of_simulations(scene, engine, full, quick, monkeypatch):
-    monkeypatch.setattr("comparisons.running.processes.POLL", 1e-3)
+    monkeypatch.setattr("dropspin.comparisons.running.processes.POLL", 1e-3)
     for expected, is_quick in ((full, False), (quick, True)):
         totals = set()
         ds.run(scene, engine, DT, on_progress=lambda progress, totals=totals: totals.add(progress.total), quick=is_quick)

@@ -9,10 +9,10 @@ from support import engines as made
 from support.scenes import standing
 
 import dropspin as ds
-import scenarios
-from comparisons.results.ensembles import ENSEMBLE_METRICS
-from comparisons.results.measurement import COLUMNS
-from scenarios import DropspinError, SceneError
+from dropspin import scenarios
+from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
+from dropspin.comparisons.results.measurement import COLUMNS
+from dropspin.scenarios import DropspinError, SceneError
 
 BALL = ds.load("drop-ball")
 

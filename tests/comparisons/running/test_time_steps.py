@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS, verify_time_step
-from scenarios import DropspinError, load
+from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS, verify_time_step
+from dropspin.scenarios import DropspinError, load
 
 BODY = {"shape": "sphere", "radius": 0.1, "mass": 1.0}
 

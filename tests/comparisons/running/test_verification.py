@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.engines.base import BatchSimulation
-from comparisons.running.verification import BuildMismatch, verified_batch, verify_start, verify_starts
-from scenarios import load
-from scenarios.model import initial_states
-from scenarios.rotations import rotate, unrotate
-from scenarios.state import ORIENTATION, SPIN
+from dropspin.comparisons.engines.base import BatchSimulation
+from dropspin.comparisons.running.verification import BuildMismatch, verified_batch, verify_start, verify_starts
+from dropspin.scenarios import load
+from dropspin.scenarios.model import initial_states
+from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, SPIN
 
 
 def test_a_spin_may_be_rotated_to_the_body_s_axes_and_back():

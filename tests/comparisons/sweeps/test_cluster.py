@@ -16,14 +16,14 @@ from unittest import mock
 import pandas as pd
 import pytest
 
-from comparisons.engines.base import EngineMissing
-from comparisons.running import cluster as connection
-from comparisons.running.processes import ResourceLimits
-from comparisons.sweeps import cluster
-from comparisons.sweeps.running import read_sweep, run_sweep
-from comparisons.sweeps.spec import load_sweep
-from comparisons.sweeps.work import Work
-from scenarios import DropspinError
+from dropspin.comparisons.engines.base import EngineMissing
+from dropspin.comparisons.running import cluster as connection
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.comparisons.sweeps import cluster
+from dropspin.comparisons.sweeps.running import read_sweep, run_sweep
+from dropspin.comparisons.sweeps.spec import load_sweep
+from dropspin.comparisons.sweeps.work import Work
+from dropspin.scenarios import DropspinError
 
 pytest.importorskip("distributed")
 
@@ -131,9 +131,9 @@ def test_address_at_which_something_else_listens_is_refused_in_one_line(answer, 
 
 def test_sweep_that_was_refused_before_its_first_job_can_be_given_again(tmp_path, monkeypatch):
     """With another spec too, and without --resume: the folder holds no row."""
-    monkeypatch.setattr("comparisons.sweeps.running.connected", lambda scheduler: nullcontext())
+    monkeypatch.setattr("dropspin.comparisons.sweeps.running.connected", lambda scheduler: nullcontext())
     refuse = mock.Mock(side_effect=DropspinError("a worker has mujoco 3.1, this machine has 4.0; install the same on both."))
-    monkeypatch.setattr("comparisons.sweeps.running.run_on_cluster", refuse)
+    monkeypatch.setattr("dropspin.comparisons.sweeps.running.run_on_cluster", refuse)
     for spec in (SPEC, SPEC | {"dts": [8e-3]}):
         with pytest.raises(DropspinError, match="install the same on both"):
             run_sweep(load_sweep(spec), str(tmp_path / "out"), scheduler="tcp://host:8786")

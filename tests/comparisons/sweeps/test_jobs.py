@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comparisons.sweeps.axes import Drawn, Spaced, interpolate
-from comparisons.sweeps.spec import load_sweep
-from scenarios import DropspinError, load
-from scenarios.drawing import uniform
-from scenarios.ensemble import spread_start, spread_starts
-from scenarios.loading import CATALOGUE
-from scenarios.state import ORIENTATION, RATES
+from dropspin.comparisons.sweeps.axes import Drawn, Spaced, interpolate
+from dropspin.comparisons.sweeps.spec import load_sweep
+from dropspin.scenarios import DropspinError, load
+from dropspin.scenarios.drawing import uniform
+from dropspin.scenarios.ensemble import spread_start, spread_starts
+from dropspin.scenarios.loading import CATALOGUE
+from dropspin.scenarios.state import ORIENTATION, RATES
 
 SPEC = {
     "scenes": ["drop-box-anyhow", "drop-ball"],
@@ -144,7 +144,7 @@ def test_start_depends_only_on_its_number():
 
 def test_starts_are_uniform_over_all_attitudes():
     """The mean of a rotation matrix over all attitudes is 0, its entries' squares 1/3 (4000 starts: ± .03)."""
-    from scenarios.rotations import rotate
+    from dropspin.scenarios.rotations import rotate
 
     scene = load("drop-box-anyhow")
     own = np.tile(scene.initial_state, (4000, 1))

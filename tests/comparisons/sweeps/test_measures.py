@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 from support import engines as made
 
 import dropspin as ds
-from comparisons.engines.registry import engine
-from comparisons.measuring.batch import motions_side_by_side
-from comparisons.measuring.comparison import Comparison
-from comparisons.measuring.metrics import METRICS, last_time_in_motion
-from comparisons.measuring.motions import Setup
-from comparisons.running.verification import UNIT_TOLERANCE
-from comparisons.sweeps.any_engine import run_single
-from comparisons.sweeps.dispatch import run_jobs
-from comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, standard_metrics
-from comparisons.sweeps.spec import load_sweep
-from scenarios import load, names
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.measuring.batch import motions_side_by_side
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metrics import METRICS, last_time_in_motion
+from dropspin.comparisons.measuring.motions import Setup
+from dropspin.comparisons.running.verification import UNIT_TOLERANCE
+from dropspin.comparisons.sweeps.any_engine import run_single
+from dropspin.comparisons.sweeps.dispatch import run_jobs
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, standard_metrics
+from dropspin.comparisons.sweeps.spec import load_sweep
+from dropspin.scenarios import load, names
 
 SCENES = [name for name in names() if "slow" not in load(name).tags]
 DT = 8e-3

@@ -18,13 +18,13 @@ import pandas as pd
 import pytest
 from support import engines as test_engines
 
-from comparisons.engines.base import Diverged
-from comparisons.running.engine_process import Failed
-from comparisons.running.processes import Closed, ResourceLimits
-from comparisons.sweeps.running import read_sweep, run_sweep
-from comparisons.sweeps.spec import load_sweep
-from comparisons.sweeps.work import Work
-from scenarios import DropspinError
+from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.processes import Closed, ResourceLimits
+from dropspin.comparisons.sweeps.running import read_sweep, run_sweep
+from dropspin.comparisons.sweeps.spec import load_sweep
+from dropspin.comparisons.sweeps.work import Work
+from dropspin.scenarios import DropspinError
 
 DROPSPIN = Path(sys.executable).with_name("dropspin")
 SPEC = {

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.engines.registry import engine
-from comparisons.running.recording import simulate
-from comparisons.symmetries.study import symmetries
-from scenarios import DropspinError, load
-from scenarios.transformations import heavy_neighbour
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.symmetries.study import symmetries
+from dropspin.scenarios import DropspinError, load
+from dropspin.scenarios.transformations import heavy_neighbour
 
 DT = 4e-3
 

@@ -9,11 +9,11 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from comparisons.measuring.symmetries import AGAIN, BITWISE, NAMES
-from comparisons.symmetries.findings import Finding
-from comparisons.symmetries.rows import with_symmetries
-from comparisons.symmetries.study import symmetries
-from reports.views.failures import failures
+from dropspin.comparisons.measuring.symmetries import AGAIN, BITWISE, NAMES
+from dropspin.comparisons.symmetries.findings import Finding
+from dropspin.comparisons.symmetries.rows import with_symmetries
+from dropspin.comparisons.symmetries.study import symmetries
+from dropspin.reports.views.failures import failures
 
 SCENE, DTS = "spin-asymmetric", (8e-3, 4e-3)
 

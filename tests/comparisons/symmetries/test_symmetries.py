@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.engines.registry import engine
-from comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES
-from comparisons.running.entries import engine_entry
-from comparisons.symmetries.study import SCENES, findings_of, symmetries
-from reference_impl.threads import usable_cores
-from scenarios import DropspinError, load, truth_for
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.symmetries.study import SCENES, findings_of, symmetries
+from dropspin.reference_impl.threads import usable_cores
+from dropspin.scenarios import DropspinError, load, truth_for
 
 DT = 4e-3
 

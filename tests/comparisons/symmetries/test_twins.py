@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support import engines as made
 
-from comparisons.running.recording import simulate
-from comparisons.symmetries.twins import twins
-from scenarios import DropspinError, load
+from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.symmetries.twins import twins
+from dropspin.scenarios import DropspinError, load
 
 DT = 4e-3
 EPS = np.finfo(float).eps

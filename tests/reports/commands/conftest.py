@@ -7,9 +7,9 @@ import pytest
 import xmlschema
 from support.cli import dropspin
 
-from comparisons.running.run import run
-from reports.run_folder import write_report
-from scenarios import load
+from dropspin.comparisons.running.run import run
+from dropspin.reports.run_folder import write_report
+from dropspin.scenarios import load
 
 MY_ENGINE = '''
 import os

@@ -8,7 +8,7 @@ from support.cli import dropspin
 
 def test_settings_and_texts_to_paste(tmp_path, monkeypatch):
     """The table, the settings and the texts; one text alone; everything as JSON."""
-    monkeypatch.setattr("comparisons.calibration.LARGEST_STEP", 0.01)  # the search for the largest stable step takes seconds
+    monkeypatch.setattr("dropspin.comparisons.calibration.LARGEST_STEP", 0.01)  # the search for the largest stable step takes seconds
     asked = ("calibrate", "--restitution", "0.7", "--dt", "0.01")
     done = dropspin(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

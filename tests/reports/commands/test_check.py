@@ -9,12 +9,12 @@ import xml.etree.ElementTree as ET
 import pytest
 from support.cli import dropspin
 
-from comparisons.regressions.baseline import Baseline, accept
-from comparisons.regressions.checking import check
-from comparisons.running.run import run
-from reports.junit import junit_xml
-from reports.views.check import BaselineFile, accepted_sentences, sentences
-from scenarios import load
+from dropspin.comparisons.regressions.baseline import Baseline, accept
+from dropspin.comparisons.regressions.checking import check
+from dropspin.comparisons.running.run import run
+from dropspin.reports.junit import junit_xml
+from dropspin.reports.views.check import BaselineFile, accepted_sentences, sentences
+from dropspin.scenarios import load
 
 ENGINE, LABEL = "my_engine:MyEngine", "my-engine"
 RUN = ("run", "spin-principal", "drop-ball", "-e", ENGINE, "--dt", "0.008", "--dt", "0.004", "--dt", "0.002")

@@ -10,7 +10,7 @@ from support.adapters import DRIFTING
 from support.cli import TERMINAL, dropspin, spawn
 from support.engines import Exact
 
-from comparisons.conformance.checks import CHECKS, conform
+from dropspin.comparisons.conformance.checks import CHECKS, conform
 
 ADAPTER = (Path(__file__).parents[3] / "docs" / "bring-your-engine.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
 

@@ -16,8 +16,8 @@ import pytest
 from support.cli import assert_refused, dropspin
 from support.run_folders import change_json, change_table, contents, replace_file
 
-from comparisons.results.store import load_results, save
-from scenarios import DropspinError
+from dropspin.comparisons.results.store import load_results, save
+from dropspin.scenarios import DropspinError
 
 FLIPS = 100
 DEEP = "[" * 5000 + "]" * 5000

@@ -34,7 +34,7 @@ def test_written_adapter_passes_the_written_tests(tmp_path):
         ("mujoco_warp", "'mujoco_warp', which is already the name of an engine; choose another one, such as mujoco_warp_adapter."),
         ("document", "already the name of an engine"),
         ("json", "'json', which is already the name of an importable module; choose another one, such as json_adapter."),
-        ("scenarios", "already the name of an importable module"),
+        ("dropspin", "already the name of an importable module"),
     ],
 )
 def test_names_that_cannot_work_are_refused(name, message, tmp_path):

@@ -5,8 +5,8 @@ import json
 import pytest
 from support.cli import TERMINAL, assert_refused, dropspin
 
-from comparisons.published import study
-from comparisons.published.results import Result
+from dropspin.comparisons.published import study
+from dropspin.comparisons.published.results import Result
 
 
 def test_table_notes_and_files(tmp_path):

@@ -6,11 +6,11 @@ import pytest
 from click.testing import CliRunner
 from support.small_record import HOSTILE, rows, write_record
 
-from comparisons.record import environments, rerun
-from comparisons.record.environments import NotMeasured
-from comparisons.record.store import machine
-from reports.commands.rerun import rerun_command
-from scenarios import DropspinError
+from dropspin.comparisons.record import environments, rerun
+from dropspin.comparisons.record.environments import NotMeasured
+from dropspin.comparisons.record.store import machine
+from dropspin.reports.commands.rerun import rerun_command
+from dropspin.scenarios import DropspinError
 
 CELL = ("mujoco[profile=default]", "3.10.0", "spin-asymmetric")
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from support.cli import DROPSPIN, dropspin
 
-from comparisons.engines.mujoco_engine import MuJoCo
-from comparisons.running import run as running
-from comparisons.running.processes import ResourceLimits
-from comparisons.running.recording import simulate
-from reports.run_folder import MeasuredScenes
-from reports.views.failures import failures
-from scenarios import load
+from dropspin.comparisons.engines.mujoco_engine import MuJoCo
+from dropspin.comparisons.running import run as running
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.comparisons.running.recording import simulate
+from dropspin.reports.run_folder import MeasuredScenes
+from dropspin.reports.views.failures import failures
+from dropspin.scenarios import load
 
 SCENE = """
 summary  = "Mine"

@@ -12,11 +12,11 @@ import pytest
 from support.cli import assert_refused, dropspin
 from support.run_folders import change_json, change_table, contents
 
-from comparisons.running.run import run
-from comparisons.sweeps.running import read_sweep, run_sweep
-from comparisons.sweeps.spec import load_sweep
-from reports.run_folder import write_report
-from scenarios import DropspinError, load
+from dropspin.comparisons.running.run import run
+from dropspin.comparisons.sweeps.running import read_sweep, run_sweep
+from dropspin.comparisons.sweeps.spec import load_sweep
+from dropspin.reports.run_folder import write_report
+from dropspin.scenarios import DropspinError, load
 
 DEEP = "[" * 5000 + "]" * 5000
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from support.cli import DROPSPIN, dropspin
 
-from comparisons.running.progress import Progress
-from reports.terminal.progress import progress_bar
+from dropspin.comparisons.running.progress import Progress
+from dropspin.reports.terminal.progress import progress_bar
 
 SCENE = """
 duration = 0.5

@@ -12,7 +12,7 @@ import pytest
 from support.adapters import DRIFTING
 from support.cli import DROPSPIN, assert_refused, dropspin, spawn
 
-from reports.views import listings
+from dropspin.reports.views import listings
 
 STRAYS = ("bottleneck", "numexpr", "cloudpickle", "yaml", "colorama", "lxml", "click", "numpy", "matplotlib", "scenarios", "_pytest")
 BALL = """
@@ -68,7 +68,9 @@ def _broken(tmp_path, monkeypatch):
     text = "libGL.so.1: cannot open shared object file: No such file or directory"
     (folder / "pydrake" / "__init__.py").write_text(f"raise ImportError({text!r})")
     (tmp_path / "ball.toml").write_text(BALL)
-    for name in [name for name in sys.modules if name.partition(".")[0] == "pydrake" or name == "comparisons.engines.drake_engine"]:
+    for name in [
+        name for name in sys.modules if name.partition(".")[0] == "pydrake" or name == "dropspin.comparisons.engines.drake_engine"
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.syspath_prepend(folder)
 

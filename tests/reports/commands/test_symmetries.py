@@ -5,7 +5,7 @@ import json
 import pytest
 from support.cli import dropspin
 
-from comparisons.measuring.symmetries import NAMES
+from dropspin.comparisons.measuring.symmetries import NAMES
 
 
 def test_table_sentences_and_files(tmp_path):

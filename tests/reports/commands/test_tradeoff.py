@@ -5,8 +5,8 @@ import json
 import pytest
 from support.cli import dropspin
 
-from comparisons.tradeoff.errors import BUDGET
-from reports.commands.tradeoff import tradeoff_command
+from dropspin.comparisons.tradeoff.errors import BUDGET
+from dropspin.reports.commands.tradeoff import tradeoff_command
 
 SCENE = """
 duration = 0.5

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import pandas as pd
 import pytest
 
-from comparisons.results.measurement import Measurement, as_table
-from reports.views.error_budget import error_budgets
+from dropspin.comparisons.results.measurement import Measurement, as_table
+from dropspin.reports.views.error_budget import error_budgets
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,15 @@ from dataclasses import replace
 import pytest
 from support.cli import TERMINAL
 
-from comparisons.robustness.axes import AXES
-from comparisons.robustness.failure_modes import Diagnosis
-from comparisons.robustness.scan import AxisScan, ScanPoint
-from comparisons.robustness.study import RobustnessStudy
-from reports import plots
-from reports.study_files import write_limits
-from reports.terminal.rows import print_rows
-from reports.views import limits
-from scenarios import load
+from dropspin.comparisons.robustness.axes import AXES
+from dropspin.comparisons.robustness.failure_modes import Diagnosis
+from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint
+from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.reports import plots
+from dropspin.reports.study_files import write_limits
+from dropspin.reports.terminal.rows import print_rows
+from dropspin.reports.views import limits
+from dropspin.scenarios import load
 
 SPIN = load("spin-principal")
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from reports.views.leading_errors import level
-from reports.views.numbers import duration, failing, formatted, left_out
+from dropspin.reports.views.leading_errors import level
+from dropspin.reports.views.numbers import duration, failing, formatted, left_out
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from reports.junit import junit_xml
-from reports.views.run import overview
+from dropspin.reports.junit import junit_xml
+from dropspin.reports.views.run import overview
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from support.cli import TERMINAL
 
-from comparisons.tradeoff.ladder import Ladder
-from comparisons.tradeoff.points import CostPoint, TradeOff
-from reports.study_files import write_tradeoff
-from reports.terminal.rows import print_rows
-from reports.views import tradeoff
-from scenarios import load
+from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff
+from dropspin.reports.study_files import write_tradeoff
+from dropspin.reports.terminal.rows import print_rows
+from dropspin.reports.views import tradeoff
+from dropspin.scenarios import load
 
 SPENT = "the budget of 2 s of processor time was spent"
 

@@ -1,0 +1,166 @@
+"""dropspin: compare rigid-body engines with exact solutions. This package is the public interface and the console command.
+
+    import dropspin as ds
+
+    results = ds.run("drop-ball", "mujoco", dt=[4e-3, 2e-3, 1e-3])
+    results.table
+
+Names are imported on first use, so that `import dropspin` and `dropspin --help` load neither pandas nor an engine.
+"""
+
+import os
+import sys
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dropspin.comparisons.calibration import Calibration as Calibration
+    from dropspin.comparisons.calibration import calibrate as calibrate
+    from dropspin.comparisons.conformance.checks import conform as conform
+    from dropspin.comparisons.conformance.outcomes import CheckResult as CheckResult
+    from dropspin.comparisons.engines.base import AsBuilt as AsBuilt
+    from dropspin.comparisons.engines.base import BatchSimulation as BatchSimulation
+    from dropspin.comparisons.engines.base import Diverged as Diverged
+    from dropspin.comparisons.engines.base import Engine as Engine
+    from dropspin.comparisons.engines.base import EngineBroken as EngineBroken
+    from dropspin.comparisons.engines.base import EngineMissing as EngineMissing
+    from dropspin.comparisons.engines.base import KnownLimitation as KnownLimitation
+    from dropspin.comparisons.engines.base import NumericOption as NumericOption
+    from dropspin.comparisons.engines.base import Simulation as Simulation
+    from dropspin.comparisons.engines.registry import engine as engine
+    from dropspin.comparisons.engines.registry import engine_names as engine_names
+    from dropspin.comparisons.judging.error_budget import ErrorBudget as ErrorBudget
+    from dropspin.comparisons.judging.error_budget import error_budget as error_budget
+    from dropspin.comparisons.measuring.contacts import contacts as contacts
+    from dropspin.comparisons.measuring.metrics import METRICS as METRICS
+    from dropspin.comparisons.regressions.baseline import Baseline as Baseline
+    from dropspin.comparisons.regressions.baseline import accept as accept
+    from dropspin.comparisons.regressions.baseline import load_baseline as load_baseline
+    from dropspin.comparisons.regressions.baseline import write_baseline as write_baseline
+    from dropspin.comparisons.regressions.checking import check as check
+    from dropspin.comparisons.regressions.comparing import compare as compare
+    from dropspin.comparisons.regressions.history import history as history
+    from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS as ENSEMBLE_METRICS
+    from dropspin.comparisons.results.measurement import Measurement as Measurement
+    from dropspin.comparisons.results.results import Results as Results
+    from dropspin.comparisons.results.store import load_results as load_results
+    from dropspin.comparisons.robustness.study import RobustnessStudy as RobustnessStudy
+    from dropspin.comparisons.robustness.study import find_limits as find_limits
+    from dropspin.comparisons.running.processes import ResourceLimits as ResourceLimits
+    from dropspin.comparisons.running.recording import simulate as simulate
+    from dropspin.comparisons.running.run import DEFAULT_DTS as DEFAULT_DTS
+    from dropspin.comparisons.running.run import measure as measure
+    from dropspin.comparisons.running.run import run as run
+    from dropspin.comparisons.sweeps.running import read_sweep as read_sweep
+    from dropspin.comparisons.sweeps.running import read_sweep_parts as read_sweep_parts
+    from dropspin.comparisons.sweeps.running import run_sweep as run_sweep
+    from dropspin.comparisons.sweeps.spec import load_sweep as load_sweep
+    from dropspin.comparisons.symmetries.study import symmetries as symmetries
+    from dropspin.comparisons.symmetries.twins import twins as twins
+    from dropspin.comparisons.tradeoff.points import TradeOff as TradeOff
+    from dropspin.comparisons.tradeoff.study import tradeoff as tradeoff
+    from dropspin.reports import plots as plots
+    from dropspin.reports.run_folder import write_report as write_report
+    from dropspin.reports.terminal.run_table import print_table as print_table
+    from dropspin.scenarios.draw import draw as draw
+    from dropspin.scenarios.errors import DropspinError as DropspinError
+    from dropspin.scenarios.errors import SceneError as SceneError
+    from dropspin.scenarios.errors import UnknownName as UnknownName
+    from dropspin.scenarios.loading import load as load
+    from dropspin.scenarios.loading import names as _names
+    from dropspin.scenarios.model import Scenario as Scenario
+    from dropspin.scenarios.trajectory import Trajectory as Trajectory
+    from dropspin.scenarios.truths import truth_for as truth_for
+    from dropspin.scenarios.truths.truth import Truth as Truth
+
+    scene_names = _names  # mypy exports a name that is imported as another only if it is assigned
+
+_HOMES = {
+    "dropspin.comparisons.calibration": ("Calibration", "calibrate"),
+    "dropspin.comparisons.conformance.checks": ("conform",),
+    "dropspin.comparisons.conformance.outcomes": ("CheckResult",),
+    "dropspin.comparisons.engines.base": (
+        "AsBuilt",
+        "BatchSimulation",
+        "Diverged",
+        "Engine",
+        "EngineBroken",
+        "EngineMissing",
+        "KnownLimitation",
+        "NumericOption",
+        "Simulation",
+    ),
+    "dropspin.comparisons.engines.registry": ("engine", "engine_names"),
+    "dropspin.comparisons.judging.error_budget": ("ErrorBudget", "error_budget"),
+    "dropspin.comparisons.measuring.contacts": ("contacts",),
+    "dropspin.comparisons.measuring.metrics": ("METRICS",),
+    "dropspin.comparisons.regressions.baseline": ("Baseline", "accept", "load_baseline", "write_baseline"),
+    "dropspin.comparisons.regressions.checking": ("check",),
+    "dropspin.comparisons.regressions.comparing": ("compare",),
+    "dropspin.comparisons.regressions.history": ("history",),
+    "dropspin.comparisons.results.ensembles": ("ENSEMBLE_METRICS",),
+    "dropspin.comparisons.results.measurement": ("Measurement",),
+    "dropspin.comparisons.results.results": ("Results",),
+    "dropspin.comparisons.results.store": ("load_results",),
+    "dropspin.comparisons.robustness.study": ("RobustnessStudy", "find_limits"),
+    "dropspin.comparisons.running.processes": ("ResourceLimits",),
+    "dropspin.comparisons.running.recording": ("simulate",),
+    "dropspin.comparisons.running.run": ("DEFAULT_DTS", "measure", "run"),
+    "dropspin.comparisons.sweeps.running": ("read_sweep", "read_sweep_parts", "run_sweep"),
+    "dropspin.comparisons.sweeps.spec": ("load_sweep",),
+    "dropspin.comparisons.symmetries.study": ("symmetries",),
+    "dropspin.comparisons.symmetries.twins": ("twins",),
+    "dropspin.comparisons.tradeoff.points": ("TradeOff",),
+    "dropspin.comparisons.tradeoff.study": ("tradeoff",),
+    "dropspin.reports": ("plots",),
+    "dropspin.reports.run_folder": ("write_report",),
+    "dropspin.reports.terminal.run_table": ("print_table",),
+    "dropspin.scenarios.draw": ("draw",),
+    "dropspin.scenarios.errors": ("DropspinError", "SceneError", "UnknownName"),
+    "dropspin.scenarios.loading": ("load", ("scene_names", "names")),
+    "dropspin.scenarios.model": ("Scenario",),
+    "dropspin.scenarios.trajectory": ("Trajectory",),
+    "dropspin.scenarios.truths": ("truth_for",),
+    "dropspin.scenarios.truths.truth": ("Truth",),
+}
+_LOCATIONS = {
+    public: (module, home)
+    for module, names in _HOMES.items()
+    for public, home in ((name, name) if isinstance(name, str) else name for name in names)
+}
+"""For each public name, the module that defines it, and its name there."""
+
+__all__ = sorted(_LOCATIONS)  # noqa: PLE0605 - a list of strings, computed
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use."""
+    if name not in _LOCATIONS:
+        raise AttributeError(f"module 'dropspin' has no attribute {name!r}")
+    module, home = _LOCATIONS[name]
+    globals()[name] = found = getattr(__import__(module, fromlist=(home,)), home)  # as `from module import home`
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def main() -> None:
+    """Run the command line.
+
+    Neither the working directory nor a user's folder on PYTHONPATH can hide dropspin's modules or installed packages. The working directory
+    is on Python's path only in the processes of the user's own engines, and folders on PYTHONPATH come last.
+    """
+    with suppress(FileNotFoundError):  # of a working directory that was removed, which the command line reports
+        _arrange_path()
+    from dropspin.reports.commands.main import main as command_line
+
+    command_line()
+
+
+def _arrange_path() -> None:
+    home, here = os.path.dirname(os.path.abspath(__file__)), os.getcwd()
+    named = [os.path.abspath(place) for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
+    own = [place for place in sys.path if os.path.abspath(place) not in {*named, here} - {home}]
+    sys.path[:] = own + [place for place in dict.fromkeys(named) if place not in {home, here}]

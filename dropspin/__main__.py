@@ -1,0 +1,5 @@
+"""`python -m dropspin`: the command line."""
+
+from dropspin import main
+
+main()

@@ -52,7 +52,7 @@ docs: $(VENV)/.installed-dev          ## the documentation, links within it chec
 
 site: $(VENV)/.installed-dev          ## the documentation with the pages of the record in record/: out/site/releases/index.html
 	$(BIN)/python -m sphinx -q -W --keep-going -t releases docs out/site
-	$(BIN)/dropspin publish record -o out/site/releases
+	$(BIN)/dropspin record publish record -o out/site/releases
 
 lint: $(VENV)/.installed-dev          ## style, types, import contracts
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""The study of the command `dropspin twins`: from which time step on engines that should give the same motion differ, and by how much.
+"""`dropspin symmetries twins`: from which time step on engines that should give the same motion differ, and by how much.
 
 Twins are engines that state the same algorithm, such as one engine on a processor and its port to a GPU. No exact solution is needed. As
 for symmetries, a difference is attributed to rounding as long as perturbations of the initial state by a few eps have as large an effect

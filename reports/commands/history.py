@@ -1,4 +1,4 @@
-"""`dropspin history`."""
+"""`dropspin compare history`."""
 
 import json
 import os

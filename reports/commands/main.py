@@ -13,31 +13,44 @@ from dropspin.reports.commands import surroundings
 from dropspin.reports.commands.interrupts import handle_interrupts, stop_if_interrupted
 from dropspin.reports.terminal.streams import error_of, unfailing
 
-COMMANDS = {
-    "accept": "Accept a run's results as the new baseline.",
-    "calibrate": "Print the settings that give a coefficient of restitution at a time step.",
-    "check": "Check a run against the expectations of its scenes and a baseline.",
-    "compare": "Show which results changed between two runs, and the cause.",
-    "conform": "Check an engine adapter against the protocol and reference motions.",
-    "doctor": "Check this installation.",
-    "history": "Follow each result over runs, commits and versions.",
-    "limits": "Find where engines break down.",
-    "list": "List the scenes, the engines or the metrics.",
-    "new-adapter": "Write a working adapter, to change into that of your engine.",
-    "publish": "Write the record of releases as a site.",
-    "record": "Measure every release of each engine.",
-    "replay": "Show the motions of a run in 3D.",
-    "report": "Write the report of a run again.",
-    "reproduce": "Compare published results with what engines give here.",
-    "rerun": "Measure a cell of the record again, bit for bit.",
-    "run": "Run scenes with several engines, and write the report.",
-    "show": "Show a scene, or the settings of an engine for the scene.",
-    "sweep": "Run every job of a grid or random sample.",
-    "symmetries": "Test whether engines keep symmetries and repeat their results.",
-    "tradeoff": "Measure what accuracy costs.",
-    "twins": "Find the time step from which engines of the same algorithm differ.",
+GROUPS = {
+    "Use": {
+        "run": "Run scenes with several engines, and write the report.",
+        "list": "List the scenes, the engines or the metrics.",
+        "show": "Show a scene, or the settings of an engine for the scene.",
+        "replay": "Show the motions of a run in 3D.",
+        "report": "Write the report of a run again.",
+        "calibrate": "Print the settings that give a coefficient of restitution at a time step.",
+    },
+    "Judge": {
+        "check": "Check a run against the expectations of its scenes and a baseline.",
+        "accept": "Accept a run's results as the new baseline.",
+        "compare": "Show which results changed between two runs, and the cause.",
+        "compare history": "Follow each result over runs, commits and versions.",
+    },
+    "Study": {
+        "tradeoff": "Measure what accuracy costs.",
+        "limits": "Find where engines break down.",
+        "symmetries": "Test whether engines keep symmetries and repeat their results.",
+        "symmetries twins": "Find the time step from which engines of the same algorithm differ.",
+        "sweep": "Run every job of a grid or random sample.",
+        "reproduce": "Compare published results with what engines give here.",
+    },
+    "Write an adapter": {
+        "new-adapter": "Write a working adapter, to change into that of your engine.",
+        "conform": "Check an engine adapter against the protocol and reference motions.",
+    },
+    "Maintain": {
+        "record": "Measure every release of each engine.",
+        "record rerun": "Measure a cell of the record again, bit for bit.",
+        "record publish": "Write the record of releases as a site.",
+        "doctor": "Check this installation.",
+    },
 }
-"""The commands, each in `reports/commands/NAME.py` (`-` is `_` there), with the line shown for each in the help."""
+COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
+"""The commands, each in `reports/commands/`, in a file with the last word of its name (`-` is `_` there); with their lines in the help."""
+MOVED = {name.rpartition(" ")[2]: name for name in COMMANDS if " " in name}
+"""The commands that were commands of their own in earlier versions."""
 CITATION = """To cite: The dropspin authors, dropspin, version {version};
 for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
 """The text to cite; a test compares it with CITATION.cff."""
@@ -92,8 +105,12 @@ def _run() -> int:
                 given = f"{argument!r:.60}"
                 raise click.UsageError(f"the argument {given} is not printable text of at most {LONGEST_ARGUMENT} characters.")
         return dropspin(prog_name="dropspin", standalone_mode=False) or 0
-    except click.ClickException as error:
+    except click.exceptions.NoArgsIsHelpError as error:
         error.show()
+        return 2
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        _say(error.format_message() + (f" To list what it takes: {context.command_path} --help" if context else ""))
         return 2
     except click.Abort:  # an interrupt of a command, with its message
         raise
@@ -132,16 +149,28 @@ class _LazyGroup(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
 
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        words = 2 if " ".join(args[:2]) in COMMANDS else 1
+        name = " ".join(args[:words])
+        if name in MOVED:
+            raise click.UsageError(f"{name} is now: dropspin {MOVED[name]}.", ctx)
+        if name not in COMMANDS and not name.startswith("-"):
+            from dropspin.scenarios import UnknownName
+
+            raise click.UsageError(str(UnknownName("command", name, COMMANDS)), ctx)
+        return super().resolve_command(ctx, [name, *args[words:]])
+
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module = cmd_name.replace("-", "_")
+        module = cmd_name.rpartition(" ")[2].replace("-", "_")
         command: click.Command = getattr(import_module(f"dropspin.reports.commands.{module}"), f"{module}_command")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+        for title, commands in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl(list(commands.items()))
 
 
 def _print_version(ctx: click.Context, parameter: click.Parameter, value: Any) -> None:

@@ -1,4 +1,4 @@
-"""`dropspin publish`."""
+"""`dropspin record publish`."""
 
 import os
 from pathlib import Path
@@ -23,6 +23,6 @@ def publish_command(record: str, output: str) -> None:
 
     found = read(record)
     docs = "../" if (Path(output).resolve().parent / "problems.html").is_file() else ""
-    with replaced_folder(output, files_of_site, "publish") as folder:
+    with replaced_folder(output, files_of_site, "record publish") as folder:
         Site(found, others(record, found), docs).write(folder)
     echo(f"Site: {os.path.join(output, INDEX)}")

@@ -1,4 +1,4 @@
-"""`dropspin rerun`."""
+"""`dropspin record rerun`."""
 
 import json
 

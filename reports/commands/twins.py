@@ -1,4 +1,4 @@
-"""`dropspin twins`."""
+"""`dropspin symmetries twins`."""
 
 import json
 from typing import TYPE_CHECKING

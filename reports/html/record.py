@@ -21,7 +21,7 @@ from dropspin.reports.views.scene import modelled
 from dropspin.scenarios import truth_for
 from dropspin.scenarios.problems import identifier
 
-GENERATOR = '<meta name="generator" content="dropspin publish">'
+GENERATOR = '<meta name="generator" content="dropspin record publish">'
 INDEX = "index.html"
 LEAST = 1e-16
 """Relative error at which an exact zero is drawn."""
@@ -160,7 +160,7 @@ class Site:
 
 
 def files_of_site(folder: Path) -> set[str]:
-    """The files that `dropspin publish` wrote to a folder; empty if it did not write the folder."""
+    """The files that `dropspin record publish` wrote to a folder; empty if it did not write the folder."""
     index = folder / INDEX
     if not index.is_file() or GENERATOR not in index.read_text(encoding="utf-8", errors="replace"):
         return set()

@@ -1,4 +1,4 @@
-"""The output of `dropspin history`: the runs in which results changed."""
+"""The output of `dropspin compare history`: the runs in which results changed."""
 
 from dropspin.comparisons.regressions.history import History, Move
 from dropspin.reports.views.numbers import formatted, subject

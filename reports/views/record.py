@@ -47,7 +47,7 @@ def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
 
 def rerun(label: str, release: Release, scene: str) -> str:
     """The command that measures a cell again."""
-    return f"dropspin rerun {quote(label)} {release.name} {scene}"
+    return f"dropspin record rerun {quote(label)} {release.name} {scene}"
 
 
 def cost(case: Case) -> str:

@@ -1,4 +1,4 @@
-"""The output of `dropspin rerun`: a row for each time step, and what is not as in the record."""
+"""The output of `dropspin record rerun`: a row for each time step, and what is not as in the record."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""The output of `dropspin twins`: a row for each scene and pair of engines."""
+"""The output of `dropspin symmetries twins`: a row for each scene and pair of engines."""
 
 import math
 from collections.abc import Sequence

@@ -16,7 +16,7 @@ PAGES = ("index.html", "engine-mujoco.html", "release-mujoco-3.11.0.html", "scen
 def folder(shared):
     def make(place):
         write_record(place / "record")
-        assert dropspin("publish", cwd=place).returncode == 0
+        assert dropspin("record", "publish", cwd=place).returncode == 0
 
     return shared("site", make) / "out/site-record"
 

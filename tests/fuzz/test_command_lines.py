@@ -88,7 +88,7 @@ def command_lines(draw: st.DrawFn) -> tuple[str, ...]:
             options += [option] if parameter.is_flag else [f"{option}={draw(values(parameter))}"]
     if draw(st.sampled_from([False] * 9 + [True])):
         options.append(draw(st.sampled_from(["--unknown", "-h", "--version", "-", "--output", "-e", "-vvv", "--json=1"])))
-    return name, *options, *(["--"] if draw(st.booleans()) else []), *arguments
+    return *name.split(), *options, *(["--"] if draw(st.booleans()) else []), *arguments
 
 
 def outputs(line: tuple[str, ...]) -> list[str]:

@@ -24,7 +24,7 @@ COMMANDS = st.sampled_from(
         (("check", "run", "--json"), ()),
         (("check", "run", "--junit", "out/junit.xml"), ("out",)),
         (("compare", "run", "run2"), ()),
-        (("history", "run2", "run", "-o", "out"), ("out",)),
+        (("compare", "history", "run2", "run", "-o", "out"), ("out",)),
         (("replay", "run", "--no-open"), ("run",)),
         (("accept", "run", "--reason", "r"), ("dropspin-baseline.toml",)),
         (("run", "ball.toml", "-e", "document", "--dt", "0.02", "-o", "run", "--resume"), ("run",)),

@@ -14,7 +14,7 @@ from support.small_record import HOSTILE, SCENES, write_record
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     write_record(folder / "record")
-    done = dropspin("publish", cwd=folder)
+    done = dropspin("record", "publish", cwd=folder)
     assert (done.returncode, done.stdout) == (0, "Site: out/site-record/index.html\n"), done.stderr
     return folder / "out/site-record"
 
@@ -64,7 +64,7 @@ def test_page_of_an_engine_says_what_changed_in_which_release(site):
     page = (site / "engine-mujoco.html").read_text(encoding="utf-8")
     start = "orientation error 1.00e-06 rad, 2 ms per simulated second, 20 times that of Wang&#39;s method, mujoco 3.11.0"
     [title] = set(re.findall(f'title="({start}[^"]*)"', page))
-    assert title.endswith("to repeat it: dropspin rerun mujoco 3.11.0 spin-asymmetric")
+    assert title.endswith("to repeat it: dropspin record rerun mujoco 3.11.0 spin-asymmetric")
 
 
 def test_page_of_a_release_says_what_changed_in_it_and_has_the_command_of_each_cell(site):
@@ -72,7 +72,7 @@ def test_page_of_a_release_says_what_changed_in_it_and_has_the_command_of_each_c
     assert "What changed after 3.10.0 8 values, over all metrics and time steps, differ from those of 3.10.0" in text
     assert "drop-ball with mujoco, mujoco[profile=default]: bounce height error 0.0127 → 1.00e-06 at dt = 1 ms" in text
     for label in ("mujoco", "'mujoco[profile=default]'"):
-        assert f"To repeat a result: dropspin rerun {label} 3.11.0 SCENE" in text
+        assert f"To repeat a result: dropspin record rerun {label} 3.11.0 SCENE" in text
     assert "drop-ball bounce height error 4.00e-06 2.00e-06 to 8.00e-06 1.00e-06 5.00e-07 to 2.00e-06 6.0 2 ms" in text
     assert "This is the first release that was measured." in Page(site / "release-mujoco-3.9.0.html").text
     assert "declined" in Page(site / "release-mujoco-3.9.0.html").text
@@ -127,12 +127,14 @@ def test_site_replaces_an_earlier_site_and_nothing_else(site):
     before = {file: file.read_bytes() for file in site.rglob("*.html")}
     stale = site / "engine-gone.html"
     stale.write_text("")
-    assert dropspin("publish", cwd=site.parents[1]).returncode == 0
+    assert dropspin("record", "publish", cwd=site.parents[1]).returncode == 0
     assert {file: file.read_bytes() for file in site.rglob("*.html")} == before
     other = site.parents[1] / "other"
     other.mkdir()
     (other / "index.html").write_text("mine")
-    assert_refused(dropspin("publish", "-o", "other", cwd=site.parents[1]), "has files that dropspin publish did not write")
+    assert_refused(
+        dropspin("record", "publish", "-o", "other", cwd=site.parents[1]), "has files that dropspin record publish did not write"
+    )
     assert (other / "index.html").read_text() == "mine"
 
 
@@ -140,10 +142,10 @@ def test_site_within_the_documentation_links_to_it(site):
     folder = site.parents[1]
     (folder / "docs").mkdir()
     (folder / "docs/problems.html").write_text("")
-    assert dropspin("publish", "record", "-o", "docs/record", cwd=folder).returncode == 0
+    assert dropspin("record", "publish", "record", "-o", "docs/record", cwd=folder).returncode == 0
     assert "../problems/DS-008.html" in Page(folder / "docs/record/scene-spin-asymmetric.html").links
     assert "../index.html" in Page(folder / "docs/record/index.html").links
 
 
 def test_folder_without_a_record_is_refused(tmp_path):
-    assert_refused(dropspin("publish", "nothing", cwd=tmp_path), "nothing: has no release that was measured here")
+    assert_refused(dropspin("record", "publish", "nothing", cwd=tmp_path), "nothing: has no release that was measured here")

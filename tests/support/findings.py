@@ -11,7 +11,7 @@ from support.heavy_engines import CASES
 PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
 FINDING = re.compile(
     r"^- .+: (?P<order>order of )?`(?P<name>[\w =]+)`(?: (?P<relation>[→<]))?(?: (?P<value>-?\d(?:[\d.]*\d)?(?:e-\d+)?))?(?: m| rad)?\.\\\n"
-    r"  `dropspin (?P<command>(?:run|twins) .+)`$",
+    r"  `dropspin (?P<command>(?:run|symmetries twins) .+)`$",
     re.MULTILINE,
 )
 
@@ -47,7 +47,7 @@ def verify_twins(command, folder, run):
 
 def verify_findings(command, folder, run=cli.dropspin):
     """Run a command: it measures the printed digits, at the finest time step or as dt → 0. A word is a verdict."""
-    if command.startswith("twins"):
+    if command.startswith("symmetries twins"):
         verify_twins(command, folder, run)
         return
     results = printed(run(*shlex.split(command), "--json", "-o", "out", cwd=folder))

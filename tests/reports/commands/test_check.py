@@ -209,8 +209,8 @@ def test_annotations_are_for_github(repository):
         (["compare", "out/good"], "Missing argument 'NEW'"),
         (["compare", "out/good", "absent"], "absent: not the folder of a run"),
         (["compare", "out/good", "out/good", "--fail-speed", "20%"], "No such option"),
-        (["history", "out/good"], "a history needs two or more runs, got 1; give more, or a folder of runs."),
-        (["history", "absent"], "absent: neither a run nor a folder of runs; "),
+        (["compare", "history", "out/good"], "a history needs two or more runs, got 1; give more, or a folder of runs."),
+        (["compare", "history", "absent"], "absent: neither a run nor a folder of runs; "),
     ],
     ids=lambda case: " ".join(case) if isinstance(case, list) else "",
 )

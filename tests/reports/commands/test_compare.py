@@ -1,4 +1,4 @@
-"""`dropspin compare` and `dropspin history`."""
+"""`dropspin compare` and `dropspin compare history`."""
 
 import json
 import re
@@ -30,7 +30,7 @@ def test_compare_says_what_got_worse_and_why(repository, tmp_path):
 
 def test_history_finds_the_run_in_which_results_moved(repository, tmp_path):
     """The run, what the move is attributed to, a table and a plot for each scene."""
-    done = dropspin("history", "out", "-o", tmp_path / "history", cwd=repository)
+    done = dropspin("compare", "history", "out", "-o", tmp_path / "history", cwd=repository)
     assert done.returncode == 0, done.stderr
     assert "changed in failing, after good. Attributed to the engine" in " ".join(done.stdout.split())
     names = {path.name for path in (tmp_path / "history").iterdir()}

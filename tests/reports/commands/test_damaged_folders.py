@@ -214,7 +214,9 @@ def test_undamaged_copy_is_loaded(copied, tmp_path):
     assert dropspin("report", "run", cwd=tmp_path).returncode == 0
 
 
-@pytest.mark.parametrize("verb", [("check", "run"), ("compare", "run", "run"), ("history", "run", "run2", "-o", "h"), ("replay", "run")])
+@pytest.mark.parametrize(
+    "verb", [("check", "run"), ("compare", "run", "run"), ("compare", "history", "run", "run2", "-o", "h"), ("replay", "run")]
+)
 def test_every_verb_refuses_a_damaged_run(verb, copied, tmp_path):
     shutil.copytree(copied, tmp_path / "run2")
     edited("provenance", "asked", to=[])(copied)

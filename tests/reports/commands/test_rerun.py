@@ -1,4 +1,4 @@
-"""`dropspin rerun`: a cell of a record is measured again, and compared bit for bit. pip is replaced: no test needs a network."""
+"""`dropspin record rerun`: a cell of a record is measured again, and compared bit for bit. pip is replaced: no test needs a network."""
 
 import json
 

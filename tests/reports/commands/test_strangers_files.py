@@ -28,7 +28,7 @@ def test_history_writes_only_into_its_folder(name, small, tmp_path):
     write_report(run(spin, "mujoco", 1e-2), tmp_path / "runs" / "one")
     shutil.copytree(tmp_path / "runs" / "one", tmp_path / "runs" / "two")
     before = contents(tmp_path)
-    assert dropspin("history", "runs", "-o", "deep/er/out", cwd=tmp_path).returncode == 0
+    assert dropspin("compare", "history", "runs", "-o", "deep/er/out", cwd=tmp_path).returncode == 0
     written = contents(tmp_path).keys() - before.keys()
     assert {path.rpartition("/")[0] for path in written} == {"deep/er/out"}
     [picture] = [path.rpartition("/")[2] for path in written if path.endswith(".svg")]
@@ -37,7 +37,7 @@ def test_history_writes_only_into_its_folder(name, small, tmp_path):
     assert "<img" not in page.replace("\\<", "")
 
 
-@pytest.mark.parametrize("verb", [("compare", "good", "run"), ("history", "good", "run", "-o", "out")])
+@pytest.mark.parametrize("verb", [("compare", "good", "run"), ("compare", "history", "good", "run", "-o", "out")])
 def test_settings_are_printed_without_control_characters(verb, small_folder, copied, tmp_path):
     """They are what an engine's adapter reported: their names and values may be of any characters."""
     shutil.copytree(small_folder, tmp_path / "good")
@@ -108,7 +108,7 @@ def test_names_of_runs_are_printed_without_control_characters(small_folder, tmp_
     """The name of a folder may be of any characters, and be no text."""
     for name in (b"one\x1b[2J", b"two\xff"):
         shutil.copytree(small_folder, tmp_path / "runs" / os.fsdecode(name))
-    done = dropspin("history", "runs", "-o", "out", cwd=tmp_path)
+    done = dropspin("compare", "history", "runs", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "one\\u001b[2J" in (tmp_path / "out/history.csv").read_text(encoding="utf-8") + (tmp_path / "out/history.md").read_text(
         encoding="utf-8"

@@ -1,4 +1,4 @@
-"""`dropspin twins`."""
+"""`dropspin symmetries twins`."""
 
 import json
 
@@ -8,15 +8,15 @@ from support.cli import dropspin
 
 def test_table_and_json(tmp_path):
     """A port that rounds otherwise, another integrator, and an engine that declines the scene."""
-    asked = ("twins", "drop-box-corner", "--dt", "0.002", "-e", "mujoco", "-e", "mujoco[body=child]", "-e", "mujoco[integrator=rk4]")
-    done = dropspin(*asked, cwd=tmp_path)
+    asked = ("drop-box-corner", "--dt", "0.002", "-e", "mujoco", "-e", "mujoco[body=child]", "-e", "mujoco[integrator=rk4]")
+    done = dropspin("symmetries", "twins", *asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0].startswith("scene            engines")
     assert lines[1].split()[-2:] == ["–", "yes"]
     assert lines[2].endswith("not run")
     assert any(line.startswith("Not run: mujoco and mujoco[integrator=rk4] in drop-box-corner: mujoco[integrator=rk4]: ") for line in lines)
-    rounded, *others = json.loads(dropspin(*asked, "--json", cwd=tmp_path).stdout)
+    rounded, *others = json.loads(dropspin("symmetries", "twins", *asked, "--json", cwd=tmp_path).stdout)
     assert [one["status"] for one in (rounded, *others)] == ["kept", "not run", "not run"]
     assert rounded["first"] > 0
     assert rounded["beyond"]["0.001"] is None
@@ -35,6 +35,6 @@ def test_table_and_json(tmp_path):
     ],
 )
 def test_bad_input_is_refused(asked, message, tmp_path):
-    done = dropspin("twins", *asked, cwd=tmp_path)
+    done = dropspin("symmetries", "twins", *asked, cwd=tmp_path)
     assert done.returncode == 2
     assert message in done.stderr

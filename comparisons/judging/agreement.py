@@ -5,14 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dropspin.comparisons.judging.horizon import with_horizon
-from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.judging.verdicts import Basis, Judgement
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.scenarios import Scenario, Trajectory, Truth
-
-NO_EVIDENCE = "no evidence"
-"""The beginning of the reason if two engines agree because they use the same discretisation."""
 
 
 def judge_agreement(
@@ -35,16 +32,18 @@ def judge_agreement(
     """
     pairs = [_paired(truth, one, other) for truth, one, other in zip(truths, first, second, strict=True)]
     shared, other = discretisations
-    reason = f"{NO_EVIDENCE}: both are {shared}" if shared is not None and shared == other else ""
+    same = shared is not None and shared == other
+    basis: Basis = "same_method" if same else ""
+    reason = f"no evidence: both are {shared}" if same else ""
     for metric in METRICS.values():
         if not (metric.agreement and metric.applies(scene, truth or _as_truth(second[0].motion))):
             continue
         unresolved: Unresolved | None = None
         try:
-            judgement = Judgement(metric.average(pairs).value, "measured", reason=reason)
+            judgement = Judgement(metric.average(pairs).value, "measured", reason=reason, basis=basis)
         except Unresolved as error:
             unresolved = error
-            judgement = Judgement(np.nan, "measured", cause="unresolved", reason="; ".join(filter(None, [reason, str(error)])))
+            judgement = Judgement(np.nan, "measured", cause="unresolved", reason="; ".join(filter(None, [reason, str(error)])), basis=basis)
         yield metric, with_horizon(judgement, scene, metric, truth, unresolved)
 
 

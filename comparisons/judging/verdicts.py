@@ -53,8 +53,9 @@ SEVERITY = (
 assert set(SEVERITY) == set(VERDICTS)
 FAILURES = frozenset({"failed"})
 BREAKDOWNS = frozenset({"broken", "diverged", "crashed", "timed_out"})
-HOLDS_AGAIN = "the known fault does not occur; its expectation can be removed"
-"""The beginning of the reason of a check that passes although a known fault is expected."""
+Basis = Literal["", "fault_absent", "few_starts", "same_method", "accepted_failure", "scene_changed"]
+"""What a verdict is based on, beside value and bounds: the known fault that is expected does not occur; the few starts of a quick run do
+not decide it; two engines agree because they use the same discretisation; a failure was accepted; the scene is not the accepted one."""
 Cause = str
 """The cause to which an error is attributed: discretisation, model, setting, rounding, chaotic, unresolved, or an option of the engine that
 sets its
@@ -73,6 +74,7 @@ class Judgement:
         cause: The cause to which the error is attributed.
         reason: The reason for the verdict.
         tolerance: The largest difference between two runs that does not count as a change; NaN if the value is not compared.
+        basis: What the verdict is based on, beside value and bounds.
     """
 
     value: float
@@ -82,6 +84,7 @@ class Judgement:
     cause: Cause = ""
     reason: str = ""
     tolerance: float = math.nan
+    basis: Basis = ""
 
 
 def judge(scene: Scenario, label: str, dt: float, metric: Metric, value: float) -> Judgement:
@@ -100,7 +103,8 @@ def judge(scene: Scenario, label: str, dt: float, metric: Metric, value: float) 
     if binding[0].engine is None or not _expect_fault(scene, binding, metric):
         return found
     if _compared(_narrowest(of_all), metric, value).verdict == "passed" if of_all else abs(value) <= negligible(scene, metric.unit):
-        return found if found.verdict == "passed" else replace(found, verdict="passed", reason=f"{HOLDS_AGAIN}: {found.reason}")
+        reason = f"the known fault does not occur; its expectation can be removed: {found.reason}"
+        return found if found.verdict == "passed" else replace(found, verdict="passed", basis="fault_absent", reason=reason)
     return replace(found, verdict="known") if found.verdict == "passed" else found
 
 

@@ -23,13 +23,16 @@ from dropspin.scenarios import DropspinError, UnknownName
 
 POLL = 0.5  # s
 LONGEST_REASON = 300
-NOT_INSTALLABLE = "not installable"
 """The beginning of the reason why a release was not installed; another day it may be."""
 HOME = Path(__file__).parents[3]
 
 
 class NotMeasured(Exception):
     """A release that has no results; the text says why."""
+
+
+class NotInstallable(NotMeasured):
+    """A release that cannot be installed here, but may be another day."""
 
 
 def releases(package: str, oldest: str) -> list[str]:
@@ -94,7 +97,7 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
             install = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-input", "--only-binary", ":all:"]
         code, output = run([*install, *own.requirements(release)], stopping)
         if code:
-            raise NotMeasured(f"{NOT_INSTALLABLE}: {without_paths(last_line(output))}")
+            raise NotInstallable(f"not installable: {without_paths(last_line(output))}")
         request, answer = Path(folder, "request.json"), Path(folder, "answer.json")
         asked = {"package": own.package, "release": release, "labels": own.labels, "time_limit": time_limit}
         request.write_text(json.dumps(asked | {"scenes": plan.scenes_of(engine), "dts": plan.dts}), encoding="utf-8")

@@ -18,9 +18,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from dropspin.comparisons.engines.base import calibrated_label
 from dropspin.comparisons.judging.verdicts import VERDICTS
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.record.environments import NOT_INSTALLABLE, without_paths
+from dropspin.comparisons.record.environments import without_paths
 from dropspin.comparisons.results.output import written_whole
 from dropspin.comparisons.results.provenance import processor
 from dropspin.comparisons.results.stored_files import read_stored, sha256
@@ -103,8 +104,7 @@ class Record:
     def has(self, engine: str, release: str, same: Row) -> bool:
         """Whether a release is measured, with this plan, adapter and machine; one that was not installable may be another day."""
         return any(
-            all({row[name] for row in rows if row[name]} <= {same[name]} for name in SAME)
-            and not rows[0]["reason"].startswith(NOT_INSTALLABLE)
+            all({row[name] for row in rows if row[name]} <= {same[name]} for name in SAME) and rows[0]["verdict"] != "missing"
             for _, rows in self.own(engine, release)
         )
 
@@ -120,7 +120,7 @@ class Record:
         named = {"engine": engine, "release": release, "measured": date.today().isoformat()}
         whole = [{**BLANK, **common, **row, **named} for row in rows]
         for row in whole:
-            row["profile"] = "" if not row["label"] else "default" if "profile=default" in row["label"] else "calibrated"
+            row["profile"] = "" if not row["label"] else "default" if calibrated_label(row["label"]) is not None else "calibrated"
         earlier = [one for one in self.own(engine, release) if all(one[1][0][name] == whole[0][name] for name in MACHINE)]
         if any([row["reason"] for row in rows] == [whole[0]["reason"]] and not whole[0]["label"] for _, rows in earlier):
             return None

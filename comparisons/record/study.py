@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from dropspin.comparisons.engines.adapter_code import built_in_code
 from dropspin.comparisons.engines.registry import BUILT_IN
-from dropspin.comparisons.record.environments import NOT_INSTALLABLE, POLL, NotMeasured, measured, releases
+from dropspin.comparisons.record.environments import POLL, NotInstallable, NotMeasured, measured, releases
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import Record, machine
 from dropspin.comparisons.results.interrupts import finished
@@ -113,8 +113,8 @@ def _measured(plan: Plan, engine: str, release: str, time_limit: float, stopping
     try:
         found = measured(plan, engine, release, time_limit, stopping or Event())
     except NotMeasured as failure:
-        reason = str(failure)
-        return _Measured([{"verdict": "missing" if reason.startswith(NOT_INSTALLABLE) else "broken", "reason": reason}], "", machine())
+        verdict = "missing" if isinstance(failure, NotInstallable) else "broken"
+        return _Measured([{"verdict": verdict, "reason": str(failure)}], "", machine())
     return _Measured(found["rows"], found["versions"], machine())
 
 

@@ -26,8 +26,6 @@ VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "
 ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic error", "ensemble": "accepted mean"}
 """The column `truth` of a row of kind `baseline`; `accepted` for all others."""
 
-SCENE_CHANGED = "the scene has changed since its results were accepted"
-KNOWN_FAILURE = "accepted as a known failure"
 """The beginnings of the reasons for an engine whose scene changed, and for known failures."""
 
 
@@ -144,8 +142,10 @@ def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
 
 
 def _scene_changed(scene: str, engine: str) -> Measurement:
-    reason = f"{SCENE_CHANGED}; accept them again"
-    return Measurement(scene=scene, engine=engine, kind="baseline", truth="accepted", verdict="failed", reason=reason)
+    reason = "the scene has changed since its results were accepted; accept them again"
+    return Measurement(
+        scene=scene, engine=engine, kind="baseline", truth="accepted", verdict="failed", reason=reason, basis="scene_changed"
+    )
 
 
 def _with_known_failures(results: Results, found: pd.DataFrame) -> pd.DataFrame:
@@ -154,6 +154,7 @@ def _with_known_failures(results: Results, found: pd.DataFrame) -> pd.DataFrame:
     keys = pd.MultiIndex.from_frame(results.table.assign(steps=step_names(results))[KEY])
     rows = keys.isin(pd.MultiIndex.from_frame(known[KEY])) & results.table["verdict"].isin(FAILURES).to_numpy()
     table = results.table.copy()
-    table.loc[rows, "reason"] = f"{KNOWN_FAILURE}; " + table.loc[rows, "reason"]
+    table.loc[rows, "reason"] = "accepted as a known failure; " + table.loc[rows, "reason"]
+    table.loc[rows, "basis"] = "accepted_failure"
     table.loc[rows, "verdict"] = "known"
     return table

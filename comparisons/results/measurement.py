@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from dropspin.comparisons.judging.verdicts import Cause, Judgement, Verdict
+from dropspin.comparisons.judging.verdicts import Basis, Cause, Judgement, Verdict
 
 Kind = Literal[
     "",
@@ -45,6 +45,7 @@ class Measurement:
         verdict: The verdict.
         cause: What the error is attributed to.
         reason: Why, in words.
+        basis: What the verdict is based on, beside value and bounds.
         time_per_step: Wall time of a native step [s].
         steps: How many steps were taken.
     """
@@ -64,6 +65,7 @@ class Measurement:
     verdict: Verdict
     cause: Cause = ""
     reason: str = ""
+    basis: Basis = ""
     time_per_step: float = math.nan
     steps: int = 0
 

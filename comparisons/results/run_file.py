@@ -15,8 +15,8 @@ from dropspin.comparisons.results.stored_files import sha256
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated
 
-FORMAT = 5
-"""Of the folder; 1 had no tolerances, 2 no time limit, 3 tolerances in a file of their own, 4 no checksums."""
+FORMAT = 6
+"""Of the folder; 1 had no tolerances, 2 no time limit, 3 tolerances in a file of their own, 4 no checksums; 5 is read by `earlier`."""
 FILE, TABLE = "run.json", "results.parquet"
 ARRAY_FILE = re.compile(r"(trajectories|ensembles)/[A-Za-z0-9][A-Za-z0-9.=_-]*\.npz")
 

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
+from dropspin.comparisons.results import earlier
 from dropspin.comparisons.results.arrays import loaded_arrays, stored_arrays
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, SAMPLES, EnsembleOutcome
 from dropspin.comparisons.results.results import Results, TrajectoryKey
@@ -69,7 +70,7 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
     """
     try:
         content = parsed(read_stored(Path(folder), FILE))
-        if isinstance(content, dict) and content.get("format") == FORMAT:
+        if isinstance(content, dict) and content.get("format") in (FORMAT, earlier.FORMAT):
             return _loaded(Path(folder), verified(content), content, arrays)
     except (OSError, ValueError, DropspinError) as error:
         detail = " ".join((f"{error.filename}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)).split())
@@ -81,7 +82,8 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
 
 def _loaded(folder: Path, file: RunFile, content: Mapping[str, Any], arrays: bool) -> Results:
     scenes = {name: _scene(file, name) for name in file.scenes}
-    rows = _from_file(folder, TABLE, file, lambda content: loaded_table(content, scenes, file.engines, file.provenance.asked.dts))
+    known = scenes, file.engines, file.provenance.asked.dts
+    rows = _from_file(folder, TABLE, file, lambda content: loaded_table(content, *known, is_earlier=file.format == earlier.FORMAT))
     trajectories = dict(_arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory))
     of_ensemble = partial(_outcome, most=QUICK_MEMBERS if file.provenance.asked.quick else None)
     ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, of_ensemble))

@@ -9,9 +9,10 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.judging.verdicts import VERDICTS, Basis
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.results.earlier import with_basis
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.measurement import COLUMNS, Kind
 from dropspin.scenarios import Scenario
@@ -24,7 +25,9 @@ OF_SYMMETRIES = ("symmetry", "determinism")
 """Kinds whose rows have the name of a symmetry, or of a repeated run, for a metric."""
 
 
-def loaded_table(content: bytes, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float]) -> pd.DataFrame:
+def loaded_table(
+    content: bytes, scenes: Mapping[str, Scenario], engines: Collection[str], dts: Collection[float], *, is_earlier: bool = False
+) -> pd.DataFrame:
     """The table in a file.
 
     Args:
@@ -32,6 +35,7 @@ def loaded_table(content: bytes, scenes: Mapping[str, Scenario], engines: Collec
         scenes: The scenes of the run.
         engines: Labels of its engines.
         dts: Its time steps [s].
+        is_earlier: Whether the folder has the format that `earlier` reads.
 
     Returns:
         The table, with the columns and types of `COLUMNS`.
@@ -41,12 +45,15 @@ def loaded_table(content: bytes, scenes: Mapping[str, Scenario], engines: Collec
     """
     file = pq.ParquetFile(io.BytesIO(content))
     types = dict(zip(file.schema_arrow.names, file.schema_arrow.types, strict=True))
-    if list(types) != list(COLUMNS) or not all(types[name] in _ARROW[kind] for name, kind in COLUMNS.items()):
+    columns = {name: kind for name, kind in COLUMNS.items() if name != "basis"} if is_earlier else COLUMNS
+    if list(types) != list(columns) or not all(types[name] in _ARROW[kind] for name, kind in columns.items()):
         raise ValueError("has other columns or types than a run's table")
     table = file.read(use_threads=False).replace_schema_metadata(None)
-    if any(table[name].null_count for name, kind in COLUMNS.items() if kind != "float64"):  # null is NaN
+    if any(table[name].null_count for name, kind in columns.items() if kind != "float64"):  # null is NaN
         raise ValueError("has gaps")
-    rows = table.to_pandas().astype(COLUMNS)
+    rows = table.to_pandas().astype(columns)
+    if is_earlier:
+        rows = with_basis(rows)[list(COLUMNS)]
     _verify_rows(rows, scenes, engines, dts)
     return rows
 
@@ -57,6 +64,7 @@ def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Co
         "scene": scenes,
         "engine": engines,
         "verdict": VERDICTS,
+        "basis": get_args(Basis),
         "kind": [kind for kind in get_args(Kind) if kind != "baseline"],  # which checks add
         "metric": {"", *METRICS, *ENSEMBLE_METRICS, *filter(kind_of, rows["metric"])},
         "dt": {*dts, np.nan},

@@ -19,10 +19,6 @@ from dropspin.comparisons.running.recording import Breakdown, divergence
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
 from dropspin.scenarios import Scenario, Trajectory, Truth
 
-UNDECIDED_BY_STARTS = "not decided by the few starts of a quick run"
-"""The beginning of the reason where the sampling noise is larger than the distance from a bound."""
-
-
 QUICK_NOISE = 2.0
 """Factor on the noise of a mean over 8 start phases, within which the mean over 32 lies: over the catalogue, with Wang's method and MuJoCo
 at 3 and 8 ms, the largest difference is 1.4 times the noise, and 0.6 times for most metrics.
@@ -107,7 +103,8 @@ def _unless_noise_decides(judgement: Judgement, scene: Scenario, label: str, dt:
     others = (judge(scene, label, dt, metric, value).verdict for value in (average.value - noise, average.value + noise, *near))
     if judgement.verdict not in ("passed", "failed", "known") or {judgement.verdict} >= set(others):
         return judgement
-    return replace(judgement, verdict="measured", reason=f"{UNDECIDED_BY_STARTS} (± {noise:.2g}): {judgement.reason}")
+    reason = f"not decided by the few starts of a quick run (± {noise:.2g}): {judgement.reason}"
+    return replace(judgement, verdict="measured", basis="few_starts", reason=reason)
 
 
 def _judge_metric(

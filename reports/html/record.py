@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dropspin.comparisons.engines.base import calibrated_label
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.record import findings
@@ -48,7 +49,7 @@ class Site:
         self.labels = {engine: self.labels_of(one) for engine, one in self.newest.items()}
         self.engines = {label: engine for engine, labels in self.labels.items() for label in labels}
         self.styles = engine_styles(list(self.engines))
-        default = [label for label in self.engines if "profile=default" in label]
+        default = [label for label in self.engines if calibrated_label(label) is not None]
         divisions = {"calibrated": [label for label in self.engines if label not in default], "default": default}
         self.divisions = {name: labels for name, labels in divisions.items() if labels}
         self.identifier, self.view = identifier, view

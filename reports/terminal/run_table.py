@@ -8,7 +8,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from dropspin.comparisons.judging.agreement import NO_EVIDENCE
 from dropspin.comparisons.judging.verdicts import MARKS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
@@ -48,7 +47,7 @@ def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
     finest = frame[frame["dt"] == frame["dt"].min()]
     own = finest[finest["kind"].isin(["truth", "invariant"])]
     agreements = results.agreements[(results.agreements["scene"] == name) & (results.agreements["dt"] == frame["dt"].min())]
-    pairs = agreements[~agreements["reason"].str.startswith(NO_EVIDENCE)]
+    pairs = agreements[~(agreements["basis"] == "same_method")]
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column(f"at dt = {1e3 * frame['dt'].min():g} ms", min_width=NAME_WIDTH)
     for engine in engines:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
 from dropspin.comparisons.regressions.baseline import Baseline
-from dropspin.comparisons.regressions.checking import KNOWN_FAILURE, SCENE_CHANGED, Checked
+from dropspin.comparisons.regressions.checking import Checked
 from dropspin.comparisons.regressions.values import broke_down, comparable_results, regressed
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
@@ -47,7 +47,7 @@ def scope(file: BaselineFile | None) -> str:
 def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
     """The outcome of a check, the verdict last."""
     own = _without_baseline(checked.results)
-    known = int(own.table["reason"].str.startswith(KNOWN_FAILURE).sum())
+    known = int((own.table["basis"] == "accepted_failure").sum())
     verdict = "" if known and not own.table["verdict"].isin(JUDGED).any() else verdict_sentence(own, counts(own))
     if file is None:
         return [verdict]
@@ -82,7 +82,7 @@ def _verdict(checked: Checked, failed_rows: pd.DataFrame, own: str) -> str:
     """The last sentence: the verdict on the run's own checks and on the accepted results."""
     failed = len(regressed(checked.changes))
     judged = int(checked.changes["change"].isin(["same", "better"]).sum()) + failed
-    changed = failed_rows.loc[failed_rows["reason"].str.startswith(SCENE_CHANGED), "scene"].nunique()
+    changed = failed_rows.loc[failed_rows["basis"] == "scene_changed", "scene"].nunique()
     scenes = f"{counted(changed, 'scene has', 'scenes have')} changed since results were accepted. " if changed else ""
     if failed or changed:
         those = f"{failing(failed, judged, 'accepted result')}." if judged else "No accepted result was compared."

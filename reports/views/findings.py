@@ -12,9 +12,8 @@ import numpy as np
 from dropspin.comparisons.engines.base import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, HOLDS_AGAIN, SEVERITY
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
 from dropspin.comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
-from dropspin.comparisons.running.measured import UNDECIDED_BY_STARTS
 from dropspin.reports.views.leading_errors import step_times
 from dropspin.reports.views.numbers import duration, failing, formatted, in_ms, quantity
 from dropspin.scenarios.text import counted
@@ -64,7 +63,7 @@ def counts(results: Results) -> Counts:
     verdicts = results.table["verdict"]
     passed, failed = verdicts == "passed", verdicts.isin(FAILURES)
     known = (verdicts == "known") & (results.table["value"].abs() > NEGLIGIBLE)
-    fixed = passed & results.table["reason"].str.startswith(HOLDS_AGAIN)
+    fixed = passed & (results.table["basis"] == "fault_absent")
     limited = (verdicts == "limited") & (results.table["metric"] != "")
     broken = verdicts.isin(BREAKDOWNS)
     return Counts(
@@ -181,7 +180,7 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
         return f"No check passes or fails{_known(tally)}."
     if judged == 0 and results.measurements.empty:
         return "No check was made, because no scene was simulated."
-    if judged == 0 and results.table["reason"].str.startswith(UNDECIDED_BY_STARTS).any():
+    if judged == 0 and (results.table["basis"] == "few_starts").any():
         return "No check is decided by the few starts of a quick run."
     if judged == 0:
         set_at_all = any(scene.expect for scene in results.scenes.values())

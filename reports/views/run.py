@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results, Status
 from dropspin.comparisons.running.forecast import Forecast
-from dropspin.comparisons.running.measured import UNDECIDED_BY_STARTS
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.views.failures import Failure, failures, reproduce_drawn
 from dropspin.reports.views.findings import (
@@ -54,7 +53,7 @@ def _quick(results: Results) -> list[str]:
     """What a quick run left out, and the number of its checks that are not decided, if any; empty for other runs."""
     if not results.is_quick:
         return []
-    undecided = int(results.table["reason"].str.startswith(UNDECIDED_BY_STARTS).sum())
+    undecided = int((results.table["basis"] == "few_starts").sum())
     decided = f"{counted(undecided, 'check is', 'checks are')} not decided by so few starts. " if undecided else ""
     return [
         f"Quick run: {QUICK_START_PHASES} start phases instead of {START_PHASES}, at most {QUICK_MEMBERS} members of an ensemble, and no "

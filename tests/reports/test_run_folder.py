@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dropspin.comparisons.results.run_file import signed
 from dropspin.comparisons.results.store import load_results
 from dropspin.comparisons.running.run import run
 from dropspin.reports import run_folder
@@ -175,6 +176,23 @@ def test_a_loaded_run_equals_the_one_that_was_saved(results, folder):
     csv = pd.read_csv(folder / "results.csv")
     assert len(csv) == len(results.table)
     assert list(csv.columns) == list(results.table.columns)
+
+
+def test_a_run_of_the_earlier_format_is_read(folder, tmp_path):
+    """Format 5 had no column for the basis of a verdict, which was the beginning of its reason."""
+    old = shutil.copytree(folder, tmp_path / "old")
+    rows = pd.read_parquet(old / "results.parquet").drop(columns="basis")
+    rows.loc[0, ["verdict", "reason"]] = "passed", "the known fault does not occur; its expectation can be removed: why"
+    rows.to_parquet(old / "results.parquet", index=False)
+    content = json.loads((old / "run.json").read_text(encoding="utf-8"))
+    content["sha256"]["results.parquet"] = hashlib.sha256((old / "results.parquet").read_bytes()).hexdigest()
+    del content["sha256"]["run.json"]
+    (old / "run.json").write_text(signed(content | {"format": 5}), encoding="utf-8")
+    again = load_results(old)
+    assert again.table.loc[0, "basis"] == "fault_absent"
+    pd.testing.assert_frame_equal(
+        again.table.drop(columns=["basis", "verdict", "reason"]), load_results(folder).table.drop(columns=["basis", "verdict", "reason"])
+    )
 
 
 def test_run_json_holds_the_provenance(folder):

@@ -18,7 +18,7 @@ from support.cli import assert_refused, dropspin
 import dropspin as ds
 from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.record import environments, release, study
-from dropspin.comparisons.record.environments import NotMeasured, measured, without_paths
+from dropspin.comparisons.record.environments import NotInstallable, NotMeasured, measured, without_paths
 from dropspin.comparisons.record.plan import Plan, load_plan
 from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, Stored, machine
 from dropspin.comparisons.results.stored_files import sha256
@@ -105,7 +105,7 @@ def test_an_interrupt_keeps_whole_files_and_the_next_call_continues(stub, tmp_pa
 
 
 def test_a_release_that_fails_costs_its_own_row(stub, tmp_path):
-    stub.failures = {"1.0": NotMeasured("not installable: no wheel"), "1.1": NotMeasured("not runnable: exit code -11")}
+    stub.failures = {"1.0": NotInstallable("not installable: no wheel"), "1.1": NotMeasured("not runnable: exit code -11")}
     record(tmp_path)
     rows = table(tmp_path)
     assert rows["verdict"].tolist() == ["missing", "broken", "measured"]

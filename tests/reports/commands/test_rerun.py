@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 from support.small_record import HOSTILE, rows, write_record
 
-from dropspin.comparisons.record import environments, rerun
-from dropspin.comparisons.record.environments import NotMeasured
+from dropspin.comparisons.record import rerun
+from dropspin.comparisons.record.environments import NotInstallable
 from dropspin.comparisons.record.store import machine
 from dropspin.reports.commands.rerun import rerun_command
 from dropspin.scenarios import DropspinError
@@ -89,7 +89,7 @@ def test_release_that_can_no_longer_be_installed(tmp_path, monkeypatch):
     write_record(tmp_path)
 
     def measured(*_):
-        raise NotMeasured(f"{environments.NOT_INSTALLABLE}: no wheel")
+        raise NotInstallable("not installable: no wheel")
 
     monkeypatch.setattr(rerun, "measured", measured)
     with pytest.raises(DropspinError, match=r"^mujoco 3\.10\.0: not installable: no wheel\.$"):

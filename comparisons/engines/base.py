@@ -19,6 +19,7 @@ from dropspin.comparisons.measuring.symmetries import REPRESENTED
 from dropspin.scenarios import Scenario, Truth
 from dropspin.scenarios.body import Box, Sphere
 from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.mechanics import is_diagonal
 from dropspin.scenarios.validation import shown
 
 Array = NDArray[np.float64]
@@ -220,6 +221,34 @@ def refusal_of_shape(scene: Scenario, hull: str = "", maps_vertices: bool = Fals
     return None if maps_vertices or isinstance(scene.body, (Sphere, Box)) else "only spheres and boxes are mapped onto a floor"
 
 
+def refusal_of_axes(scene: Scenario, does: str) -> str | None:
+    """Why the products of inertia of a scene's body are in the way of what an adapter does, such as `damps`; None if there are none."""
+    if is_diagonal(scene.body.inertia_tensor):
+        return None
+    return f"the adapter {does} along the body's own axes only; these are not principal axes"
+
+
+def refusal_of_unequal_damping(scene: Scenario) -> str | None:
+    """Why a scene is declined by an adapter that sets one coefficient of angular damping; None for equal moments of inertia."""
+    moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
+    if scene.damping is None or scene.damping.angular == 0.0 or np.ptp(moments) <= 1e-12 * moments[-1]:
+        return None
+    return "the adapter damps rotation about all axes with one coefficient; angular damping needs a body of equal moments of inertia"
+
+
+def refusal_of_rest_speed(scene: Scenario, engine: str, instead: str = "") -> str | None:
+    """Why an engine without a setting for it declines a rest speed; None for a floor that has none.
+
+    Args:
+        scene: The scene.
+        engine: The engine's name.
+        instead: What the engine always does.
+    """
+    if scene.floor is None or scene.floor.rest_speed == 0.0:
+        return None
+    return f"{engine} has no setting for the speed below which restitution is 0 (floor.rest_speed){instead and f'; {instead}'}"
+
+
 def refusal_of_floor(scene: Scenario, kind: str) -> str | None:
     """Why a floor is too small for a scene; None for a plane, and if the body stays within `FLOOR_HALF_SIZE` of the origin.
 
@@ -379,7 +408,7 @@ class Engine(ABC):
         return None
 
     def declines(self, scene: Scenario) -> str | None:
-        """Why this engine cannot reproduce a scene; None if it can."""
+        """Why a scene is not simulated: a limit of the engine, or of its adapter ("the adapter ..."); None if it is."""
         return None
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:

@@ -37,16 +37,12 @@ class Dart(Engine):
         return flight if scene.floor is None and scene.damping is None else None
 
     def declines(self, scene: Scenario) -> str | None:
-        moments, floor = np.linalg.eigvalsh(scene.body.inertia_tensor), scene.floor
-        if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
-            return "the adapter damps about the world's axes only; angular damping needs a body of equal moments of inertia"
-        if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, self.option("floor"))) is not None:
+        unfit = base.refusal_of_unequal_damping(scene) or base.refusal_of_shape(scene)
+        if (unfit := unfit or base.refusal_of_floor(scene, self.option("floor"))) is not None:
             return unfit
-        if floor is not None and not hasattr(dart.constraint, "NsgsFrictionSolver"):
+        if scene.floor is not None and not hasattr(dart.constraint, "NsgsFrictionSolver"):
             return f"dartpy {version('dartpy')} is installed, without the settings of exact contacts; update it to 6.20 or later"
-        if floor is not None and floor.rest_speed > 0.0:
-            return "DART has a fixed rebound speed below which restitution is 0, 0.1 m/s; floor.rest_speed cannot be set"
-        return None
+        return base.refusal_of_rest_speed(scene, "DART", "it sets rebounds below 0.1 m/s to 0")
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return DartSimulation(scene, dt, self.option("floor"), self.option("beside"))

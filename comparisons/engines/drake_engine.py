@@ -24,7 +24,7 @@ logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.
 STICKING = 1e6
 LONGEST = 1e150
 REASONS = {
-    "discrete_contact_approximation": "tamsi for a coefficient, else sap; the default, lagged, stops a sliding box at once",
+    "discrete_contact_approximation": "tamsi for a coefficient, else sap; the default, lagged, with this dissipation stops a sliding box",
     "sap_near_rigid_threshold": "at the default 1, a flat box rests 0.3 mm deep instead of 0.014, and a rocking block's error doubles",
     "relaxation_time": "s, for sap; a body leaves the floor at depth over this; at the default 0.1 a ball rebounds at 10 mm/s instead of 1",
     "dissipation": "s/m, for tamsi; the remaining rebound speed is 1 over this; at the default it is 20 mm/s, at any step",
@@ -35,7 +35,7 @@ REASONS = {
 
 
 class Drake(Engine):
-    """Drake's rigid body, in the discrete plant that contacts need, in free flight too."""
+    """Drake's rigid body in the discrete plant, in free flight too."""
 
     name = "drake"
     order = 1.0
@@ -49,9 +49,8 @@ class Drake(Engine):
         return base.SEMI_IMPLICIT_EULER if falls else None
 
     def declines(self, scene: Scenario) -> str | None:
-        moments = np.linalg.eigvalsh(scene.body.inertia_tensor)
-        if scene.damping is not None and scene.damping.angular > 0.0 and np.ptp(moments) > 1e-12 * moments[-1]:
-            return "the adapter damps all axes with one coefficient; angular damping needs a body of equal moments of inertia"
+        if (unfit := base.refusal_of_unequal_damping(scene)) is not None:
+            return unfit
         if scene.floor is not None and scene.floor.restitution > 0.0:
             return "Drake has no coefficient of restitution; its contacts are springs with dissipation"
         return base.refusal_of_floor(scene, self.option("floor"))
@@ -105,7 +104,7 @@ class DrakeSimulation(Simulation):
             AddContactMaterial(surface, chosen["dissipation"], spring, CoulombFriction(friction, friction))
             surface.AddProperty("material", "relaxation_time", chosen["relaxation_time"])
         plant.RegisterCollisionGeometry(plant.world_body(), *_floor(kind), "floor", surfaces[0])
-        # One shape would have one contact with the floor; balls of radius 0 give each corner its own.
+        # One shape would have one point contact with the floor; balls of radius 0 give each corner its own.
         for (number, corner), one in product(enumerate(body.vertices), bodies):
             plant.RegisterCollisionGeometry(one, RigidTransform(corner), Sphere(body.rounding), f"corner {number}", surfaces[1])
         return {"discrete_contact_approximation": approximation, "stiffness": stiffness} | chosen

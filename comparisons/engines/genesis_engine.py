@@ -17,7 +17,9 @@ from dropspin.comparisons.engines.base import (
     BatchSimulation,
     Engine,
     Simulation,
+    refusal_of_axes,
     refusal_of_floor,
+    refusal_of_rest_speed,
     refusal_of_shape,
     version,
 )
@@ -51,22 +53,17 @@ class Genesis(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor
-        if scene.damping is not None and np.count_nonzero(scene.body.inertia_tensor) > 3:
-            return "the adapter damps along the body's own axes only; these are not principal axes"
-        if (unfit := refusal_of_shape(scene)) is not None or floor is None:
+        unfit = refusal_of_axes(scene, "damps") if scene.damping is not None else None
+        if (unfit := unfit or refusal_of_shape(scene)) is not None or floor is None:
             return unfit
         if floor.coefficient < LEAST_FRICTION:
-            return (
-                "a contact's coefficient of friction is 0.01 at least: a body that slides at 1 m/s without friction loses 0.098 m/s in 1 s"
-            )
+            return "Genesis raises a contact's coefficient of friction to 0.01: a body that slides without friction loses 0.098 m/s in 1 s"
         if floor.restitution > 0.0:
             return (
-                "a contact's time constant is 2 dt at least, with which its damper only stops a body: with any smaller one set, a ball "
+                "the adapter stops a body in one step with a contact's damper; Genesis raises its time constant to 2 dt, with which a ball "
                 "that falls 0.5 m does not rebound"
             )
-        if floor.rest_speed > 0.0:
-            return "Genesis has no speed below which restitution is 0 (floor.rest_speed)"
-        return refusal_of_floor(scene, "plane with edges")
+        return refusal_of_rest_speed(scene, "Genesis") or refusal_of_floor(scene, "plane with edges")
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         worlds = self.prepare_batch([scene], dt)

@@ -19,7 +19,7 @@ from typing import Any
 IMPEDANCE = 0.9999  # the largest that MuJoCo allows
 INFINITE_FRICTION = 1e6
 STRONGEST_FRICTION = 1e9
-"""The largest coefficient with which contacts work, with elliptic cones."""
+"""The largest coefficient that the adapter sets."""
 MOST_DAMPED = 1e3
 
 

@@ -16,7 +16,9 @@ from dropspin.comparisons.engines.base import (
     NumericOption,
     Simulation,
     may_tumble,
+    refusal_of_axes,
     refusal_of_floor,
+    refusal_of_rest_speed,
     refusal_of_shape,
 )
 from dropspin.comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
@@ -35,7 +37,6 @@ from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.body import Box, Sphere, Vertices
-from dropspin.scenarios.mechanics import is_diagonal
 from dropspin.scenarios.model import differ_in_start_alone
 
 VERSION = numbers_of(mujoco.__version__)
@@ -129,33 +130,30 @@ class MuJoCo(Engine):
             return too_old
         if min(body.mass, *np.linalg.eigvalsh(body.inertia_tensor)) < mujoco.mjMINVAL:
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
-        if scene.damping is not None and not is_diagonal(body.inertia_tensor):
-            return "the adapter damps along the body's own axes only; these are not principal axes"
-        if (unfit := self._refusal_of_shape(scene)) is not None:
+        unfit = refusal_of_axes(scene, "damps") if scene.damping is not None else None
+        if (unfit := unfit or self._refusal_of_shape(scene)) is not None:
             return unfit
         if floor is None or self.option("profile") == "default":
             return None
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
-            return (
-                f"calibrated contacts break down at coefficients of friction above {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
-            )
+            return f"the adapter takes coefficients of friction up to {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
         refusal_of_contacts = {Box: refusal_of_boxes, Vertices: refusal_of_meshes}.get(type(body))
         if refusal_of_contacts is not None and (too_old := refusal_of_contacts(VERSION)) is not None:
             return too_old
         if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
-            return "RK4 has no restitution in one step: the contact's damper acts in all stages; use integrator=euler, or spring_steps=20"
+            return (
+                "with RK4 the adapter's one-step damper acts in all stages, and no body rebounds; use integrator=euler, or spring_steps=20"
+            )
         if floor.restitution < LEAST_OF_A_SPRING and "spring_steps" in self.options:
-            return f"a contact spring cannot pull, so its restitution is at least {LEAST_OF_A_SPRING:g}; leave out spring_steps"
-        if floor.rest_speed > 0.0:
-            return "MuJoCo has no speed below which restitution is 0 (floor.rest_speed)"
-        return None
+            return f"the adapter sets springs for a restitution of at least {LEAST_OF_A_SPRING:g}; leave out spring_steps"
+        return refusal_of_rest_speed(scene, "MuJoCo")
 
     def _refusal_of_shape(self, scene: Scenario) -> str | None:
         """Why the shape of a scene's body cannot strike a floor."""
         unfit = refusal_of_shape(scene, "mesh" if self.option("body") == "mesh" else "", maps_vertices=True)
         unfit = unfit or refusal_of_floor(scene, self.option("floor"))
         if unfit is None and scene.floor is not None and isinstance(scene.body, Vertices) and scene.body.resting_height == 0.0:
-            return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo compiles no flat mesh"
+            return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo has no convex hull of a flat mesh"
         return unfit
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:

@@ -106,5 +106,7 @@ def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: flo
     if g > 0.0 and scene.starts_above_floor:
         sizes["bounce_height_error"] = (2.0 * e * fastest * added + added**2) / (2.0 * g * scene.clearance)
     return KnownLimitation(
-        f"contacts slip at up to {slip:.3g} m/s; MuJoCo's friction cone adds up to µ times that, {added:.3g} m/s, to the rebound", sizes
+        f"contacts slip at up to {slip:.3g} m/s; with calibrated contacts MuJoCo's friction cone adds up to µ times that, {added:.3g} m/s, "
+        "to the rebound",
+        sizes,
     )

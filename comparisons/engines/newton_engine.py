@@ -18,6 +18,7 @@ from dropspin.comparisons.engines.base import (
     Engine,
     KnownLimitation,
     Simulation,
+    refusal_of_rest_speed,
     refusal_of_shape,
     version,
 )
@@ -57,13 +58,13 @@ class Newton(Engine):
         if solver == "mujoco" and find_spec("mujoco_warp") is None:
             return "Newton's MuJoCo solver needs mujoco-warp; install newton[sim]"
         if scene.damping is not None:
-            return "the adapter maps no linear damping"
+            return "the adapter maps no damping"
         if (unfit := refusal_of_shape(scene)) is not None or floor is None:
             return unfit
         if solver != "xpbd":
             return "this solver's contacts are springs and dampers without a restitution: a ball rebounds alike with 0.5 and with 0.9"
-        if floor.rest_speed > 0.0:
-            return "Newton has no speed below which restitution is 0 (floor.rest_speed)"
+        if (fixed := refusal_of_rest_speed(scene, "Newton's XPBD", "it drops restitution below 2 g dt")) is not None:
+            return fixed
         if floor.friction != "none" and floor.restitution > 0.0:
             return (
                 "XPBD limits friction by the depth that a step removes, not by the impulse of the rebound, which acts later and without "

@@ -15,6 +15,7 @@ from dropspin.comparisons.engines.base import (
     Engine,
     Simulation,
     may_tumble,
+    refusal_of_axes,
     refusal_of_floor,
     refusal_of_shape,
 )
@@ -31,7 +32,6 @@ from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.body import Box, Vertices
-from dropspin.scenarios.mechanics import is_diagonal
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
 FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision, and the body stops
@@ -93,20 +93,20 @@ class PyBullet(Engine):
     def declines(self, scene: Scenario) -> str | None:
         """Why calibration cannot reproduce the scene."""
         inertia = scene.body.inertia_tensor
-        if not is_diagonal(inertia):
-            return "the adapter passes inertia along the body's own axes only; these are not principal axes"
+        if (askew := refusal_of_axes(scene, "passes inertia")) is not None:
+            return askew
         floor = scene.floor
         if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(inertia)) < SMALLEST_INERTIA:
             return f"Bullet omits the gyroscopic term if the product of the moments is below {SMALLEST_INERTIA:g}; scale the scene's units"
         if scene.damping is not None and not self.is_default and max(scene.damping.linear, scene.damping.angular) > FASTEST_DECAY:
-            return f"Bullet's damping allows no decay faster than {FASTEST_DECAY:g} per second"
+            return f"the adapter sets no decay faster than {FASTEST_DECAY:g} per second; Bullet's coefficient, 1 - exp(-rate), loses digits"
         if scene.damping is not None and self.is_multibody and not self.is_default:
             return "Bullet's multibodies damp by another law, k v (1 + |v|)"
         is_hull = self.option("body") == "hull"
         if (unfit := refusal_of_shape(scene, "hull" if is_hull else "", maps_vertices=True)) is not None or floor is None:
             return unfit
         if isinstance(scene.body, Vertices) and not is_hull and len(scene.body.hull) > MOST_BALLS:
-            return f"PyBullet's compound shapes have at most {MOST_BALLS} parts; the convex hull has {len(scene.body.hull)} vertices"
+            return f"the adapter builds compound shapes of at most {MOST_BALLS} parts; the convex hull has {len(scene.body.hull)} vertices"
         if (too_small := refusal_of_floor(scene, self._form.floor_in(scene))) is not None:
             return too_small
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:

@@ -29,7 +29,7 @@ from dropspin.scenarios.transformations import heavy_neighbour
 ALMOST = 0.999
 NO_PUSH = 1e-6  # relative to what gravity adds in a step
 BALL = 1e-9  # of the body's size; the radius of the balls that are its vertices, which must not be 0
-MOST_BALLS = 16  # PyBullet drops all others without notice
+MOST_BALLS = 16  # createCollisionShapeArray drops all others without notice
 SQUARE = {
     "vertices": [[x, 0.0, z] for x, z in product((-FLOOR_HALF_SIZE, FLOOR_HALF_SIZE), repeat=2)],
     "indices": [0, 1, 2, 2, 1, 3],

@@ -9,7 +9,7 @@ from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION
 
 FRICTION = {"none": 0.0, "infinite": 1e6}
-WHY_FRICTION = f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution, because Rapier takes the average"
+WHY_FRICTION = f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution: Rapier takes the average by default"
 WHY_DAMPING = "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives the scene's decay"
 
 
@@ -18,8 +18,8 @@ def refusal(scene: Scenario, kind: str) -> str | None:
     body, floor = scene.body, scene.floor
     if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, kind)) is not None or floor is None:
         return unfit
-    if floor.rest_speed > 0.0:
-        return "Rapier has no speed below which restitution is 0 (floor.rest_speed)"
+    if (unfit := base.refusal_of_rest_speed(scene, "Rapier")) is not None:
+        return unfit
     if floor.restitution == 0.0:
         return None
     if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 FailureMode = Literal["declined", "sound", "inaccurate", "gains_energy", "sinks", "tunnels", "clamped", "diverged", "crashed", "timed_out"]
 FAILURE_MODES: tuple[FailureMode, ...] = get_args(FailureMode)
-"""The failure modes, from mild to severe; `declined` means that the engine cannot run the scene, and is not a failure."""
+"""The failure modes, from mild to severe; `declined` means that the engine or its adapter cannot run the scene, and is not a failure."""
 
 ERRORS_OF_FEW_ROWS = ("orientation_error", "angular_momentum_error", "energy_error", "bounce_height_error", "restitution_error")
 ERRORS = (*ERRORS_OF_FEW_ROWS, "landing_error")

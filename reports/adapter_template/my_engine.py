@@ -23,7 +23,7 @@ class MyEngine(ds.Engine):
     # compiles = True  # with a JIT compiler (JAX, Warp, Numba): compilation is then timed apart and has time limits of its own
 
     def declines(self, scene: ds.Scenario) -> str | None:
-        """The reason why the engine cannot simulate a scene as specified; None if it can."""
+        """The reason why a scene is not simulated, a limit of the engine or of this adapter; None if it is."""
         if scene.damping is not None:
             return "damping is not modelled"
         if np.count_nonzero(scene.body.inertia_tensor) > 3:

@@ -349,7 +349,7 @@ def test_every_cost_is_a_positive_time(spin):
 def test_engine_that_declines_is_left_out_with_the_reason():
     short = load("drop-ball").model_copy(update={"duration": 0.6})
     found = tradeoff(short, ["mujoco", "mujoco[integrator=rk4]"])
-    assert "RK4 has no restitution" in found.left_out["mujoco[integrator=rk4]"]
+    assert "RK4 the adapter's one-step damper" in found.left_out["mujoco[integrator=rk4]"]
     assert {point.engine for point in found.points} == {"mujoco"}
     assert METRICS[found.metric].unit == "1"
 
@@ -357,7 +357,7 @@ def test_engine_that_declines_is_left_out_with_the_reason():
 def test_unknown_metric_and_declining_engines_are_errors():
     with pytest.raises(DropspinError, match="metric 'restitution_error' is unknown"):
         tradeoff(SPIN, ["mujoco"], metric="restitution_error")
-    with pytest.raises(DropspinError, match=r"no engine runs drop-ball: mujoco\[integrator=rk4\]: RK4 has no restitution"):
+    with pytest.raises(DropspinError, match=r"no engine runs drop-ball: mujoco\[integrator=rk4\]: with RK4 the adapter's one-step damper"):
         tradeoff(load("drop-ball"), ["mujoco[integrator=rk4]"])
 
 

@@ -157,7 +157,7 @@ def test_body_of_vertices_lands_flat(name):
 
 
 def test_bodies_of_vertices_are_declined_where_an_engine_cannot_represent_them():
-    """A flat mesh, more parts than PyBullet's compound shapes have, and MuJoCo's contact points before version 4."""
+    """A flat mesh, more parts than the adapter of PyBullet gives a compound shape, and MuJoCo's contact points before version 4."""
     assert "flat" in engine("mujoco").declines(prism(half_length=0.0))
     assert engine("pybullet").declines(prism(half_length=0.0)) is None
     assert "at most 16 parts; the convex hull has 24" in engine("pybullet").declines(prism(12))

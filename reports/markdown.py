@@ -9,6 +9,7 @@ from dropspin.comparisons.results.results import Results
 from dropspin.reports.pages import page
 from dropspin.reports.views import check, compare
 from dropspin.reports.views.failures import Failure, grouped
+from dropspin.reports.views.impact_laws import NOTE
 from dropspin.reports.views.run import Overview
 
 MOST_SENTENCES = 24
@@ -17,7 +18,7 @@ MOST_SENTENCES = 24
 
 def run_markdown(results: Results, summary: Overview) -> str:
     """A short report of a run."""
-    return page("report.md", **vars(summary), engines=results.engines, provenance=results.provenance)
+    return page("report.md", **vars(summary), engines=results.engines, provenance=results.provenance, note_on_laws=NOTE)
 
 
 def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Sequence[Failure]) -> str:

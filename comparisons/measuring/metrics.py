@@ -75,7 +75,7 @@ def energy_drift(case: Comparison | Motions) -> Array:
     return (at_rows(case.energy, case.first_flight_end) - case.energy[..., 0]) / case.energy_scale
 
 
-@_metric("1", "invariant", "no damping", requirements.keeps_energy)
+@_metric("1", "invariant", "no damping, and no impact that gains energy in the exact solution", requirements.gains_no_energy)
 def energy_gain(case: Comparison | Motions) -> Array:
     """Largest increase of energy above any earlier value, over the scene's energy.
 
@@ -109,7 +109,14 @@ def bounce_height_error(case: Comparison) -> float:
     return float(np.mean(found - exact)) / case.scene.clearance
 
 
-@_metric("1", "truth", "an exact solution with an impact", requirements.has_impact, signed=True, first_flight=True)
+@_metric(
+    "1",
+    "truth",
+    "an exact solution with an impact, the restitution of Newton",
+    requirements.has_newton_restitution,
+    signed=True,
+    first_flight=True,
+)
 def restitution_error(case: Comparison) -> float:
     """Separation speed over approach speed of the contact point in the first impact, minus the coefficient of restitution."""
     assert case.scene.floor is not None
@@ -252,7 +259,7 @@ def friction_cone_excess(case: Comparison) -> float:
     return _largest(case.contacts.cone_excess)
 
 
-@_metric("1", "invariant", "a floor, no damping", requirements.obeys_contact_laws)
+@_metric("1", "invariant", "a floor whose friction opposes the slip that is left, no damping", requirements.opposes_slip_left)
 def friction_push(case: Comparison) -> float:
     """Largest impulse of friction in a time step times the slip that is left in its direction, over the scene's energy."""
     return _largest(case.contacts.push)

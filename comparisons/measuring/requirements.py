@@ -1,9 +1,13 @@
 """Requirements of metrics: the properties that a scene must have for a metric to apply."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dropspin.scenarios import Scenario, Truth
+from dropspin.scenarios import Scenario, Trajectory, Truth
+from dropspin.scenarios.mechanics import kinetic_energy
 from dropspin.scenarios.state import RATES, SPIN
+
+Array = NDArray[np.float64]
 
 
 def has_truth(scene: Scenario, truth: Truth | None) -> bool:
@@ -22,6 +26,11 @@ def spins(scene: Scenario, truth: Truth | None) -> bool:
 def has_impact(scene: Scenario, truth: Truth | None) -> bool:
     """Whether the body starts above the floor and strikes the floor."""
     return truth is not None and len(truth.events) > 0 and scene.starts_above_floor
+
+
+def has_newton_restitution(scene: Scenario, truth: Truth | None) -> bool:
+    """Whether, in addition, the speeds of the contact point before and after an impact have the ratio of the coefficient of restitution."""
+    return has_impact(scene, truth) and scene.floor is not None and scene.floor.impact_law in ("cone", "integrated-newton")
 
 
 def lands(scene: Scenario, truth: Truth | None) -> bool:
@@ -66,9 +75,21 @@ def limits_friction(scene: Scenario, truth: Truth | None) -> bool:
     return obeys_contact_laws(scene, truth) and scene.floor is not None and scene.floor.friction != "infinite"
 
 
-def keeps_energy(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether there is no damping, so that energy is lost only at the floor."""
-    return scene.damping is None
+def opposes_slip_left(scene: Scenario, truth: Truth | None) -> bool:
+    """Whether, in addition, friction opposes the slip that an impact leaves, instead of that at each instant of the impact."""
+    return obeys_contact_laws(scene, truth) and scene.floor is not None and scene.floor.impact_law == "cone"
+
+
+def gains_no_energy(scene: Scenario, truth: Truth | None) -> bool:
+    """Whether there is no damping, and no impact of the exact solution gains energy, as some do whose restitution is large and Newton's."""
+    if scene.damping is not None:
+        return False
+    return truth is None or all(_kinetic(scene, one.after) <= (1.0 + 1e-9) * _kinetic(scene, one.before) for one in truth.events)
+
+
+def _kinetic(scene: Scenario, state: Array) -> float:
+    """The kinetic energy of a state [J]."""
+    return float(kinetic_energy(scene, Trajectory.from_states(np.zeros(1), state[np.newaxis]))[0])
 
 
 def keeps_energy_in_flight(scene: Scenario, truth: Truth | None) -> bool:

@@ -15,6 +15,7 @@ Kind = Literal[
     "invariant",
     "agreement",
     "prediction",
+    "other_law",
     "ensemble",
     "order",
     "asymptotic_error",
@@ -38,7 +39,7 @@ class Measurement:
         value: The value, in `unit`.
         unit: SI unit; '1' for a ratio.
         kind: What the value is compared with.
-        truth: Name of the exact solution; for an agreement the other engine's label.
+        truth: Name of the exact solution; for an agreement the other engine's label; for `other_law` the impact law.
         lower: Least value allowed, or the lower end of the 95 % interval of an order or an asymptotic error; NaN where there is none.
         upper: Largest value allowed, or the upper end of that interval; NaN where there is none.
         tolerance: How far the value may move between two runs before it counts as changed, in `unit`; NaN where it is not compared.

@@ -102,6 +102,6 @@ def _verify_kind(kind: str, metric: str, unit: str) -> None:
     elif metric in ENSEMBLE_METRICS:
         kinds, own = {"ensemble", "agreement"}, ENSEMBLE_METRICS[metric].unit
     else:
-        kinds, own = {METRICS[metric].kind, "prediction", "agreement", "order", "asymptotic_error"}, METRICS[metric].unit
+        kinds, own = {METRICS[metric].kind, "prediction", "other_law", "agreement", "order", "asymptotic_error"}, METRICS[metric].unit
     if kind not in kinds or unit != ("1" if kind == "order" else own):
         raise ValueError(f"has {metric or 'a remark'} of the kind {kind!r} in the unit {shown(unit)}")

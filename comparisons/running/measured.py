@@ -39,8 +39,13 @@ class Measured(NamedTuple):
 def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[Trajectory | None]]:
     """The start phases at a time step [s], and the exact motion from each at every step, as far as there is an exact solution."""
     phases = start_phases(own.scene, own.truth, dt, quick=own.quick)
-    times = dt * np.arange(1 + own.scene.steps(dt), dtype=float)
-    return phases, [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+    return phases, exactly_at(own.scene, dt, phases)
+
+
+def exactly_at(scene: Scenario, dt: float, phases: Sequence[StartPhase]) -> list[Trajectory | None]:
+    """The exact motion from each start phase of a scene at every step."""
+    times = dt * np.arange(1 + scene.steps(dt), dtype=float)
+    return [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
 
 
 def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[Trajectory | None]) -> list[Comparison]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 from dropspin.comparisons.engines.base import calibrated_label
 from dropspin.comparisons.judging.agreement import judge_agreement
@@ -11,22 +11,31 @@ from dropspin.comparisons.judging.convergence import Claim, ConvergenceStudy, at
 from dropspin.comparisons.judging.error_budget import is_sufficient
 from dropspin.comparisons.judging.verdicts import Judgement
 from dropspin.comparisons.measuring.comparison import Comparison
-from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from dropspin.comparisons.results.measurement import Case, Measurement, as_table
 from dropspin.comparisons.results.results import Results, TrajectoryKey
 from dropspin.comparisons.running.engine_run import EngineRun, Timing
 from dropspin.comparisons.running.ensembles import judge_differences, judge_means
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.measured import Measured, breakdown_of, compare, measure, phases_at
+from dropspin.comparisons.running.measured import Measured, breakdown_of, compare, exactly_at, measure, phases_at
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, OnSimulations, Progress, reporter
 from dropspin.comparisons.running.start_phases import StartPhase
 from dropspin.comparisons.running.studies import study_engine
 from dropspin.scenarios import Trajectory
+from dropspin.scenarios.truths import other_laws
 
 Timings = Mapping[tuple[str, str, float], Timing]
 """By scene, engine and time step."""
+
+
+class _OtherLaw(NamedTuple):
+    """An impact law, each start phase with the exact solution under it, and the exact motions."""
+
+    law: str
+    phases: Sequence[StartPhase]
+    exact: Sequence[Trajectory | None]
 
 
 @dataclass
@@ -36,6 +45,7 @@ class _Collected:
     measured: dict[str, list[Measured]]
     studies: dict[str, dict[str, ConvergenceStudy]] = field(default_factory=dict)
     means: list[Measurement] = field(default_factory=list)
+    other_laws: list[Measurement] = field(default_factory=list)
     predictions: list[Measurement] = field(default_factory=list)
     agreements: list[Measurement] = field(default_factory=list)
     claims: dict[str, Claim] = field(default_factory=dict)
@@ -69,6 +79,7 @@ def run_scene(
     found = _Collected({label: [] for label in labels})
     for dt in dts:
         phases, exact = phases_at(own, dt)
+        laws = _other_laws(own, dt, phases) if dt == min(dts) else []
         compared: list[tuple[EngineRun, list[Comparison]]] = []
         for entry in entries:
             progress = Progress(scene.name, entry.label, dt)
@@ -78,6 +89,7 @@ def run_scene(
             cases = [] if breakdown_of(engine_run) else compare(engine_run.phases, phases, exact)
             found.measured[entry.label] += measure(own, dt, engine_run, phases, exact, cases, timing.per_step)
             _collect(found, own, dt, engine_run)
+            found.other_laws += _distances(own, dt, engine_run, laws) if cases else []
             compared.append((engine_run, cases))
             on_progress(progress._replace(finished=True))
         for first, second in combinations(compared, 2):
@@ -87,7 +99,8 @@ def run_scene(
             if entry.label in found.claims:
                 measured = found.measured[entry.label]
                 found.studies[entry.label] = study_engine(own, entry, found.claims[entry.label], measured, processes, on_progress)
-    table, predictions, agreements = map(as_table, (found.means + _with_convergence(found, labels), found.predictions, found.agreements))
+    rows = found.means + _with_convergence(found, labels) + found.other_laws
+    table, predictions, agreements = map(as_table, (rows, found.predictions, found.agreements))
     provenance = {**stamp, "settings": found.settings}
     return Results(table, {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance, predictions, agreements)
 
@@ -145,6 +158,25 @@ def _agreement(
     if one.outcome is not None and other.outcome is not None:
         for name, judgement in judge_differences(one.outcome, other.outcome):
             yield case.measurement("agreement", name, ENSEMBLE_METRICS[name].unit, judgement, other.label)
+
+
+def _other_laws(own: StartPhase, dt: float, phases: Sequence[StartPhase]) -> list[_OtherLaw]:
+    """The exact solutions under the impact laws that the scene does not name, from each start phase."""
+    found = []
+    for law, truth in other_laws(own.scene).items():
+        delays = [truth.events[0].time - phase.truth.events[0].time for phase in phases if phase.truth is not None]
+        of_law = [phase._replace(truth=truth.after(delay)) for phase, delay in zip(phases, delays, strict=True)]
+        found.append(_OtherLaw(law, of_law, exactly_at(own.scene, dt, of_law)))
+    return found
+
+
+def _distances(own: StartPhase, dt: float, engine_run: EngineRun, laws: Sequence[_OtherLaw]) -> Iterator[Measurement]:
+    """How far an engine is from the exact solution under each other impact law, in the leading metric of the scene; this is no error."""
+    case = Case(own.scene.name, engine_run.label, dt, own.scene.steps(dt))
+    for law, phases, exact in laws:
+        metric = METRICS[leading_metric(own.scene)]
+        value = metric.value_or_nan(compare(engine_run.phases, phases, exact))
+        yield case.measurement("other_law", metric.name, metric.unit, Judgement(value, "measured"), law)
 
 
 def _with_convergence(found: _Collected, labels: Sequence[str]) -> list[Measurement]:

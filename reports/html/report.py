@@ -26,6 +26,7 @@ from dropspin.reports.sections import Section
 from dropspin.reports.views import numbers
 from dropspin.reports.views.contacts import worst_contacts
 from dropspin.reports.views.error_budget import error_budgets
+from dropspin.reports.views.impact_laws import NOTE
 from dropspin.reports.views.leading_errors import leading_errors, step_times
 from dropspin.reports.views.matrix import legend_of_marks
 from dropspin.reports.views.run import Overview
@@ -66,6 +67,7 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
         "ensemble_metrics": ENSEMBLE_METRICS,
         "start_phases": QUICK_START_PHASES if results.is_quick else START_PHASES,
         "settings": first_settings(results.provenance),
+        "note_on_laws": NOTE,
     }
 
 

@@ -17,6 +17,7 @@ from dropspin.reports.views.findings import (
     profile_comparisons,
     verdict_sentence,
 )
+from dropspin.reports.views.impact_laws import law_rows
 from dropspin.scenarios.text import counted
 
 
@@ -31,6 +32,7 @@ class Overview:
         statuses: The status of each engine in each scene, by scene and engine.
         profiles: Engines with default settings compared with the calibrated ones.
         failures: The failures, grouped.
+        laws: The distances of engines to other impact laws, in scenes in which the laws differ: the rows of `law_rows`.
     """
 
     verdict: str
@@ -39,6 +41,7 @@ class Overview:
     statuses: Mapping[str, Mapping[str, Status]]
     profiles: Sequence[ProfileComparison]
     failures: Sequence[Failure]
+    laws: Sequence[Mapping[str, str]]
 
 
 def overview(results: Results) -> Overview:
@@ -46,7 +49,7 @@ def overview(results: Results) -> Overview:
     tally, profiles = counts(results), profile_comparisons(results)
     findings = finding_sentences(results, {cause: asymptotic_errors(results, cause) for cause in ("model", "setting")}, profiles)
     findings = [*_quick(results), *findings, *reproduce_drawn(results)]
-    return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results))
+    return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results), law_rows(results))
 
 
 def _quick(results: Results) -> list[str]:

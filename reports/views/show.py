@@ -1,5 +1,6 @@
 """The output of `dropspin show`: a scene, or the model that an engine builds of the scene."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from dropspin.scenarios import Scenario, Truth, truth_for
 from dropspin.scenarios.model import Expectation
 from dropspin.scenarios.problems import identifier
 from dropspin.scenarios.state import VELOCITY
-from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of
+from dropspin.scenarios.truths import Law, other_laws
 
 if TYPE_CHECKING:
     from dropspin.comparisons.running.inputs import EngineEntry
@@ -42,20 +43,17 @@ def scene_rows(scene: Scenario) -> Rows:
         facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
     if truth and not truth.covers_all(scene.duration):
         facts["valid until"] = f"{truth.horizon:.6f} s: {truth.ends}"
-    if truth and truth.events and law_of(scene) in FRICTION_LAWS:
-        facts["other laws"] = _other_laws(scene, truth)
+    if truth and (others := other_laws(scene)):
+        facts["other laws"] = _other_laws(truth, others)
     for expectation in scene.expect:
         facts[f"expect {expectation.metric} ({_applies_to(expectation)})"] = f"{_allowed(expectation)}: {expectation.reason}"
     return [{"what": key, "is": value} for key, value in facts.items() if value]
 
 
-def _other_laws(scene: Scenario, truth: Truth) -> str:
+def _other_laws(truth: Truth, others: Mapping[Law, Truth]) -> str:
     """By how much the velocity after the first impact differs under the other laws of impacts with friction."""
-    after, found = truth.events[0].after[VELOCITY], []
-    for law in FRICTION_LAWS:
-        other = None if law == law_of(scene) else truth_for(scene, law)
-        if other is not None and other.events:
-            found.append(f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s")
+    after = truth.events[0].after[VELOCITY]
+    found = [f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s" for law, other in others.items() if other.events]
     return f"velocity after the first impact differs by: {', '.join(found)}; these are other models, not errors"
 
 

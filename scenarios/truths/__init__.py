@@ -2,21 +2,27 @@
 
 from functools import lru_cache
 
+import numpy as np
+
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.state import VELOCITY
 from dropspin.scenarios.truths.bounce import bounce_ladder
 from dropspin.scenarios.truths.corner_impact import corner_impact
 from dropspin.scenarios.truths.coulomb_slide import coulomb_slide
 from dropspin.scenarios.truths.coulomb_turn import coulomb_turn
 from dropspin.scenarios.truths.flight import flight
-from dropspin.scenarios.truths.impact_laws import LAWS, Law
+from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, LAWS, Law, law_of
 from dropspin.scenarios.truths.rocking import rocking
 from dropspin.scenarios.truths.rolling import rolling
 from dropspin.scenarios.truths.slipping import slipping
 from dropspin.scenarios.truths.top import top
 from dropspin.scenarios.truths.truth import Impact, Truth
 
-__all__ = ["LAWS", "Impact", "Law", "Truth", "truth_for"]
+__all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "truth_for"]
+
+SAME_IMPULSE = 1e-6
+"""Largest difference of two impulses, over the momentum, that is due to rounding: 1e-13 in the integration, which impacts amplify."""
 
 
 @lru_cache(maxsize=128)  # a run, its tables and its plots all need it, and the solution of a tumble takes a second
@@ -44,3 +50,26 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
         if truth is not None:
             return truth
     return None
+
+
+def other_laws(scene: Scenario) -> dict[Law, Truth]:
+    """The exact solutions under the other laws of impacts with friction, as far as an impact differs from that under the scene's law.
+
+    Where the slip turns during an impact these are different models, and none is the error of another.
+
+    Returns:
+        By law; empty without an impact with a coefficient of friction, and where the laws agree.
+    """
+    truth = truth_for(scene)
+    if truth is None or not truth.events or law_of(scene) not in FRICTION_LAWS:
+        return {}
+    found = {law: truth_for(scene, law) for law in FRICTION_LAWS if law != law_of(scene)}
+    return {law: other for law, other in found.items() if other is not None and _has_other_impulses(truth, other)}
+
+
+def _has_other_impulses(truth: Truth, other: Truth) -> bool:
+    """Whether an impact that two solutions have in common has another impulse."""
+    return any(
+        np.linalg.norm(one.after[VELOCITY] - another.after[VELOCITY]) > SAME_IMPULSE * np.linalg.norm(one.before[VELOCITY])
+        for one, another in zip(truth.events, other.events, strict=False)
+    )

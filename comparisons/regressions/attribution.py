@@ -2,17 +2,23 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any, Literal
 
 from dropspin.comparisons.engines.registry import BUILT_IN
+from dropspin.comparisons.regressions.motions import Motion
 from dropspin.comparisons.results.provenance import MEASURING
 from dropspin.scenarios.text import printable
 
 Stamp = Mapping[str, Any]
 Origin = Literal["engine", "adapter", "settings", "dropspin", "surroundings", "either", "absent", "nothing"]
 OWN_CODE = "dropspin's own code"
+OF_DROPSPIN = frozenset({"dropspin", "code"})
+"""The differences of the surroundings that are dropspin's."""
 MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
+NO_DIFFERENCE = "nothing that is recorded differs; the engine is not deterministic, or has changed without a new version"
+OWN_ENGINE = "document"
+"""The engine that is a part of dropspin."""
+CORRECTION = "a correction of dropspin, not a change of the engine"
 
 
 @dataclass(frozen=True)
@@ -21,9 +27,10 @@ class Attribution:
 
     Attributes:
         origin: `absent` if one of the runs has no measurements; `engine` for its version, else `adapter` for the adapter's code, else
-            `settings`; `dropspin` if nothing but dropspin's code differs, that of a built-in adapter included; `surroundings` for
-            dropspin, its code, the libraries and the machine; `either` if both the engine, its adapter or its settings and the surroundings
-            differ, so that the cause cannot be isolated; `nothing` if the whole provenance is the same.
+            `settings`; `dropspin` if its version or code differs, and the motions are the same or nothing else differs but the code of a
+            built-in adapter; `surroundings` for dropspin, its code, the libraries and the machine; `either` if both the engine, its
+            adapter, its settings or its motions and the surroundings differ, so that the cause cannot be isolated; `nothing` if the whole
+            provenance is the same.
         message: The cause in a sentence, without the engine's name.
     """
 
@@ -31,16 +38,17 @@ class Attribution:
     message: str
 
 
-def surroundings(old: Stamp, new: Stamp) -> list[str]:
-    """The differences that affect all engines, as text."""
-    found = [
-        f"{package} {old['versions'][package]} → {new['versions'][package]}"
-        for package in MEASURING
-        if old["versions"][package] != new["versions"][package]
-    ]
-    if old["code"] != new["code"]:
-        found.append(OWN_CODE)
-    return found + [f"{word} {old[key]} → {new[key]}" for key, word in MACHINE.items() if old[key] != new[key]]
+def surroundings(old: Stamp, new: Stamp) -> dict[str, str]:
+    """The differences that affect all engines, as text by name, in what both record."""
+
+    def differs(one: Any, other: Any) -> bool:
+        return None not in (one, other) and one != other
+
+    versions = {package: (old["versions"].get(package), new["versions"].get(package)) for package in MEASURING}
+    found = {package: f"{package} {one} → {other}" for package, (one, other) in versions.items() if differs(one, other)}
+    if differs(old.get("code"), new["code"]):
+        found["code"] = OWN_CODE
+    return found | {key: f"{word} {old[key]} → {new[key]}" for key, word in MACHINE.items() if differs(old.get(key), new[key])}
 
 
 def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
@@ -53,7 +61,7 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
     name = engine.split("[", maxsplit=1)[0]
     if versions[0] != versions[1] and all(versions):
         found["engine"] = f"{name} {_listed(versions[0])} → {_listed(versions[1])}"
-    if old["adapters"].get(engine) != new["adapters"].get(engine):
+    if engine in old["adapters"] and old["adapters"][engine] != new["adapters"].get(engine):
         found["adapter"] = f"the code of {name}'s adapter"
     changed = _changed_settings(before, after)
     if changed:
@@ -61,7 +69,7 @@ def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
     return found
 
 
-def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str]) -> Attribution:
+def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], motions: Motion = "unknown") -> Attribution:
     """Attribute the changes of an engine's results.
 
     Args:
@@ -69,30 +77,32 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str]) -> 
         new: Provenance of the later run.
         engine: Label of the engine whose results changed.
         unmoved: Other engines of both runs whose results are all the same, which excludes the surroundings as the cause.
+        motions: Whether the engine's motions, from which these results were measured, are the same bit for bit.
     """
     absent = [word for word, stamp in (("earlier", old), ("later", new)) if not stamp["settings"].get(engine)]
     if absent:
         return Attribution("absent", f"it has no measurements in the {absent[0]} run: it broke down, declined, or is missing")
     own, around = of_engine(old, new, engine), surroundings(old, new)
+    listed, name = ", ".join([*own.values(), *around.values()]), engine.split("[", maxsplit=1)[0]
+    if motions == "same" and around.keys() & OF_DROPSPIN:
+        return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {', '.join(around.values())}")
     if not own and not around:
-        return Attribution(
-            "nothing", "the provenance of both runs is the same; the engine is not deterministic, or has changed without a new version"
-        )
-    if around == [OWN_CODE] and own.keys() <= ({"adapter"} if engine.split("[", maxsplit=1)[0] in BUILT_IN else set()):
-        return Attribution("dropspin", f"a correction of dropspin, not a change of the engine: {', '.join([*own.values(), *around])}")
+        return Attribution("nothing", "nothing that is recorded differs, nor do the motions" if motions == "same" else NO_DIFFERENCE)
+    if around and around.keys() <= OF_DROPSPIN and own.keys() <= ({"adapter"} if name in BUILT_IN else set()):
+        if motions == "different" and not own and name != OWN_ENGINE:
+            return Attribution("either", f"{listed}; the cause cannot be isolated, because the motions of {name} differ too")
+        return Attribution("dropspin", f"{CORRECTION}{', as far as it is recorded' * (motions == 'unknown')}: {listed}")
     if not own:
-        return Attribution("surroundings", f"attributed to the surroundings: {', '.join(around)}")
+        return Attribution("surroundings", f"attributed to the surroundings: {listed}")
     first = next(iter(own))
     message = f"attributed to {'the engine' if first == 'engine' else f'its {first}'}: {', '.join(own.values())}"
     if not around:
         return Attribution(first, message)
     if unmoved:
         return Attribution(
-            first, f"{message}; {', '.join(around)} differ too, but the results of {', '.join(sorted(unmoved))} are the same"
+            first, f"{message}; {', '.join(around.values())} differ too, but the results of {', '.join(sorted(unmoved))} are the same"
         )
-    return Attribution(
-        "either", f"{', '.join(chain(own.values(), around))}; the cause cannot be isolated, because the results of every engine changed"
-    )
+    return Attribution("either", f"{listed}; the cause cannot be isolated, because the results of every engine changed")
 
 
 def _changed_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:

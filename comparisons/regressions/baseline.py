@@ -18,6 +18,7 @@ from tomlkit.items import InlineTable, Item
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.regressions.motions import Digests, digests_of
 from dropspin.comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results, verify_comparable
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.output import written_whole
@@ -50,16 +51,24 @@ SUFFIXES = {"_order": "order", "_asymptotic_error": "asymptotic_error"}
 
 
 class Acceptance(Table):
-    """The date, the reason and the versions of an acceptance."""
+    """The date, the reason and the versions of an acceptance, and the hashes of dropspin's code and of each adapter's."""
 
     date: datetime.date
     reason: Annotated[Text, Field(min_length=1)]
     versions: dict[Text, Text]
+    code: Text | None = None
+    adapters: dict[Text, Text] = Field(default_factory=dict)
 
     @property
     def key(self) -> str:
         """The key in the file, a hash of the content, so that two branches do not use the same key for different acceptances."""
         return digest(self.model_dump())[:KEY_LENGTH]
+
+    def stamp_of(self, engine: str) -> dict[str, Any]:
+        """What it has of the provenance of the run, for `attribution.attribute`; baselines of earlier versions have no hashes of code."""
+        version = self.versions.get(engine.split("[", maxsplit=1)[0])
+        settings = {engine: {"accepted": {} if version is None else {"version": version}}}
+        return self.model_dump() | {"python": self.versions.get("python"), "settings": settings}
 
 
 class _Line(Table):
@@ -78,6 +87,7 @@ class _File(Table):
     accepted: dict[str, dict[str, Any]] = Field(default_factory=dict)
     engines: dict[Text, Text] = Field(default_factory=dict)
     scenes: dict[Text, Text] = Field(default_factory=dict)
+    motions: dict[Text, dict[Text, dict[str, Text]]] = Field(default_factory=dict)
     results: dict[Text, dict[Text, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
 
 
@@ -96,6 +106,7 @@ class Baseline:
         acceptances: Acceptances by key.
         engines: The name by which an engine is run, if it differs from the label, such as `my_module:MyEngine`.
         scenes: The hash of what each scene simulates.
+        motions: By scene, engine and time step: the hash of the motions from which the results were measured.
         results: The table that `comparable_results` returns, with two more columns: `by` is the key of the acceptance; if `known_failure`
             is true, a failed check of this result does not fail the run unless the result is worse than accepted.
     """
@@ -103,6 +114,7 @@ class Baseline:
     acceptances: Mapping[str, Acceptance] = field(default_factory=dict)
     engines: Mapping[str, str] = field(default_factory=dict)
     scenes: Mapping[str, str] = field(default_factory=dict)
+    motions: Digests = field(default_factory=dict)
     results: pd.DataFrame = field(default_factory=lambda: _table([]))
 
 
@@ -128,7 +140,13 @@ def load_baseline(path: str | Path) -> Baseline:
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     lines = [_read_line(where, key, content, acceptances) for key, content in _listed(where, written)]
-    return Baseline(acceptances, written.engines, written.scenes, _table(lines))
+    motions = {
+        (scene, engine, step): digest
+        for scene, engines in written.motions.items()
+        for engine, steps in engines.items()
+        for step, digest in steps.items()
+    }
+    return Baseline(acceptances, written.engines, written.scenes, motions, _table(lines))
 
 
 def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, str], Any]]:
@@ -199,7 +217,9 @@ def accept(
     if known_failures:
         flags = kept[KEY].merge(mine[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
         kept = kept.assign(known_failure=flags.where(flags.notna(), kept["known_failure"].to_numpy()).astype(bool).to_numpy())
-    acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(results.provenance))
+    stamp = results.provenance
+    adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (mine["engine"] == engine).any()}
+    acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(stamp), code=stamp["code"], adapters=adapters)
     moved = mine.merge(kept[KEY], on=KEY, how="left", indicator=True)
     moved = moved[moved["_merge"] == "left_only"].assign(by=acceptance.key)
     outside = earlier.results.drop(old.index)
@@ -207,8 +227,10 @@ def accept(
     everything = pd.concat([outside[~outdated], kept, moved], ignore_index=True)[list(COLUMNS)]
     used = set(everything["by"])
     acceptances = {key: one for key, one in {acceptance.key: acceptance, **earlier.acceptances}.items() if key in used}
-    names = {label: name for label, name in results.provenance["names"].items() if name != label}
-    return Baseline(acceptances, {**earlier.engines, **names}, {**earlier.scenes, **scenes}, everything), found[~lost]
+    names = {label: name for label, name in stamp["names"].items() if name != label}
+    replaced = {(row["scene"], row["engine"], step) for row in moved.to_dict("records") for step in row["steps"].split(", ")}
+    motions = {**digests_of(stamp), **{key: digest for key, digest in earlier.motions.items() if key not in replaced}}
+    return Baseline(acceptances, {**earlier.engines, **names}, {**earlier.scenes, **scenes}, motions, everything), found[~lost]
 
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:
@@ -232,10 +254,14 @@ def _text(baseline: Baseline) -> str:
     lines = [*(f"# {line}" for line in HEADER), "", f"format = {FORMAT}", ""]
     for key, one in sorted(baseline.acceptances.items(), key=lambda item: (item[1].date, item[0])):
         content = {"date": one.date, "reason": one.reason, "versions": _inline(one.versions)}
+        content |= {"code": one.code} if one.code else {}
+        content |= {"adapters": _inline(one.adapters)} if one.adapters else {}
         lines.append(_assigned(["accepted", key], _inline(content)))
     lines.append("")
     for table, named, used in (("engines", baseline.engines, engines), ("scenes", baseline.scenes, scenes)):
         lines += [_assigned([table, name], tomlkit.string(text)) for name, text in sorted(named.items()) if name in used]
+    pairs = set(zip(held["scene"], held["engine"], strict=True))
+    lines += [_assigned(["motions", *key], tomlkit.string(one)) for key, one in sorted(baseline.motions.items()) if key[:2] in pairs]
     for _, rows in held.groupby(["scene", "engine", "steps"], sort=False):
         lines.append("")
         for row in rows.to_dict("records"):

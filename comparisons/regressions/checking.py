@@ -1,6 +1,8 @@
 """The comparison of a run with a baseline, in which each accepted result gets a row of kind `baseline` with a verdict."""
 
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -8,13 +10,16 @@ import pandas as pd
 
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES, Verdict
+from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute
 from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.motions import Motion, compared_digests, digests_of
 from dropspin.comparisons.regressions.values import (
     KEY,
     asked_for,
     changes,
     comparable_results,
     most_changed_first,
+    regressed,
     step_names,
     verify_comparable,
 )
@@ -42,11 +47,13 @@ class Checked:
         changes: The results of the run compared with the accepted ones: the table that `values.changes` returns, largest change first;
             empty without a baseline.
         not_run: Accepted results that the run does not cover, because it has other scenes, engines or time steps.
+        attributions: For each engine with failing accepted results, the causes to which they are attributed, and how many to each.
     """
 
     results: Results
     changes: pd.DataFrame
     not_run: pd.DataFrame
+    attributions: Mapping[tuple[str, Attribution], int] = field(default_factory=dict)
 
 
 def check(results: Results, baseline: Baseline | None = None) -> Checked:
@@ -84,11 +91,31 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     comparable = mine[~mine["scene"].isin(accepted.loc[another, "scene"])]
     found = changes(accepted[~another], comparable).merge(accepted[[*KEY, "by", "known_failure"]], on=KEY, how="left")
     found = most_changed_first(found)
+    causes = _causes(found, baseline, results)
+    of_dropspin = {number for number, cause in causes.items() if cause.origin == "dropspin"}
+    found = found.assign(note=[f"; {CORRECTION}" if number in of_dropspin else "" for number in found.index])
     rows = [_scene_changed(scene, engine) for scene, engine in accepted.loc[another, ["scene", "engine"]].drop_duplicates().to_numpy()]
     rows += _lost_rows(results, found[found["change"] == "gone"])
     rows += [_judged(row, baseline) for row in found[~found["change"].isin(["new", "gone"])].to_dict("records")]
     table = pd.concat([_with_known_failures(results, found), as_table(rows)], ignore_index=True)
-    return Checked(replace(results, table=table), found, baseline.results.drop(accepted.index))
+    attributions = Counter((found["engine"][number], cause) for number, cause in causes.items())
+    return Checked(replace(results, table=table), found.drop(columns="note"), baseline.results.drop(accepted.index), attributions)
+
+
+def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[int, Attribution]:
+    """By the number of its row, the cause to which each failing accepted result is attributed."""
+    failing, stamp = regressed(found), results.provenance
+    unmoved = [str(engine) for engine, changes in found.groupby("engine")["change"] if set(changes) == {"same"}]
+    motions = compared_digests(failing, baseline.motions, digests_of(stamp))
+    known: dict[tuple[str, str, Motion], Attribution] = {}
+    causes = {}
+    for number, row, of_row in zip(failing.index, failing.to_dict("records"), motions, strict=True):
+        engine, by = row["engine"], row["by"]
+        if (engine, by, of_row) not in known:
+            earlier = baseline.acceptances[by].stamp_of(engine)
+            known[engine, by, of_row] = attribute(earlier, stamp, engine, unmoved, of_row)
+        causes[number] = known[engine, by, of_row]
+    return causes
 
 
 def _with_current_names(baseline: Baseline, results: Results) -> pd.DataFrame:
@@ -103,7 +130,7 @@ def _judged(found: dict[Any, Any], baseline: Baseline) -> Measurement:
     """The row of an accepted result that the run also measured."""
     by = baseline.acceptances[found["by"]]
     away = "" if found["change"] == "same" else f"; {found['change']} by {found['in_tolerances']:,.3g} times its tolerance"
-    reason = f"accepted {found['before']:.6g} ± {found['tolerance']:.2g} on {by.date}, {by.reason}{away}"
+    reason = f"accepted {found['before']:.6g} ± {found['tolerance']:.2g} on {by.date}, {by.reason}{away}{found['note']}"
     lower, upper = (found[name] if np.isfinite(found[name]) else np.nan for name in ("lower", "upper"))
     return replace(_row(found), lower=lower, upper=upper, value=found["value"], verdict=VERDICTS[found["change"]], reason=reason)
 
@@ -137,7 +164,7 @@ def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
             if row["kind"] in STUDIES:
                 rows.append(replace(_row(row), verdict="measured", reason=f"accepted {row['before']:.6g}, undefined now"))
             else:
-                rows.append(replace(_row(row), reason=f"accepted {row['before']:.6g}, not measured now"))
+                rows.append(replace(_row(row), reason=f"accepted {row['before']:.6g}, not measured now{row['note']}"))
     return rows
 
 

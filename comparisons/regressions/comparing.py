@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from dropspin.comparisons.regressions.attribution import Attribution, attribute, surroundings
-from dropspin.comparisons.regressions.motions import EqualMotions, equal_motions
+from dropspin.comparisons.regressions.motions import EqualMotions, compared_digests, digests_of, equal_motions, taken_together
 from dropspin.comparisons.regressions.speed import SpeedChange, speed_changes
 from dropspin.comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed, verify_comparable
 from dropspin.comparisons.results.results import Results
@@ -74,9 +74,13 @@ def compare(old: Results, new: Results) -> Changes:
     changed = found.groupby("engine")["change"].agg(lambda change: bool((change != "same").any()))
     unmoved = [str(engine) for engine, moved in changed.items() if not moved]
     stamps = old.provenance, new.provenance
-    attributions = {str(engine): attribute(*stamps, str(engine), unmoved) for engine, moved in changed.items() if moved}
+    digests = digests_of(old.provenance), digests_of(new.provenance)
+    attributions = {
+        str(engine): attribute(*stamps, str(engine), unmoved, taken_together(compared_digests(rows, *digests)))
+        for engine, rows in found[found["change"] != "same"].groupby("engine")
+    }
     in_one_only, speed, motions = _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other)
-    return Changes(found, attributions, surroundings(*stamps), other, in_one_only, speed, motions)
+    return Changes(found, attributions, list(surroundings(*stamps).values()), other, in_one_only, speed, motions)
 
 
 def _in_one_only(old: Results, new: Results) -> list[str]:

@@ -1,12 +1,55 @@
 """Whether two runs have the same motions, bit for bit: the test of determinism across runs, versions and machines."""
 
-from collections.abc import Collection
-from typing import NamedTuple
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import Trajectory
+
+Digests = Mapping[tuple[str, str, str], str]
+"""By scene, engine and time step as text: the hash of the motions that were measured."""
+Motion = Literal["same", "different", "unknown"]
+
+
+def digests_of(stamp: Mapping[str, Any]) -> Digests:
+    """The hashes of the motions of a run, from its provenance; empty for runs of versions that recorded none."""
+    by_engine = stamp.get("motions", {})
+    return {
+        (scene, engine, step): digest
+        for engine, by_scene in by_engine.items()
+        for scene, by_step in by_scene.items()
+        for step, digest in by_step.items()
+    }
+
+
+def compared_digests(rows: pd.DataFrame, old: Digests, new: Digests) -> list[Motion]:
+    """For each result, whether the motions that were measured for it are equal bit for bit in two runs.
+
+    Args:
+        rows: Results, with the columns of `values.KEY`.
+        old: The hashes of the earlier motions.
+        new: Those of the later motions.
+
+    Returns:
+        `unknown` where a hash is missing, and for means of ensembles and symmetries, which have other motions.
+    """
+    return [_compared(row, old, new) for row in rows.to_dict("records")]
+
+
+def _compared(row: Mapping[Any, Any], old: Digests, new: Digests) -> Motion:
+    pairs = [(old.get(key), new.get(key)) for key in ((row["scene"], row["engine"], step) for step in row["steps"].split(", "))]
+    if row["kind"] not in ("truth", "invariant", "order", "asymptotic_error") or any(None in pair for pair in pairs):
+        return "unknown"
+    return "same" if all(one == other for one, other in pairs) else "different"
+
+
+def taken_together(found: Iterable[Motion]) -> Motion:
+    """Whether the motions of several results are equal: `different` if those of one are."""
+    every = set(found)
+    return "different" if "different" in every else "same" if every == {"same"} else "unknown"
 
 
 class EqualMotions(NamedTuple):

@@ -5,13 +5,16 @@ import json
 import os
 import platform
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dropspin.comparisons.engines.base import version
+from dropspin.scenarios import Trajectory
 from dropspin.scenarios.text import printable
 
 MEASURING = ("dropspin", "numpy", "numba", "scipy")
@@ -92,6 +95,15 @@ def code(*places: Path) -> str:
     for file in files:
         found.update(file.read_bytes())
     return found.hexdigest()[:12]
+
+
+def motion_digest(motions: Iterable[Trajectory]) -> str:
+    """A short hash of motions: equal hashes mean motions that are equal bit for bit."""
+    found = hashlib.sha256()
+    for motion in motions:
+        found.update(np.ascontiguousarray(motion.states, dtype=np.float64).tobytes())
+        found.update(np.float64(motion.velocity_lag).tobytes())
+    return found.hexdigest()[:8]
 
 
 def digest(settings: Mapping[str, Any]) -> str:

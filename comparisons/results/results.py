@@ -55,7 +55,8 @@ class Results:
         engines: The engines' labels, in order.
         trajectories: By (scene, engine, dt): the motion from the scene's own start, every step.
         ensembles: By (scene, engine, dt): the results of each start, if the scene has an ensemble.
-        provenance: The arguments of the run, versions, machine, settings per engine and scene.
+        provenance: The arguments of the run, versions, machine, settings per engine and scene, and the hash of its motions per scene
+            and time step.
         predictions: The errors that theory predicts for an engine's method, with the same columns; few scenes and methods have any.
         agreements: The differences between each two engines, with the same columns; `truth` has the label of the other engine.
     """
@@ -232,11 +233,13 @@ def _counted(verdicts: "pd.Series[str]") -> str:
 
 
 def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
-    """The runs of several scenes as one run, in order; their settings are collected in the provenance."""
+    """The runs of several scenes as one run, in order; their settings and motions are collected in the provenance."""
     settings: dict[str, dict[str, Any]] = {}
+    motions: dict[str, dict[str, Any]] = {}
     for part in parts:
-        for engine, stamped in part.provenance["settings"].items():
-            settings.setdefault(engine, {}).update(stamped)
+        for together, name in ((settings, "settings"), (motions, "motions")):
+            for engine, stamped in part.provenance[name].items():
+                together.setdefault(engine, {}).update(stamped)
     digests = {engine: digest(stamped) for engine, stamped in settings.items()}
     table, predictions, agreements = (
         pd.concat([getattr(part, name) for part in parts], ignore_index=True) for name in ("table", "predictions", "agreements")
@@ -247,7 +250,7 @@ def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
         parts[0].engines,
         dict(item for part in parts for item in part.trajectories.items()),
         dict(item for part in parts for item in part.ensembles.items()),
-        {**provenance, "settings": settings, "settings_digests": digests},
+        {**provenance, "settings": settings, "settings_digests": digests, "motions": motions},
         predictions,
         agreements,
     )

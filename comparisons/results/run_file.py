@@ -70,6 +70,7 @@ class _Provenance(_Table):
     adapters: dict[Text, Text | None]
     settings: dict[Text, dict[Text, dict[str, Any]]]
     settings_digests: Texts = {}
+    motions: dict[Text, dict[Text, dict[Text, Text]]] = {}
     named: list[Text] = []
     compilation: dict[Text, Seconds] = {}
 

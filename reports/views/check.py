@@ -12,7 +12,6 @@ from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
 from dropspin.comparisons.regressions.baseline import Baseline
 from dropspin.comparisons.regressions.checking import Checked
 from dropspin.comparisons.regressions.values import broke_down, comparable_results, regressed
-from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.views.failures import Failure
 from dropspin.reports.views.findings import counts, verdict_sentence
@@ -53,7 +52,7 @@ def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
         return [verdict]
     table = checked.results.table
     failed_rows = table[(table["kind"] == "baseline") & (table["verdict"] == "failed")]
-    listed = [*(_changed_versions(checked, file.baseline) if len(failed_rows) else []), *_notes(checked, known)]
+    listed = [*_attributed(checked), *_notes(checked, known)]
     better, new = (int((checked.changes["change"] == change).sum()) for change in ("better", "new"))
     acceptable = bool((~(broke_down(failed_rows, checked.results) & (failed_rows["metric"] == ""))).any())
     if acceptable or better or new:
@@ -129,18 +128,13 @@ def _without_baseline(results: Results) -> Results:
     return replace(results, table=results.table[results.table["kind"] != "baseline"])
 
 
-def _changed_versions(checked: Checked, baseline: Baseline) -> list[str]:
-    """The versions that changed since the failing results were accepted."""
-    now = versions_behind(checked.results.provenance)
-    moved = checked.changes[checked.changes["change"].isin(["worse", "moved", "gone"])]
-    differ = [
-        f"{name} {then} → {now[name]}"
-        for by in moved["by"].dropna().unique()
-        for name, then in baseline.acceptances[by].versions.items()
-        if name in now and now[name] != then
-    ]
-    listed = ", ".join(dict.fromkeys(differ))
-    return [f"Changed since they were accepted: {listed}."] if differ else []
+def _attributed(checked: Checked) -> list[str]:
+    """For each engine, the causes to which its failing accepted results are attributed."""
+    found = []
+    for (engine, cause), count in checked.attributions.items():
+        are = counted(count, "result is", "results are")
+        found.append(f"{engine}: {are} worse, moved or gone. {cause.message[0].upper()}{cause.message[1:]}.")
+    return found
 
 
 def _escaped(text: str, more: str = "") -> str:

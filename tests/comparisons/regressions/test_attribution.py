@@ -2,7 +2,7 @@
 
 import pytest
 
-from dropspin.comparisons.regressions.attribution import attribute
+from dropspin.comparisons.regressions.attribution import CORRECTION, attribute
 
 STAMP = {
     "versions": {"dropspin": "1", "numpy": "2", "numba": "3", "scipy": "4"},
@@ -26,14 +26,15 @@ def settings(version, solref):
             {},
             [],
             "nothing",
-            "the provenance of both runs is the same; the engine is not deterministic, or has changed without a new version",
+            "nothing that is recorded differs; the engine is not deterministic, or has changed without a new version",
         ),
         (settings("1.1", 1), [], "engine", "attributed to the engine: candidate 1.0 → 1.1"),
         (settings("1.0", 2), [], "settings", "attributed to its settings: its settings (solref)"),
         (settings("1.1", 2), [], "engine", "attributed to the engine: candidate 1.0 → 1.1, its settings (solref)"),
         ({"adapters": {"candidate": "b"}}, [], "adapter", "attributed to its adapter: the code of candidate's adapter"),
         ({"cpu": "B"}, [], "surroundings", "attributed to the surroundings: processor A → B"),
-        ({"code": "d"}, [], "dropspin", "a correction of dropspin, not a change of the engine: dropspin's own code"),
+        ({"code": "d"}, [], "dropspin", f"{CORRECTION}, as far as it is recorded: dropspin's own code"),
+        ({"versions": STAMP["versions"] | {"dropspin": "2"}}, [], "dropspin", f"{CORRECTION}, as far as it is recorded: dropspin 1 → 2"),
         (
             {"code": "d", "adapters": {"candidate": "b"}},
             [],
@@ -68,4 +69,4 @@ def test_changed_code_of_a_built_in_adapter_is_a_correction_of_dropspin():
     stamp = STAMP | {"adapters": {"pybullet": "a"}, "settings": {"pybullet": STAMP["settings"]["candidate"]}}
     found = attribute(stamp, stamp | {"code": "d", "adapters": {"pybullet": "b"}}, "pybullet", [])
     assert found.origin == "dropspin"
-    assert found.message.endswith("not a change of the engine: the code of pybullet's adapter, dropspin's own code")
+    assert found.message.endswith("as far as it is recorded: the code of pybullet's adapter, dropspin's own code")

@@ -47,7 +47,7 @@ def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, 
         command = "dropspin run drop-ball -e my_engine:MyEngine --dt 0.008 --dt 0.004 --dt 0.002 --baseline dropspin-baseline.toml"
         assert f"Reproduce: {command} -o out/again" in first
         assert (output.count("✗"), output.count("Reproduce: "), output.count("dropspin accept")) == (1, 1, 1)
-        assert "Changed since they were accepted: my-engine good → failing." in output
+        assert "worse, moved or gone. Attributed to the engine: my-engine good → failing." in output
         assert f'If the changes are intended: dropspin accept out/failing {" ".join(BASELINE)} --reason "…"' in output
     if release == "crashing":
         assert f"drop-ball · {LABEL} · 0.008 s: crashed. its process was ended by SIGABRT" in output

@@ -109,14 +109,7 @@ def bounce_height_error(case: Comparison) -> float:
     return float(np.mean(found - exact)) / case.scene.clearance
 
 
-@_metric(
-    "1",
-    "truth",
-    "an exact solution with an impact, the restitution of Newton",
-    requirements.has_newton_restitution,
-    signed=True,
-    first_flight=True,
-)
+@_metric("1", "truth", "an exact impact with Newton's restitution", requirements.has_newton_restitution, signed=True, first_flight=True)
 def restitution_error(case: Comparison) -> float:
     """Separation speed over approach speed of the contact point in the first impact, minus the coefficient of restitution."""
     assert case.scene.floor is not None

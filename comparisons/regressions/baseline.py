@@ -17,8 +17,8 @@ from pydantic import Field
 from tomlkit.items import InlineTable, Item
 
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.measuring.symmetries import kind_of
-from dropspin.comparisons.regressions.motions import Digests, digests_of
+from dropspin.comparisons.regressions.motions import Digests, digests_of, flat
+from dropspin.comparisons.regressions.result_names import assert_steps, metric_and_kind, name_of
 from dropspin.comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results, verify_comparable
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.output import written_whole
@@ -27,7 +27,6 @@ from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.body import Table
-from dropspin.scenarios.errors import did_you_mean
 from dropspin.scenarios.loading import read_toml
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown, validated
@@ -46,8 +45,6 @@ HEADER = (
     "value ± tolerance, in the unit of the metric; by: the acceptance it belongs to.",
     "`dropspin check RUN --baseline FILE` compares a run with them, `dropspin accept RUN` replaces them.",
 )
-SUFFIXES = {"_order": "order", "_asymptotic_error": "asymptotic_error"}
-"""Suffixes of the names of results that are fitted to several time steps, and the kinds of such results."""
 
 
 class Acceptance(Table):
@@ -140,13 +137,7 @@ def load_baseline(path: str | Path) -> Baseline:
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     lines = [_read_line(where, key, content, acceptances) for key, content in _listed(where, written)]
-    motions = {
-        (scene, engine, step): digest
-        for scene, engines in written.motions.items()
-        for engine, steps in engines.items()
-        for step, digest in steps.items()
-    }
-    return Baseline(acceptances, written.engines, written.scenes, motions, _table(lines))
+    return Baseline(acceptances, written.engines, written.scenes, flat(written.motions), _table(lines))
 
 
 def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, str], Any]]:
@@ -156,7 +147,7 @@ def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, s
             raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
         for engine, steps in engines.items():
             for step, named in steps.items():
-                _assert_steps(f"{where}: results of {scene}, {engine}", step)
+                assert_steps(f"{where}: results of {scene}, {engine}", step)
                 for name, content in named.items():
                     yield (scene, engine, step, name), content
 
@@ -165,7 +156,7 @@ def _read_line(where: str, key: tuple[str, str, str, str], content: Any, accepta
     """A result of a file as a row of a table."""
     scene, engine, steps, name = key
     here = f"{where}: results of {scene}, {engine}, {steps}: {name}"
-    metric, kind = _metric_and_kind(here, name)
+    metric, kind = metric_and_kind(here, name)
     line = validated(_Line, here, content)
     if line.by not in acceptances:
         raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
@@ -265,7 +256,7 @@ def _text(baseline: Baseline) -> str:
     for _, rows in held.groupby(["scene", "engine", "steps"], sort=False):
         lines.append("")
         for row in rows.to_dict("records"):
-            lines.append(_assigned(["results", row["scene"], row["engine"], row["steps"], _name(row)], _inline(_line(row))))
+            lines.append(_assigned(["results", row["scene"], row["engine"], row["steps"], name_of(row)], _inline(_line(row))))
     return "\n".join(lines) + "\n"
 
 
@@ -279,37 +270,9 @@ def _inline(content: Mapping[str, Any]) -> InlineTable:
     return table
 
 
-def _name(row: Mapping[Hashable, Any]) -> str:
-    """The name of a result in the file."""
-    return row["metric"] + next((ending for ending, kind in SUFFIXES.items() if kind == row["kind"]), "")
-
-
 def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
     value, tolerance = float(row["value"]), float(f"{row['tolerance']:.2g}")
     ratio = min(max(abs(value) / tolerance, 1.0), LARGEST_RATIO)
     digits = EXTRA_DIGITS + math.ceil(math.log10(ratio))
     line = {"value": float(f"{value:.{digits}g}"), "tolerance": tolerance, "by": row["by"]}
     return line | ({"known_failure": True} if row["known_failure"] else {})
-
-
-def _assert_steps(where: str, steps: str) -> None:
-    try:
-        written = ", ".join(repr(float(step)) for step in steps.split(","))
-    except ValueError:
-        raise DropspinError(f"{where}: {steps!r} is not a time step or a list of them; write seconds, such as '0.004'.") from None
-    if written != steps:
-        raise DropspinError(f"{where}: {steps!r}: write it as {written!r}, or runs at this step will not find it.")
-
-
-def _metric_and_kind(where: str, name: str) -> tuple[str, str]:
-    """The metric and the kind of a result, from its name in the file."""
-    if name in METRICS:
-        return name, METRICS[name].kind
-    if name in ENSEMBLE_METRICS:
-        return name, "ensemble"
-    if (kind := kind_of(name)) is not None:
-        return name, kind
-    for ending, of_suffix in SUFFIXES.items():
-        if name.removesuffix(ending) in METRICS and name.endswith(ending):
-            return name.removesuffix(ending), of_suffix
-    raise DropspinError(f"{where}: no such result.{did_you_mean(name, [*METRICS, *ENSEMBLE_METRICS])}")

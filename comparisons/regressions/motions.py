@@ -16,11 +16,15 @@ Motion = Literal["same", "different", "unknown"]
 
 def digests_of(stamp: Mapping[str, Any]) -> Digests:
     """The hashes of the motions of a run, from its provenance; empty for runs of versions that recorded none."""
-    by_engine = stamp.get("motions", {})
+    return flat(stamp.get("motions", {}))
+
+
+def flat(nested: Mapping[str, Mapping[str, Mapping[str, str]]]) -> Digests:
+    """Hashes in mappings of scenes, engines and time steps as one mapping."""
     return {
         (scene, engine, step): digest
-        for engine, by_scene in by_engine.items()
-        for scene, by_step in by_scene.items()
+        for scene, by_engine in nested.items()
+        for engine, by_step in by_engine.items()
         for step, digest in by_step.items()
     }
 

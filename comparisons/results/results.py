@@ -235,11 +235,11 @@ def _counted(verdicts: "pd.Series[str]") -> str:
 def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
     """The runs of several scenes as one run, in order; their settings and motions are collected in the provenance."""
     settings: dict[str, dict[str, Any]] = {}
-    motions: dict[str, dict[str, Any]] = {}
+    motions: dict[str, Any] = {}
     for part in parts:
-        for together, name in ((settings, "settings"), (motions, "motions")):
-            for engine, stamped in part.provenance[name].items():
-                together.setdefault(engine, {}).update(stamped)
+        motions |= part.provenance["motions"]
+        for engine, stamped in part.provenance["settings"].items():
+            settings.setdefault(engine, {}).update(stamped)
     digests = {engine: digest(stamped) for engine, stamped in settings.items()}
     table, predictions, agreements = (
         pd.concat([getattr(part, name) for part in parts], ignore_index=True) for name in ("table", "predictions", "agreements")

@@ -53,7 +53,7 @@ class _Collected:
     trajectories: dict[TrajectoryKey, Trajectory] = field(default_factory=dict)
     ensembles: dict[TrajectoryKey, EnsembleOutcome] = field(default_factory=dict)
     settings: dict[str, dict[str, Any]] = field(default_factory=dict)
-    motions: dict[str, dict[str, dict[str, str]]] = field(default_factory=dict)
+    motions: dict[str, dict[str, str]] = field(default_factory=dict)
 
 
 def run_scene(
@@ -103,7 +103,7 @@ def run_scene(
                 found.studies[entry.label] = study_engine(own, entry, found.claims[entry.label], measured, processes, on_progress)
     rows = found.means + _with_convergence(found, labels) + found.other_laws
     table, predictions, agreements = map(as_table, (rows, found.predictions, found.agreements))
-    provenance = {**stamp, "settings": found.settings, "motions": found.motions}
+    provenance = {**stamp, "settings": found.settings, "motions": {scene.name: found.motions}}
     return Results(table, {scene.name: scene}, labels, found.trajectories, found.ensembles, provenance, predictions, agreements)
 
 
@@ -133,8 +133,7 @@ def _collect(found: _Collected, own: StartPhase, dt: float, engine_run: EngineRu
     if engine_run.motion is not None:
         found.trajectories[scene.name, label, dt] = engine_run.motion
         found.settings.setdefault(label, {})[f"{scene.name} dt={dt:g}"] = engine_run.settings
-        by_step = found.motions.setdefault(label, {}).setdefault(scene.name, {})
-        by_step[repr(float(dt))] = motion_digest([engine_run.motion, *engine_run.phases])
+        found.motions.setdefault(label, {})[repr(float(dt))] = motion_digest([engine_run.motion, *engine_run.phases])
         earlier = found.claims[label].limitations if label in found.claims else ()
         found.claims[label] = Claim(label, engine_run.order, engine_run.precision, (*earlier, *engine_run.limitations))
     if engine_run.outcome is not None:

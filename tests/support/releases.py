@@ -124,11 +124,7 @@ def part(results, *scenes, engines=None, dt=None):
         for label, stamped in stamp["settings"].items()
         if label in labels
     }
-    stamp["motions"] = {
-        label: {name: steps for name, steps in by_scene.items() if name in names}
-        for label, by_scene in stamp["motions"].items()
-        if label in labels
-    }
+    stamp["motions"] = {name: digests for name, digests in stamp["motions"].items() if name in names}
     for table in ("names", "adapters"):
         stamp[table] = {label: content for label, content in stamp[table].items() if label in labels}
     chosen = {name: results.scenes[name] for name in names}
@@ -144,8 +140,12 @@ def relabelled(results, old, new):
     """A run with another label of an engine."""
     stamp = dict(results.provenance)
     stamp["asked"] = stamp["asked"] | {"engines": [new if label == old else label for label in stamp["asked"]["engines"]]}
-    for table in ("names", "adapters", "settings", "motions"):
+    for table in ("names", "adapters", "settings"):
         stamp[table] = {new if label == old else label: content for label, content in stamp[table].items()}
+    stamp["motions"] = {
+        scene: {new if label == old else label: steps for label, steps in by_engine.items()}
+        for scene, by_engine in stamp["motions"].items()
+    }
     engines = tuple(new if label == old else label for label in results.engines)
     tables = {table: getattr(results, table).replace({"engine": {old: new}}) for table in TABLES}
     return replace(results, **tables, engines=engines, provenance=stamp)

@@ -84,7 +84,7 @@ def test_results_of_changed_motions_are_no_corrections_beside_those_of_the_same_
     """The results at a time step whose motions are the same are corrections; those at another are not."""
     corrected(monkeypatch)
     found = run(BALL, Candidate(), STEPS)
-    motions = {"candidate": {BALL.name: {**found.provenance["motions"]["candidate"][BALL.name], "0.008": "00000000"}}}
+    motions = {BALL.name: {"candidate": {**found.provenance["motions"][BALL.name]["candidate"], "0.008": "00000000"}}}
     failed = failing(check(stamped(found, motions=motions), accepted)).set_index("dt")["reason"].str.endswith(CORRECTION)
     assert dict(failed.dropna()[[0.004, 0.002]]) == {0.004: True, 0.002: True}
     assert not failed[0.008]
@@ -119,7 +119,7 @@ def test_hashes_of_unchanged_results_stay_in_the_baseline(accepted):
     """Those of results that are replaced are replaced too, so that hash and value belong together."""
     lively = relabelled(run(BALL, TooLively(), STEPS), "too-lively", "candidate")
     assert accept(lively, accepted, "livelier", TODAY)[0].motions == digests_of(lively.provenance)
-    rounded = stamped(run(BALL, Candidate(), STEPS), motions={"candidate": {BALL.name: dict.fromkeys(map(repr, STEPS), "00000000")}})
+    rounded = stamped(run(BALL, Candidate(), STEPS), motions={BALL.name: {"candidate": dict.fromkeys(map(repr, STEPS), "00000000")}})
     assert accept(rounded, accepted, "on another machine", TODAY)[0].motions == accepted.motions
 
 

@@ -137,7 +137,10 @@ def load_baseline(path: str | Path) -> Baseline:
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     lines = [_read_line(where, key, content, acceptances) for key, content in _listed(where, written)]
-    return Baseline(acceptances, written.engines, written.scenes, flat(written.motions), _table(lines))
+    motions = flat(written.motions)
+    for scene, engine, step in motions:
+        assert_steps(f"{where}: motions of {scene}, {engine}", step)
+    return Baseline(acceptances, written.engines, written.scenes, motions, _table(lines))
 
 
 def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, str], Any]]:

@@ -146,7 +146,7 @@ def test_union_merge_keeps_what_two_branches_accepted(release, numpy, tmp_path):
         (lambda text: text.replace('"0.004"', '"fast"', 1), "'fast' is not a time step or a list of them; write seconds, such as '0.004'."),
         (
             lambda text: text.replace("scenes.drop-ball =", "scene.drop-ball ="),
-            "scene: unknown key. Allowed: format, accepted, engines, scenes, results",
+            "scene: unknown key. Allowed: format, accepted, engines, scenes, motions, results",
         ),
         (lambda text: re.sub("^scenes.drop-ball.*$", "", text, flags=re.MULTILINE), "scenes: 'drop-ball' has results, but no digest"),
         (lambda text: text.replace(", versions = ", ", version = ", 1), "accepted.KEY: version: unknown key. "),

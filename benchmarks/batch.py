@@ -22,15 +22,15 @@ from speed import DT, scene
 
 from dropspin import reference_impl, scenarios
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.engines.document import reference_body, reference_world
 from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.engines.wang import reference_body, reference_world
 from dropspin.comparisons.running.recording import record_batch
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios.model import initial_states
 
 STEPS = 1000
-WORLDS = {"document": (32, 256, 1024, 4096), "mujoco": (1024,)}
-ROUNDS = {"document": (60, 15), "mujoco": (9, 3)}
+WORLDS = {"wang": (32, 256, 1024, 4096), "mujoco": (1024,)}
+ROUNDS = {"wang": (60, 15), "mujoco": (9, 3)}
 """How often a call and a batch are compared: last states, which differ by little, and every step recorded."""
 
 Call = Callable[[], object]
@@ -99,7 +99,7 @@ def compare(title: str, alone: Call, batch: Call, rounds: int, steps: int) -> No
 def main() -> None:
     """Print the cost of batches of a box in flight, dropped and at rest."""
     print("\nbatches, 1,000 steps [best ns a step: the engine's call, the batch; their ratio: of the best times, median of the rounds]")
-    for label, alone in (("document", document_alone), ("mujoco", mujoco_alone)):
+    for label, alone in (("wang", document_alone), ("mujoco", mujoco_alone)):
         for name in ("flight", "drop", "rest"):
             for worlds in WORLDS[label]:
                 starts, (last, recorded), steps = members(name, worlds), ROUNDS[label], worlds * STEPS

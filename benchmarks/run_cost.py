@@ -16,9 +16,9 @@ import numpy as np
 
 import dropspin as ds
 from dropspin import reference_impl
-from dropspin.comparisons.engines.document import Document, DocumentBatch, DocumentSimulation, reference_body, reference_world
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo, MuJoCoBatch, MuJoCoSimulation
 from dropspin.comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
+from dropspin.comparisons.engines.wang import Wang, WangBatch, WangSimulation, reference_body, reference_world
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.inputs import EngineEntry
 
@@ -26,7 +26,7 @@ DT = 4e-3
 JOBS = 10_000
 SWEEP = {
     "scenes": ["drop-box-anyhow"],
-    "engines": ["document"],
+    "engines": ["wang"],
     "dts": [DT],
     "random": {"count": JOBS, "seed": 1, "floor.restitution": {"from": 0.0, "to": 1.0}, "start.velocity[0]": {"from": -1.0, "to": 1.0}},
 }
@@ -83,18 +83,18 @@ class ProcessesHere:
 
 def run_cost(scenes: Sequence[ds.Scenario]) -> None:
     """Print the parts of a run relative to its stepping and recording."""
-    simulations = (DocumentSimulation, DocumentBatch, MuJoCoSimulation, MuJoCoBatch, PyBulletSimulation)
+    simulations = (WangSimulation, WangBatch, MuJoCoSimulation, MuJoCoBatch, PyBulletSimulation)
     for simulation, name in product(simulations, ("record", "advance")):
         time_method(simulation, name, "stepping and recording")
-    for engine in (Document, MuJoCo, PyBullet):
+    for engine in (Wang, MuJoCo, PyBullet):
         time_method(engine, "prepare", "building")
-    for engine in (Document, MuJoCo):
+    for engine in (Wang, MuJoCo):
         time_method(engine, "prepare_batch", "building")
     import_module("dropspin.comparisons.running.run").EngineProcesses = ProcessesHere
-    ds.run(scenes[:1], "document", jobs=1)  # compiles
+    ds.run(scenes[:1], "wang", jobs=1)  # compiles
     seconds.clear()
     start = time.perf_counter()
-    results = ds.run(scenes, ["document", "mujoco", "pybullet"], jobs=1)
+    results = ds.run(scenes, ["wang", "mujoco", "pybullet"], jobs=1)
     seconds["all of the run"] = time.perf_counter() - start
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()

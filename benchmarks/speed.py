@@ -1,4 +1,4 @@
-"""Speed of Wang's method (the engine `document`) compared with MuJoCo and PyBullet: `make bench`.
+"""Speed of Wang's method (the engine `wang`) compared with MuJoCo and PyBullet: `make bench`.
 
 All entries step the same box in one process, in turn, round after round. Ratios of the best and of the median times are printed, because
 absolute times on a shared machine are noise. The models differ: MuJoCo and PyBullet solve four contact points with friction cones for
@@ -180,7 +180,7 @@ def floors() -> dict[str, Entry]:
     names = {"flight": "no floor", "far": "a floor far below"}
     return {
         f"{label}, {floor}": alone(label, name, recording=False)
-        for label in ("document", "mujoco", "pybullet")
+        for label in ("wang", "mujoco", "pybullet")
         for name, floor in names.items()
     }
 
@@ -253,17 +253,17 @@ def main() -> None:
     OUT.mkdir(exist_ok=True)
     results: dict[str, Table] = {}
     leads = {}
-    many = f"document, {BODIES} at once"
+    many = f"wang, {BODIES} at once"
     for name in ("flight", "drop", "rest"):
-        stepping = {label: alone(label, name, recording=False) for label in ("document", "mujoco", "pybullet")}
+        stepping = {label: alone(label, name, recording=False) for label in ("wang", "mujoco", "pybullet")}
         title = f"{name}, stepping alone"
-        results[title] = table = report(title, timed(stepping | {many: ensemble(name), "mujoco.rollout": rollout(name)}), "document")
-        for ours in ("document", many):
+        results[title] = table = report(title, timed(stepping | {many: ensemble(name), "mujoco.rollout": rollout(name)}), "wang")
+        for ours in ("wang", many):
             leads[f"{ours}: {name}"] = lead(ours, table, ours, ("mujoco", "mujoco.rollout", "pybullet"))
-        recording = {label: alone(label, name, recording=True) for label in ("document", "mujoco", "pybullet")}
+        recording = {label: alone(label, name, recording=True) for label in ("wang", "mujoco", "pybullet")}
         title = f"{name}, every step recorded"
-        results[title] = table = report(title, timed(recording | {"mujoco.rollout": rollout(name)}), "document")
-        leads[f"document, recording: {name}"] = lead("document", table, "document", ("mujoco", "mujoco.rollout", "pybullet"))
+        results[title] = table = report(title, timed(recording | {"mujoco.rollout": rollout(name)}), "wang")
+        leads[f"wang, recording: {name}"] = lead("wang", table, "wang", ("mujoco", "mujoco.rollout", "pybullet"))
         sizes = {f"{size} bodies": ensemble(name, size, steps=1000) for size in SIZES}
         title = f"{name}, ensembles, 1,000 steps a call"
         results[title] = report(title, timed(sizes), f"{BODIES} bodies")
@@ -271,7 +271,7 @@ def main() -> None:
     results["drop, ensembles, threads"] = report("drop, ensembles, threads", timed(cores), "threads: 1")
     results["rotation methods"] = report("rotation methods", timed(rotations()), "note")
     results["parts that are not modelled"] = report("parts that are not modelled", timed(parts()), "everything")
-    results["a floor that is not reached"] = report("a floor that is not reached", timed(floors()), "document, no floor")
+    results["a floor that is not reached"] = report("a floor that is not reached", timed(floors()), "wang, no floor")
     first = {f"{kind}, {width}": first_call(kind == "cached", width) for width in ("one body", "ensemble") for kind in ("cold", "cached")}
     print("\nfirst call in a new process: " + "; ".join(f"{label} {seconds:.2f} s" for label, seconds in first.items()))
     stamp = {"versions": versions(), "cpu": processor(), "lanes": lanes.WIDTH}

@@ -45,7 +45,7 @@ def _shared_functions():
     """Compile what all kernels of Wang's method share, 5 s without numba's cache: engine processes, which are forked, have it then."""
     from dropspin.comparisons.running.recording import simulate
 
-    simulate("drop-box-corner", "document", 1e-2)
+    simulate("drop-box-corner", "wang", 1e-2)
 
 
 @pytest.fixture
@@ -86,6 +86,6 @@ def core_run(shared) -> Path:
         from dropspin.comparisons.results.store import save
         from dropspin.comparisons.running.run import run
 
-        save(run(map(with_few_members, QUICK), ["document", "mujoco", "pybullet"]), folder)
+        save(run(map(with_few_members, QUICK), ["wang", "mujoco", "pybullet"]), folder)
 
     return shared("core-run", make)

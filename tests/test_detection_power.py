@@ -19,9 +19,9 @@ FAULT = {fault.title: fault for fault in FAULTS}
         ("restitution", "pybullet", "drop-ball-backspin"),
         ("mass, inertia right", "mujoco", "tip-box"),
         ("moment of inertia about y", SEQUENTIAL, "spin-dzhanibekov"),
-        ("initial angular velocity", "document", "fall-spin"),
+        ("initial angular velocity", "wang", "fall-spin"),
         ("linear damping", "mujoco", "fall-damped"),
-        ("time step", "document", "fall-spin"),
+        ("time step", "wang", "fall-spin"),
     ],
 )
 def test_a_parameter_wrong_by_three_per_mille_is_detected(title, name, scene):
@@ -34,7 +34,7 @@ def test_a_parameter_wrong_by_three_per_mille_is_detected(title, name, scene):
         ("Coulomb coefficient", SEQUENTIAL, -3e-3, "slide-box", "position_error"),
         ("Coulomb coefficient", SEQUENTIAL, -4e-3, "turn-box-rough", "orientation_error"),
         ("linear damping", "pybullet", 3e-3, "fall-damped", "position_error"),
-        ("moment of inertia about y", "document", -3e-3, "drop-box-corner", "contact_momentum_error"),
+        ("moment of inertia about y", "wang", -3e-3, "drop-box-corner", "contact_momentum_error"),
     ],
 )
 def test_a_fault_that_opposes_the_discretisation_error_is_detected(title, name, s, scene, metric):
@@ -42,7 +42,7 @@ def test_a_fault_that_opposes_the_discretisation_error_is_detected(title, name, 
     assert ("asymptotic_error", metric, "nan") in failures(name, FAULT[title], s, scene)
 
 
-@pytest.mark.parametrize("name", ["document", "mujoco", "pybullet"])
+@pytest.mark.parametrize("name", ["wang", "mujoco", "pybullet"])
 def test_a_fault_of_size_zero_changes_no_bit(name):
     """After the start, whose quaternion an engine may report with length 1 to rounding only."""
     scene = load("drop-box-corner")

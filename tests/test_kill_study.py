@@ -33,7 +33,7 @@ acceleration = [0.0, -9.81, 0.0]
 """
 SPEC = """
 scenes = ["one.toml"]
-engines = ["document", "mujoco"]
+engines = ["wang", "mujoco"]
 dts = [0.01, 0.005]
 [random]
 count = 130
@@ -41,10 +41,10 @@ seed = 1
 "body.mass" = { from = 1.0, to = 2.0 }
 """
 COMMANDS = {
-    "run": ("run", "one.toml", "two.toml", "-e", "document", "--dt", "0.01", "-o", "out", "--resume"),
+    "run": ("run", "one.toml", "two.toml", "-e", "wang", "--dt", "0.01", "-o", "out", "--resume"),
     "sweep": ("sweep", "spec.toml", "-o", "out", "--resume"),
-    "tradeoff": ("tradeoff", "one.toml", "-e", "document", "--budget", "0.05", "-o", "out"),
-    "limits": ("limits", "one.toml", "-e", "document", "--axis", "duration", "--dt", "0.05", "-o", "out"),
+    "tradeoff": ("tradeoff", "one.toml", "-e", "wang", "--budget", "0.05", "-o", "out"),
+    "limits": ("limits", "one.toml", "-e", "wang", "--axis", "duration", "--dt", "0.05", "-o", "out"),
     "accept": ("accept", "run", "--reason", "kills", "--baseline", "out/baseline.toml"),
     "report": ("report", "out", "--plots", "svg"),
 }

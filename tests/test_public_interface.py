@@ -73,9 +73,9 @@ def test_notebook_shows_status_and_leading_error_of_each_engine():
     unsolved = ds.load("drop-box-flat")
     sideways = unsolved.starting_at(unsolved.initial_state + np.eye(13)[7])
     sideways = sideways.model_copy(update={"floor": unsolved.floor.model_copy(update={"friction": 0.3}), "expect": ()})
-    found = ds.run([named, sideways, ds.load("spin-principal")], ["document", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
+    found = ds.run([named, sideways, ds.load("spin-principal")], ["wang", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
     shown = table_of(found._repr_html_())
-    assert list(shown.columns) == ["leading error", "document", "mujoco"]
+    assert list(shown.columns) == ["leading error", "wang", "mujoco"]
     assert list(shown["leading error"]) == ["position error", "–", "orientation error"]
     for scene, unit in (("<b>fall</b>", "m"), ("spin-principal", "rad")):
         for engine in found.engines:
@@ -85,7 +85,7 @@ def test_notebook_shows_status_and_leading_error_of_each_engine():
             [value] = rows.loc[rows["dt"] == 2e-3, "value"]
             assert float(error) == pytest.approx(abs(value), rel=0.05)
             assert (status, shown_unit) == ("converges", unit)
-    assert shown.loc["drop-box-flat", "document"] == "declined"
+    assert shown.loc["drop-box-flat", "wang"] == "declined"
     assert shown.loc["drop-box-flat", "mujoco"] == "no exact solution"
     assert "<b>" not in found._repr_html_()
     assert found.leading_errors("drop-box-flat").empty
@@ -95,7 +95,7 @@ def test_notebook_shows_status_and_leading_error_of_each_engine():
 
 def test_summary_has_a_line_for_each_engine():
     """Counts of checks, and the scenes with model errors."""
-    found = ds.run(["spin-asymmetric", "fall-spin"], ["document", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
+    found = ds.run(["spin-asymmetric", "fall-spin"], ["wang", "mujoco"], dt=[8e-3, 4e-3, 2e-3])
     lines = dict(line.split(": ", 1) for line in found.summary().splitlines())
     assert tuple(lines) == found.engines
     for engine, line in lines.items():
@@ -105,7 +105,7 @@ def test_summary_has_a_line_for_each_engine():
         models = mine[(mine["kind"] == "asymptotic_error") & (mine["cause"] == "model") & (mine["value"].abs() > 1e-4)]
         named = line.partition("model errors in ")[2].rstrip(".")
         assert (named.split(", ") if named else []) == list(models["scene"].unique())
-    assert lines["document"].endswith("; model errors in spin-asymmetric.")
+    assert lines["wang"].endswith("; model errors in spin-asymmetric.")
     assert "model errors" not in lines["mujoco"]
 
 

@@ -14,6 +14,7 @@ from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissin
 from dropspin.comparisons.engines.exceptions import described
 from dropspin.comparisons.engines.npm_packages import is_npm, npm_package
 from dropspin.scenarios.errors import DropspinError, UnknownName
+from dropspin.scenarios.model import EARLIER_NAMES
 from dropspin.scenarios.validation import shown
 
 
@@ -30,7 +31,7 @@ GROUP = "dropspin.engines"
 """The entry-point group in which other packages register engines: name = "module:Class"."""
 
 BUILT_IN = {
-    "document": _Home("dropspin.comparisons.engines.document", "Document"),
+    "wang": _Home("dropspin.comparisons.engines.wang", "Wang"),
     "mujoco": _Home("dropspin.comparisons.engines.mujoco_engine", "MuJoCo", "mujoco", "pip install mujoco"),
     "pybullet": _Home(
         "dropspin.comparisons.engines.pybullet_engine",
@@ -105,7 +106,7 @@ def parsed(name: str) -> tuple[str, dict[str, str]]:
     match = re.fullmatch(r"\s*([\w.:-]+)\s*(?:\[(.*)\])?\s*", name)
     if match is None:
         raise DropspinError(f"engine {name!r}: write a name, or a name with options, such as mujoco[integrator=rk4].")
-    return match.group(1), _options(name, match.group(2) or "")
+    return EARLIER_NAMES.get(match.group(1), match.group(1)), _options(name, match.group(2) or "")
 
 
 def constructed(base: str, options: Mapping[str, str]) -> Engine:
@@ -193,7 +194,7 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
             f"engine {name!r}: {attribute}.name is {shown(given)}; "
             "give it a name for results, of letters, digits, - and _, such as 'my-engine'."
         )
-    if given in BUILT_IN:
+    if given in BUILT_IN or given in EARLIER_NAMES:
         raise DropspinError(f"engine {name!r}: {attribute}.name is {given!r}, which is a built-in engine; results need another name.")
     return adapter
 

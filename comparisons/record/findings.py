@@ -40,7 +40,7 @@ class Case(NamedTuple):
         low, high: The least and the largest size of the leading error over start phases; NaN for a scene without.
         cost: The least wall time of the steps [s per simulated second].
         median_cost: The median of the repeated timings of it.
-        relative_cost: The cost over that of a step of `document` in free flight.
+        relative_cost: The cost over that of a step of `wang` in free flight.
     """
 
     verdict: str

@@ -33,7 +33,7 @@ Row = dict[str, Any]
 TIMING_REPEATS = 5
 LONG_ENOUGH = 1.0
 """Timings of a simulation end when they have taken this long together [s]."""
-YARDSTICK, YARDSTICK_SCENE, YARDSTICK_STEPS = "document", "spin-asymmetric", 10_000
+YARDSTICK, YARDSTICK_SCENE, YARDSTICK_STEPS = "wang", "spin-asymmetric", 10_000
 """Steps of Wang's method in free flight, which take the same time whatever the time step is."""
 
 
@@ -126,7 +126,7 @@ def range_over_phases(engine: Engine, scene: Scenario, dt: float) -> Row:
 
 
 def costs(engine: Engine, scene: Scenario, dt: float) -> Row:
-    """The wall time of the steps per simulated second, and that over the time of `document`'s steps, measured in turn."""
+    """The wall time of the steps per simulated second, and that over the time of `wang`'s steps, measured in turn."""
     steps, yardstick, yardstick_scene = scene.steps(dt), engine_named(YARDSTICK), load(YARDSTICK_SCENE)
     time_steps(yardstick, yardstick_scene, dt, 1)  # compiles, and so may the engine
     if engine.compiles:

@@ -16,7 +16,7 @@ OF_DROPSPIN = frozenset({"dropspin", "code"})
 """The differences of the surroundings that are dropspin's."""
 MACHINE = {"python": "Python", "cpu": "processor", "platform": "platform"}
 NO_DIFFERENCE = "nothing that is recorded differs; the engine is not deterministic, or has changed without a new version"
-OWN_ENGINE = "document"
+OWN_ENGINE = "wang"
 """The engine that is a part of dropspin."""
 CORRECTION = "a correction of dropspin, not a change of the engine"
 

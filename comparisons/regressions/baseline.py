@@ -28,6 +28,7 @@ from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.body import Table
 from dropspin.scenarios.loading import read_toml
+from dropspin.scenarios.model import current_label
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown, validated
 
@@ -152,7 +153,7 @@ def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, s
             for step, named in steps.items():
                 assert_steps(f"{where}: results of {scene}, {engine}", step)
                 for name, content in named.items():
-                    yield (scene, engine, step, name), content
+                    yield (scene, current_label(engine), step, name), content
 
 
 def _read_line(where: str, key: tuple[str, str, str, str], content: Any, acceptances: Mapping[str, Acceptance]) -> dict[str, Any]:

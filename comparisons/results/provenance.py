@@ -51,7 +51,7 @@ def versions() -> dict[str, str | None]:
 def versions_behind(stamp: Mapping[str, Any]) -> dict[str, str]:
     """The versions that a run's results depend on: of the packages that measured them, and of the engines as they report it."""
     engines = {label.split("[")[0]: settings.get("version") for label, settings in first_settings(stamp).items()}
-    engines.pop("document", None)  # part of dropspin
+    engines.pop("wang", None)  # part of dropspin
     packages = {package: stamp["versions"][package] for package in MEASURING}
     return {name: printable(str(found)) for name, found in (packages | engines | {"python": stamp["python"]}).items() if found}
 

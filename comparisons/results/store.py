@@ -71,7 +71,11 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
     try:
         content = parsed(read_stored(Path(folder), FILE))
         if isinstance(content, dict) and content.get("format") in (FORMAT, earlier.FORMAT):
-            return _loaded(Path(folder), verified(content), content, arrays)
+            file = verified(content)
+            if file.format == earlier.FORMAT:
+                content = earlier.with_current_labels(content)
+                file = RunFile.model_validate(content)
+            return _loaded(Path(folder), file, content, arrays)
     except (OSError, ValueError, DropspinError) as error:
         detail = " ".join((f"{error.filename}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)).split())
         raise DropspinError(

@@ -18,9 +18,9 @@ from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.errors import UnknownName
 
 IN_FLIGHT = (
-    "document",
-    "document[rotation=gyroscopic]",
-    "document[rotation=rk4]",
+    "wang",
+    "wang[rotation=gyroscopic]",
+    "wang[rotation=rk4]",
     "mujoco",
     "mujoco[integrator=implicitfast]",
     "mujoco[integrator=rk4]",
@@ -28,8 +28,8 @@ IN_FLIGHT = (
     "pybullet[coordinates=multibody,velocity_clamp=kept]",
 )
 ON_A_FLOOR = (
-    "document",
-    "document[contact=sequential,law=coulomb,rotation=rk4]",
+    "wang",
+    "wang[contact=sequential,law=coulomb,rotation=rk4]",
     "mujoco",
     "pybullet",
     "pybullet[coordinates=multibody,velocity_clamp=kept]",

@@ -13,7 +13,7 @@ from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
 
 MEASURING = 1e-5
-"""Time to record and measure a step [s], beyond that of the step; 2 to 24 µs with document, mujoco and pybullet."""
+"""Time to record and measure a step [s], beyond that of the step; 2 to 24 µs with wang, mujoco and pybullet."""
 
 
 class Forecast(NamedTuple):

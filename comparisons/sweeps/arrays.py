@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dropspin import reference_impl
-from dropspin.comparisons.engines.document import Document, reference_bodies, reference_world
+from dropspin.comparisons.engines.wang import Wang, reference_bodies, reference_world
 from dropspin.comparisons.measuring.batch import motions_side_by_side
 from dropspin.comparisons.measuring.motions import Setup
 from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
@@ -45,7 +45,7 @@ def run_batch(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
         engine = group.engine_at(0)
         scene = _representative_scene(group)
         # The steps that a sequential contact leaves unsolved are reported for each job, and are counted only for a job by itself.
-        if isinstance(engine, Document) and engine.option("contact") == "mean" and scene is not None:
+        if isinstance(engine, Wang) and engine.option("contact") == "mean" and scene is not None:
             _run_group(group, indices, engine, scene, outcomes, metrics)
 
 
@@ -116,7 +116,7 @@ def _selected(given: Any, indices: Indices) -> Any:
     return None if given is None else tuple(_selected(part, indices) for part in given)
 
 
-def _run_group(jobs: Jobs, indices: Indices, engine: Document, scene: Scenario, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
+def _run_group(jobs: Jobs, indices: Indices, engine: Wang, scene: Scenario, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
     """Run the jobs of a group in order of their number of steps, as many at a time as `BATCH_BYTES` allow."""
     parameters, is_ordinary = _parameters(jobs, scene)
     is_ordinary &= _is_accepted(jobs, engine, scene)
@@ -169,7 +169,7 @@ def _batches(steps: NDArray[np.int64]) -> Iterator[slice]:
         first = last
 
 
-def _is_accepted(jobs: Jobs, engine: Document, scene: Scenario) -> NDArray[np.bool_]:
+def _is_accepted(jobs: Jobs, engine: Wang, scene: Scenario) -> NDArray[np.bool_]:
     """Which jobs have a friction that the engine's impact law supports; that depends only on whether there is friction."""
     friction = jobs.fields.get("floor.friction")
     if friction is None or friction.dtype == object:

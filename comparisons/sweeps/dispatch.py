@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropspin.comparisons.engines.document import Document
+from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.sweeps.any_engine import run_in_batches, run_single
 from dropspin.comparisons.sweeps.arrays import run_batch
 from dropspin.comparisons.sweeps.jobs import Sweep
@@ -17,7 +17,7 @@ def run_jobs(sweep: Sweep, first: int, last: int) -> Outcomes:
     found = []
     for jobs in sweep.jobs(first, last):
         outcomes = Outcomes.empty(len(jobs), len(sweep.metrics))
-        if isinstance(jobs.engine, Document):
+        if isinstance(jobs.engine, Wang):
             run_batch(jobs, outcomes, sweep.metrics)
         elif jobs.engine.steps_batches:
             run_in_batches(jobs, outcomes, sweep.metrics)

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from dropspin.comparisons.engines.document import Document
 from dropspin.comparisons.engines.stand_in import code_of
+from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.results.provenance import code, provenance, versions
 from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.inputs import EngineEntry
@@ -56,7 +56,7 @@ class Work:
     @classmethod
     def of(cls, sweep: Sweep, resources: ResourceLimits) -> "Work":
         """With the versions that are installed on this machine, and hashes of the adapters' code."""
-        adapters = {f"the adapter of {engine.label}": code_of(engine) for engine in sweep.engines if not isinstance(engine, Document)}
+        adapters = {f"the adapter of {engine.label}": code_of(engine) for engine in sweep.engines if not isinstance(engine, Wang)}
         return cls(sweep, resources, installed_versions() | adapters)
 
     @cached_property
@@ -93,7 +93,7 @@ class Work:
         swept = {axis.name: [float(value) for value in axis.representative_values] for axis in axes}
         longest = max(swept.get("duration", [scene.duration for scene in self.sweep.scenes]))
         steps = longest / min([*self.sweep.dts, *swept.get("dt", [])])
-        slow = any(not isinstance(engine, Document) for engine in self.sweep.engines) or bool(self.sweep.metrics)
+        slow = any(not isinstance(engine, Wang) for engine in self.sweep.engines) or bool(self.sweep.metrics)
         return int(min(max(PART_TIME / (JOB_TIME[slow] + STEP_TIME[slow] * steps), 1), LARGEST_PART))
 
     @property

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 SCENES = ("spin-asymmetric", "drop-ball-backspin", "drop-box-anyhow", "drop-box-sticking", "roll-ball", "slide-box", "turn-box-rough")
 """A free rotation, a ball with backspin, boxes that strike a smooth and a rough floor, a rolling ball, a sliding and a turning box."""
-ENGINES = ("document", "mujoco", "pybullet")
+ENGINES = ("wang", "mujoco", "pybullet")
 DT = 1e-3  # s
 RESOURCES = ResourceLimits(processor_time=60.0)
 FASTER = (1.001, 1.002)
@@ -52,7 +52,7 @@ def symmetries(
 
     Args:
         scenes: One scene or several: scenes, catalogue names, paths of files, or mappings; by default seven of different kinds.
-        engines: One engine or several: engines, or names with options; by default `document`, `mujoco` and `pybullet`.
+        engines: One engine or several: engines, or names with options; by default `wang`, `mujoco` and `pybullet`.
         dt: Time step [s].
         on_progress: Called with a description of the current work and the fraction of the whole study that is done, from 0 to 1, in any
             thread, but in one at a time.

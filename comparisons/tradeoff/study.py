@@ -26,20 +26,20 @@ from dropspin.scenarios import DropspinError, Scenario, truth_for
 from dropspin.scenarios.errors import UnknownName
 
 IN_FLIGHT = (
-    "document",
-    "document[rotation=gyroscopic]",
-    "document[rotation=implicit-gyroscopic]",
-    "document[rotation=midpoint]",
-    "document[rotation=rk4]",
-    "document[rotation=exact]",
+    "wang",
+    "wang[rotation=gyroscopic]",
+    "wang[rotation=implicit-gyroscopic]",
+    "wang[rotation=midpoint]",
+    "wang[rotation=rk4]",
+    "wang[rotation=exact]",
     "mujoco",
     "mujoco[integrator=implicitfast]",
     "mujoco[integrator=rk4]",
     "pybullet",
 )
 ON_A_FLOOR = (
-    "document",
-    "document[contact=sequential,law=coulomb,rotation=rk4]",
+    "wang",
+    "wang[contact=sequential,law=coulomb,rotation=rk4]",
     "mujoco",
     "mujoco[spring_steps=20]",
     "mujoco[integrator=rk4,spring_steps=20]",

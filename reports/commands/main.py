@@ -52,7 +52,7 @@ COMMANDS = {name: line for group in GROUPS.values() for name, line in group.item
 MOVED = {name.rpartition(" ")[2]: name for name in COMMANDS if " " in name}
 """The commands that were commands of their own in earlier versions."""
 CITATION = """To cite: The dropspin authors, dropspin, version {version};
-for the engine document: Huamin Wang, Rigid Body Dynamics (lecture note)."""
+for the engine wang: Huamin Wang, Rigid Body Dynamics (lecture note)."""
 """The text to cite; a test compares it with CITATION.cff."""
 LONGEST_ARGUMENT = 4096
 LONGEST_MESSAGE = 1500

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dropspin.reports.views.check import BaselineFile
     from dropspin.scenarios import Scenario
 
-CORE_ENGINES = ("document", "mujoco", "pybullet")
+CORE_ENGINES = ("wang", "mujoco", "pybullet")
 
 
 @click.command("run")

@@ -33,7 +33,7 @@ def symmetries_command(
 
     Each scene is turned, mirrored, moved, described with other body axes and in other units, and run again: in a batch, in a new
     process, on one core, and stopped and continued. If the engine has other representations of body or floor, or can simulate a second
-    body far away, these are compared too. No exact solution is needed. The default is seven scenes with document, mujoco and pybullet.
+    body far away, these are compared too. No exact solution is needed. The default is seven scenes with wang, mujoco and pybullet.
 
     Exit code: 0 whatever is found, 2 bad input; `dropspin run --symmetries` judges.
     """

@@ -5,7 +5,7 @@ from itertools import product
 from zlib import crc32
 
 # Okabe & Ito (2008), Color Universal Design: distinguishable with any colour vision, on white and on near black.
-KNOWN = {"document": ("#0072B2", "o"), "mujoco": ("#D55E00", "s"), "pybullet": ("#009E73", "D")}
+KNOWN = {"wang": ("#0072B2", "o"), "mujoco": ("#D55E00", "s"), "pybullet": ("#009E73", "D")}
 COLOURS = ("#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C", "#A6761D", "#7B5EA7", "#B33B24", "#3D8B8B")
 MARKERS = ("^", "v", "P", "X", "*")
 STYLES = tuple(product(MARKERS, COLOURS))

@@ -27,7 +27,7 @@ MOST_NAMED = 3
 """Scenes, metrics or engines that a sentence names; of more it has the number."""
 SAME_SIZE = 0.999
 """Errors count as equal from this share of the largest one on."""
-ENGINE_NAMES = {"document": "document (Wang's method)"}
+ENGINE_NAMES = {"wang": "wang (Wang's method)"}
 """Descriptive names of engines, by label, where the label is not descriptive."""
 
 

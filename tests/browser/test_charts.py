@@ -6,7 +6,7 @@ import pytest
 import dropspin as ds
 from dropspin.scenarios.mechanics import energy
 
-ENGINES = ["document", "mujoco"]
+ENGINES = ["wang", "mujoco"]
 DT = 4e-3
 
 
@@ -63,7 +63,7 @@ def test_hover_shows_the_value_of_the_run(chart, results):
     motion = results.trajectories["drop-box-corner", "mujoco", DT]
     values = energy(results.scenes["drop-box-corner"], motion)
     row = 100
-    one.press("document")
+    one.press("wang")
     one.press("exact solution")
     x, y = one.at(motion.t[row], values[row])
     one.mouse.move(x + 1, y + 2)
@@ -97,9 +97,9 @@ def test_legend_hides_and_isolates(chart):
     one.press("mujoco")
     assert one.lines() == every - {"mujoco"}
     one.press("mujoco")
-    one.press("document", modifiers=["Shift"])
-    assert one.lines() == {"document"}
-    one.press("document", modifiers=["Shift"])
+    one.press("wang", modifiers=["Shift"])
+    assert one.lines() == {"wang"}
+    one.press("wang", modifiers=["Shift"])
     assert one.lines() == every
 
 
@@ -107,12 +107,12 @@ def test_difference_from_the_exact_solution(chart, results):
     """The line is engine minus exact solution at each time, to 1e-6 of it and within a pixel on the screen; the exact solution is 0."""
     one = chart("drop-box-corner", "height [m]")
     one.press("Difference from exact")
-    motion = results.trajectories["drop-box-corner", "document", DT]
+    motion = results.trajectories["drop-box-corner", "wang", DT]
     expected = motion.position[:, 1] - ds.truth_for(results.scenes["drop-box-corner"])(motion.t).position[:, 1]
-    drawn = one.get("chart.lines.find((line) => line.label === 'document').difference")
+    drawn = one.get("chart.lines.find((line) => line.label === 'wang').difference")
     np.testing.assert_allclose(drawn, expected, rtol=1e-6, atol=1e-12)
-    scale = np.polyfit(expected, one.path("document")[:, 1], 1)
-    assert np.abs(np.polyval(scale, expected) - one.path("document")[:, 1]).max() < 1.0
+    scale = np.polyfit(expected, one.path("wang")[:, 1], 1)
+    assert np.abs(np.polyval(scale, expected) - one.path("wang")[:, 1]).max() < 1.0
     assert np.ptp(one.path("exact solution")[:, 1]) < 0.2
 
 
@@ -139,7 +139,7 @@ def test_filter_of_engines_acts_on_plots_and_replay(opened):
     shown = page.tab.evaluate(
         "document.querySelector('[data-scene=drop-box-corner] [data-replay]').viewer.motions.map((motion) => [motion.label, motion.shown])"
     )
-    assert dict(shown) == {"document": True, "mujoco": False, "exact solution": True}
+    assert dict(shown) == {"wang": True, "mujoco": False, "exact solution": True}
     page.tab.get_by_role("checkbox", name="mujoco", exact=True).first.check()
     assert "mujoco" in one.lines()
 

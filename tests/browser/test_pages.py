@@ -27,7 +27,7 @@ from dropspin.reports.sections import Section
 from dropspin.reports.views.run import overview
 from dropspin.scenarios.rotations import about, angle_between_orientations, multiply
 
-ENGINES = ["document", "mujoco", "pybullet"]
+ENGINES = ["wang", "mujoco", "pybullet"]
 PAGES = ("report.html", "replay.html")
 SCENES = (
     *("drop-ball", "drop-ball-backspin", "drop-box-anyhow", "drop-box-corner", "drop-box-edge", "fall-damped", "fall-tilted"),
@@ -236,7 +236,7 @@ def test_filters_hide_scenes_and_engines_and_count_the_rest(opened, results):
     tab.locator("#filters").get_by_label("Status").select_option("failed")
     assert [one.get_attribute("data-scene") for one in sections.all()] == ["drop-<b>failing</b>"]
     tab.locator("#filters").get_by_label("Status").select_option(LIMITED)
-    tab.get_by_role("checkbox", name="document").uncheck()
+    tab.get_by_role("checkbox", name="wang").uncheck()
     found = overview(results).statuses
     left = {scene for scene, of in found.items() if LIMITED in (of["mujoco"].words, of["pybullet"].words)}
     assert {one.get_attribute("data-scene") for one in sections.all()} == left
@@ -338,8 +338,8 @@ def test_all_results_of_a_scene_are_in_a_table_made_on_demand(opened, results):
     assert rows.count() == len(mine)
     reasons = set(section.locator("table.results td:last-child").all_inner_texts())
     assert set(mine["reason"]) - {""} <= reasons
-    page.tab.get_by_role("checkbox", name="document").uncheck()
-    assert section.locator("table.results tbody tr:visible").count() == (mine["engine"] != "document").sum()
+    page.tab.get_by_role("checkbox", name="wang").uncheck()
+    assert section.locator("table.results tbody tr:visible").count() == (mine["engine"] != "wang").sum()
 
 
 def test_starting_a_replay_moves_the_focus_to_its_controls(opened):

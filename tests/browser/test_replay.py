@@ -13,7 +13,7 @@ import dropspin as ds
 from dropspin.reports.plots.colours import engine_colours
 from dropspin.scenarios.rotations import angle_between_orientations, rotate
 
-ENGINES = ["document", "mujoco", "pybullet"]
+ENGINES = ["wang", "mujoco", "pybullet"]
 SCENES = ["drop-box-corner", "drop-box-anyhow", "spin-asymmetric", "spin-principal-500"]
 DT = 4e-3
 WEIGHT = 9.8 * DT
@@ -147,7 +147,7 @@ def test_marked_face_has_the_attitude_of_the_run(replay, results):
     """Six of eight points on the face along the body's axis z are light, where it is seen; on no other face is one."""
     shown = replay("spin-asymmetric")
     shown.home.get_by_role("radio", name="mujoco").check()
-    for label in ("document", "pybullet", "exact solution"):
+    for label in ("wang", "pybullet", "exact solution"):
         shown.home.get_by_label(f"show {label}").uncheck()
     motion = results.trajectories["spin-asymmetric", "mujoco", DT]
     half = np.array(results.scenes["spin-asymmetric"].body.half_extents)

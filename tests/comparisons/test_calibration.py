@@ -190,7 +190,7 @@ def test_spring_over_n_steps_has_the_depth_of_a_half_wave():
 @pytest.mark.parametrize(
     ("name", "given", "message"),
     [
-        ("document", {}, "document has no settings to calibrate"),
+        ("wang", {}, "wang has no settings to calibrate"),
         ("mujoco[integrator=rk4]", {}, "RK4 the adapter's one-step damper acts in all stages"),
         ("mujoco[spring_steps=20]", {"restitution": 0.0}, "a restitution of at least 0.01"),
         ("mujoco", {"restitution": 1.5}, "restitution"),

@@ -155,7 +155,7 @@ def test_cost_of_a_step_in_flight_is_without_that_of_the_call(monkeypatch, dt):
 @pytest.fixture(scope="module")
 def spin():
     """Wang's method and three other rotations, on a spin of 6 s."""
-    engines = ["document", "document[rotation=midpoint]", "document[rotation=rk4]", "document[rotation=exact]"]
+    engines = ["wang", "wang[rotation=midpoint]", "wang[rotation=rk4]", "wang[rotation=exact]"]
     return tradeoff(SPIN.model_copy(update={"duration": 6.0}), engines)
 
 
@@ -176,7 +176,7 @@ def test_errors_do_not_depend_on_the_number_of_jobs_and_costs_are_measured_alone
     monkeypatch.setattr(study, "errors_over_steps", errors_over_steps)
     monkeypatch.setattr(study, "_cost", cost_of)
     monkeypatch.setattr(errors, "MOST_STEPS", 200)
-    engines = ["mujoco[integrator=rk4]", "document[rotation=rk4]", "document[rotation=exact]"]
+    engines = ["mujoco[integrator=rk4]", "wang[rotation=rk4]", "wang[rotation=exact]"]
     one, two = (tradeoff(SHORT, engines, worlds=[2], jobs=jobs) for jobs in (1, 2))
     assert one.ladders == two.ladders
     assert [(point.engine, point.dt, point.error) for point in one.points] == [
@@ -199,7 +199,7 @@ def test_recommended_step_has_the_stated_error(spin):
 
 def test_errors_fall_by_their_order(spin):
     """Midpoint by 4 and rk4 by 16 per halved step, to a tenth of the order, where neither coarse steps nor rounding dominate."""
-    for engine, order in (("document[rotation=midpoint]", 2.0), ("document[rotation=rk4]", 4.0)):
+    for engine, order in (("wang[rotation=midpoint]", 2.0), ("wang[rotation=rk4]", 4.0)):
         mine = [point for point in spin.points if point.engine == engine and 1e-10 < point.error < 1e-3]
         slope = np.polyfit(np.log([point.dt for point in mine]), np.log([point.error for point in mine]), 1)[0]
         assert slope == pytest.approx(order, abs=0.1)
@@ -207,19 +207,19 @@ def test_errors_fall_by_their_order(spin):
 
 def test_engine_that_does_not_converge_is_left_out(spin):
     """Wang's method has no gyroscopic term: it converges to another motion."""
-    assert spin.left_out["document"].startswith("no convergence observed: orientation error is 1.")
-    [ladder] = [one for one in spin.ladders if one.engine == "document"]
+    assert spin.left_out["wang"].startswith("no convergence observed: orientation error is 1.")
+    [ladder] = [one for one in spin.ladders if one.engine == "wang"]
     coarsest, finest = (f"{1e3 * dt:.4g} ms" for dt, _ in (ladder.steps[0], ladder.steps[-1]))
-    assert spin.left_out["document"].endswith(f"at the {len(ladder.steps)} time steps tried, {coarsest} to {finest}")
-    assert {point.engine for point in spin.points} == {f"document[rotation={name}]" for name in ("midpoint", "rk4", "exact")}
+    assert spin.left_out["wang"].endswith(f"at the {len(ladder.steps)} time steps tried, {coarsest} to {finest}")
+    assert {point.engine for point in spin.points} == {f"wang[rotation={name}]" for name in ("midpoint", "rk4", "exact")}
     assert min(point.error for point in spin.points if "exact" in point.engine) < 1e-13
 
 
 def test_engine_that_conserves_the_energy_of_a_wrong_motion_is_left_out():
     """Wang's method keeps the energy of a spin that it gets wrong; midpoint keeps that of the right one."""
     short = SPIN.model_copy(update={"duration": 10.0})
-    found = tradeoff(short, ["document", "document[rotation=midpoint]", "document[rotation=rk4]"], metric="energy_error")
-    assert "no convergence observed: orientation error" in found.left_out["document"]
+    found = tradeoff(short, ["wang", "wang[rotation=midpoint]", "wang[rotation=rk4]"], metric="energy_error")
+    assert "no convergence observed: orientation error" in found.left_out["wang"]
     of = {name: [point.error for point in found.points if name in point.engine] for name in ("midpoint", "rk4")}
     assert max(of["midpoint"]) < 1e-11  # measured 1e-13, at steps of a radian too
     assert of["rk4"][0] > 1e-4
@@ -291,7 +291,7 @@ def test_ladder_ends_where_the_budget_of_processor_time_is_spent(budget):
 
 @pytest.mark.usefixtures("_processor_time_of_the_steps")
 def test_every_engine_that_was_asked_for_has_a_ladder_with_the_reason_of_its_end():
-    names = ["document[rotation=exact]", "mujoco[integrator=rk4]"]
+    names = ["wang[rotation=exact]", "mujoco[integrator=rk4]"]
     found = tradeoff(SHORT, [FirstOrder(), Aborting(), Never(), *names, names[0]], budget=0.5)
     ladders = {ladder.engine: ladder for ladder in found.ladders}
     assert {name: (one.ended, bool(one.left_out)) for name, one in ladders.items()} == {
@@ -327,7 +327,7 @@ class NoCost(Exact):
 
 
 def test_engine_whose_cost_cannot_be_measured_is_left_out_with_the_reason():
-    found = tradeoff(SHORT, [NoCost(), "document[rotation=exact]"])
+    found = tradeoff(SHORT, [NoCost(), "wang[rotation=exact]"])
     assert list(found.left_out) == ["no-cost"]
     assert "cost could not be measured" in found.left_out["no-cost"]
     with pytest.raises(DropspinError, match="no engine runs spin-asymmetric: no-cost: its cost could not be measured"):

@@ -38,7 +38,7 @@ def sound(shared):
         for command in (
             ACCEPT,
             ("sweep", "spec.toml", "-o", "sweep"),
-            ("tradeoff", "drift.toml", "-e", "document", "--budget", "0.1", "-o", "study"),
+            ("tradeoff", "drift.toml", "-e", "wang", "--budget", "0.1", "-o", "study"),
         ):
             done = dropspin(*command, cwd=folder)
             assert done.returncode == 0, done.stderr

@@ -20,14 +20,14 @@ BALL: dict[str, Any] = {
 ENSEMBLE = {"ensemble": {"size": 3, "seed": 1, "turn": 0.5, "velocity": [0.1, 0.1, 0.1]}}
 SPEC = {
     "scenes": ["ball.toml"],
-    "engines": ["document"],
+    "engines": ["wang"],
     "dts": [0.05],
     "grid": {"body.mass": [1.0, 2.0], "floor.restitution": {"from": 0.0, "to": 1.0, "count": 2}},
 }
 RANDOM = {key: value for key, value in SPEC.items() if key != "grid"} | {
     "random": {"count": 2, "seed": 1, "body.mass": {"from": 1.0, "to": 2.0, "log": True}, "start.velocity[0]": {"from": 0.0, "to": 1.0}}
 }
-RUN = ("run", "ball.toml", "-e", "document", "-e", "mujoco", "--dt", "0.02", "--dt", "0.01", "--dt", "0.005")
+RUN = ("run", "ball.toml", "-e", "wang", "-e", "mujoco", "--dt", "0.02", "--dt", "0.01", "--dt", "0.005")
 ACCEPT = ("accept", "run", "--reason", "measured", "--known-failures")
 ADAPTER = (
     "import os, sys, signal, subprocess, threading, types\nimport numpy as np\n"

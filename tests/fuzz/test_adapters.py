@@ -106,7 +106,7 @@ CHANGES = st.one_of(
 )
 CHECKS = ("claims", "declines", "builds what is meant", "repeats", "settings", "files", "bouncing ball")
 OUTPUT = ("--time-limit", "1", "-o", "out")
-RUN = ("run", "drift.toml", "-e", "mine:Mine", "-e", "document", "--dt", "0.02", *OUTPUT)
+RUN = ("run", "drift.toml", "-e", "mine:Mine", "-e", "wang", "--dt", "0.02", *OUTPUT)
 SEVERAL_STEPS = ("run", "ball.toml", "-e", "mine:Mine[method=two]", "--dt", "0.04", "--dt", "0.02", "--dt", "0.01", "--json", *OUTPUT)
 SHOW = ("show", "drift.toml", "-e", "mine:Mine")
 COMMANDS = st.sampled_from([RUN, SEVERAL_STEPS, SHOW, (*SHOW, "--json"), ("sweep", "spec.toml", *OUTPUT)])
@@ -118,7 +118,7 @@ STUDIES = st.sampled_from(
         ("calibrate", "-e", "mine:Mine", "--restitution", "0.5", "--dt", "0.02"),
     ]
 )
-SPEC = 'scenes = ["drift.toml"]\nengines = ["mine:Mine", "document"]\ndts = [0.02]\n[grid]\n"body.mass" = [1.0, 2.0]\n'
+SPEC = 'scenes = ["drift.toml"]\nengines = ["mine:Mine", "wang"]\ndts = [0.02]\n[grid]\n"body.mass" = [1.0, 2.0]\n'
 
 
 def run_with(changes, command):

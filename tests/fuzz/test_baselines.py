@@ -42,4 +42,4 @@ def test_a_run_is_judged_by_a_baseline_or_refused(sound, data):
     with surroundings() as work:
         fill(work, sound)
         (work / "baseline.toml").write_bytes(given_content)
-        run(work, "run", "ball.toml", "-e", "document", "--dt", "0.02", "-o", "out", "--baseline", "baseline.toml", outputs=["out"])
+        run(work, "run", "ball.toml", "-e", "wang", "--dt", "0.02", "-o", "out", "--baseline", "baseline.toml", outputs=["out"])

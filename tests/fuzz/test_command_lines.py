@@ -12,9 +12,9 @@ from fuzz.cases import fill, run, run_alone, surroundings
 from fuzz.strategies import NUMBERS, TEXTS
 
 SOUND = {
-    "engine_name": ["mujoco", "document", "mujoco[integrator=rk4]"],
-    "engine_names": ["mujoco", "document", "mujoco[integrator=rk4]"],
-    "engines": ["mujoco", "document"],
+    "engine_name": ["mujoco", "wang", "mujoco[integrator=rk4]"],
+    "engine_names": ["mujoco", "wang", "mujoco[integrator=rk4]"],
+    "engines": ["mujoco", "wang"],
     "scene": ["ball.toml", "spin-principal", "draw-1-001"],
     "scenes": ["ball.toml", "drift.toml"],
     "run": ["run", "run2", "sweep", "study"],

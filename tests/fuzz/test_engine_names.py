@@ -1,4 +1,4 @@
-"""Names of engines with options, such as `document[contact=sequential,rotation=exact]`, and of classes, such as `my_module:MyEngine`."""
+"""Names of engines with options, such as `wang[contact=sequential,rotation=exact]`, and of classes, such as `my_module:MyEngine`."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,7 +9,7 @@ from fuzz.cases import run, surroundings
 from fuzz.inputs import ADAPTER, BALL_FILE, DRIFT_FILE, SPEC, toml
 from fuzz.strategies import NUMBERS, TEXTS
 
-WITH_OPTIONS = ("document", "mujoco", "pybullet")
+WITH_OPTIONS = ("wang", "mujoco", "pybullet")
 SOUND = st.sampled_from(WITH_OPTIONS).flatmap(
     lambda name: st.tuples(
         st.just(name),

@@ -27,7 +27,7 @@ COMMANDS = st.sampled_from(
         (("compare", "history", "run2", "run", "-o", "out"), ("out",)),
         (("replay", "run", "--no-open"), ("run",)),
         (("accept", "run", "--reason", "r"), ("dropspin-baseline.toml",)),
-        (("run", "ball.toml", "-e", "document", "--dt", "0.02", "-o", "run", "--resume"), ("run",)),
+        (("run", "ball.toml", "-e", "wang", "--dt", "0.02", "-o", "run", "--resume"), ("run",)),
     ]
 )
 TYPES = ["int64", "float32", "str", "bool", "datetime64[ns]", "category", "object", "complex128"]

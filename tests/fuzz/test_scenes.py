@@ -49,7 +49,7 @@ def test_scenes_are_shown_or_refused(content, name, as_json):
 
 
 @cases(150)
-@given(edited(BALL | ENSEMBLE).map(toml) | WELL_TYPED, NAMES, st.sampled_from(["document", "mujoco", "pybullet"]))
+@given(edited(BALL | ENSEMBLE).map(toml) | WELL_TYPED, NAMES, st.sampled_from(["wang", "mujoco", "pybullet"]))
 def test_scenes_are_run_or_refused(content, name, engine):
     with surroundings() as work:
         (work / name).write_bytes(content)
@@ -64,7 +64,7 @@ def test_scenes_are_run_or_refused(content, name, engine):
 def test_scenes_are_studied_or_refused(content, command):
     with surroundings() as work:
         (work / "scene.toml").write_bytes(content)
-        run(work, *command, "-e", "document", "-o", "out", "scene.toml", outputs=["out"])
+        run(work, *command, "-e", "wang", "-o", "out", "scene.toml", outputs=["out"])
 
 
 @cases(120)

@@ -98,7 +98,7 @@ def test_exact_polhode_lies_on_both_ellipsoids(name):
 
 def test_polhode_shows_a_missing_and_an_explicit_gyroscopic_term():
     """The path of Wang's method is a point, explicit Euler leaves the ellipsoid, the exact rotor stays on it."""
-    scene, engines = ds.load("spin-asymmetric"), ["document", "document[rotation=gyroscopic]", "document[rotation=exact]"]
+    scene, engines = ds.load("spin-asymmetric"), ["wang", "wang[rotation=gyroscopic]", "wang[rotation=exact]"]
     results = ds.run(scene, engines, dt=0.1)
     found = spins_of(results, scene.name)
     still, euler, exact = (found[engine] for engine in engines)
@@ -175,7 +175,7 @@ def test_error_over_time_has_gaps_at_impacts_and_the_metric_as_maximum():
     found = line(axes, "made")[1]
     assert np.nanmax(found) < 1e-12  # a spike would be 1 - e² = 0.75
     assert np.isnan(found).sum() > 0.25 * len(found)
-    results = ds.run("spin-asymmetric", ["mujoco", "document"], dt=[4e-2, 2e-2])
+    results = ds.run("spin-asymmetric", ["mujoco", "wang"], dt=[4e-2, 2e-2])
     for metric in ("energy_error", "orientation_error", "angular_momentum_error", "angular_momentum_direction_error"):
         axes = axes_of()
         plots.plot_error_growth(results, "spin-asymmetric", metric, axes)
@@ -205,7 +205,7 @@ def ensemble():
     """A run with an ensemble of five starts."""
     scene = ds.load("drop-box-anyhow")
     few = scene.model_copy(update={"ensemble": scene.ensemble.model_copy(update={"size": 5}), "expect": (), "duration": 0.6})
-    return ds.run(few, ["document", "mujoco"], dt=4e-3)
+    return ds.run(few, ["wang", "mujoco"], dt=4e-3)
 
 
 def test_angular_momentum_of_an_ensemble(ensemble):
@@ -267,7 +267,7 @@ def test_impacts_are_drawn_as_lines_and_not_as_envelopes():
 @pytest.mark.parametrize("count", [3, 9, 20, 40])
 def test_engines_have_colours_and_markers_of_their_own(count):
     """Up to 40 engines differ in the pair, up to 8 besides the built-in ones in the colour; another set gives an engine the same style."""
-    labels = [f"document[rotation={number}]" for number in range(count - 1)]
+    labels = [f"wang[rotation={number}]" for number in range(count - 1)]
     styles = engine_styles(["mujoco", *labels])
     assert len(set(styles.values())) == count
     if count <= 9:

@@ -29,7 +29,7 @@ def folder(shared):
     """The data of a run: the impact of a corner, a free tumble and a ball, at two time steps."""
 
     def make(folder):
-        save(ds.run(["drop-box-corner", "spin-asymmetric", "drop-ball"], ["document", "mujoco"], dt=[4e-3, 2e-3]), folder)
+        save(ds.run(["drop-box-corner", "spin-asymmetric", "drop-ball"], ["wang", "mujoco"], dt=[4e-3, 2e-3]), folder)
 
     return shared("replay-run", make)
 
@@ -142,11 +142,11 @@ def test_scene_without_floor_has_no_impulses(results):
 
 
 def test_motion_of_a_diverged_engine_ends_at_its_last_finite_state(results):
-    key = ("spin-asymmetric", "document", 4e-3)
+    key = ("spin-asymmetric", "wang", 4e-3)
     motion = results.trajectories[key]
     broken = replace(motion, position=np.where(motion.t[:, None] < 1.0, motion.position, np.nan))
     replay = replay_of(replace(results, trajectories={**results.trajectories, key: broken}), "spin-asymmetric")
-    ended = next(one for one in replay.motions if one.label == "document")
+    ended = next(one for one in replay.motions if one.label == "wang")
     assert ended.frames.t[-1] == pytest.approx(1.0, abs=replay.interval)
 
 

@@ -21,7 +21,7 @@ LARGEST = float(np.finfo(np.float32).max)
 @pytest.fixture(scope="module")
 def results():
     """The impact of a corner, a free tumble and a ball."""
-    return ds.run(["drop-box-corner", "spin-asymmetric", "drop-ball"], ["document", "mujoco"], dt=4e-3)
+    return ds.run(["drop-box-corner", "spin-asymmetric", "drop-ball"], ["wang", "mujoco"], dt=4e-3)
 
 
 def decoded(column, count):
@@ -97,13 +97,13 @@ def test_turns_between_frames_are_counted_from_the_rounded_attitudes():
 
 def test_motion_that_flies_off_does_not_blur_the_others(results):
     """Its positions are stored as floats of 32 bits, up to the largest one; the view covers those that stay."""
-    key = ("drop-ball", "document", 4e-3)
+    key = ("drop-ball", "wang", 4e-3)
     motion = results.trajectories[key]
     away = np.where(motion.t > 0.3, 2.0 ** np.minimum(10.0 * (motion.t - 0.3) / 4e-3, 900.0), 0.0)
     flown = replace(motion, position=motion.position + away[:, None] * [1.0, 0.0, 0.0])
     replay = replay_of(replace(results, trajectories={**results.trajectories, key: flown}), "drop-ball")
     assert 1.0 < replay.sight < 30.0
-    data = next(one for one in as_data(replay)["motions"] if one["label"] == "document")
+    data = next(one for one in as_data(replay)["motions"] if one["label"] == "wang")
     times, position, _, _ = shown(data, replay.interval)
     kept = flown.position[np.rint(times / 4e-3).astype(int)]
     np.testing.assert_allclose(position[:, 0], np.minimum(kept[:, 0], LARGEST), rtol=2.0**-23)

@@ -178,21 +178,24 @@ def test_a_loaded_run_equals_the_one_that_was_saved(results, folder):
     assert list(csv.columns) == list(results.table.columns)
 
 
-def test_a_run_of_the_earlier_format_is_read(folder, tmp_path):
-    """Format 5 had no column for the basis of a verdict, which was the beginning of its reason."""
+def test_a_run_of_the_earlier_format_is_read(tmp_path):
+    """Format 5 had no column for the basis of a verdict, which was the beginning of its reason, and another name for the engine `wang`."""
+    folder = write_report(run("spin-asymmetric", ["wang[rotation=rk4]", "wang"], [8e-3, 4e-3]), tmp_path / "run").parent
     old = shutil.copytree(folder, tmp_path / "old")
     rows = pd.read_parquet(old / "results.parquet").drop(columns="basis")
     rows.loc[0, ["verdict", "reason"]] = "passed", "the known fault does not occur; its expectation can be removed: why"
+    rows[["engine", "truth"]] = rows[["engine", "truth"]].replace({"wang": "document", "wang[rotation=rk4]": "document[rotation=rk4]"})
     rows.to_parquet(old / "results.parquet", index=False)
-    content = json.loads((old / "run.json").read_text(encoding="utf-8"))
+    content = json.loads((old / "run.json").read_text(encoding="utf-8").replace('"wang', '"document'))
     content["sha256"]["results.parquet"] = hashlib.sha256((old / "results.parquet").read_bytes()).hexdigest()
     del content["sha256"]["run.json"]
     (old / "run.json").write_text(signed(content | {"format": 5}), encoding="utf-8")
-    again = load_results(old)
+    again, other, judged = load_results(old), load_results(folder), ["basis", "verdict", "reason"]
     assert again.table.loc[0, "basis"] == "fault_absent"
-    pd.testing.assert_frame_equal(
-        again.table.drop(columns=["basis", "verdict", "reason"]), load_results(folder).table.drop(columns=["basis", "verdict", "reason"])
-    )
+    assert again.engines == other.engines
+    assert again.trajectories.keys() == other.trajectories.keys()
+    for name in ("table", "agreements"):
+        pd.testing.assert_frame_equal(getattr(again, name).drop(columns=judged), getattr(other, name).drop(columns=judged))
 
 
 def test_run_json_holds_the_provenance(folder):
@@ -324,7 +327,7 @@ def test_markdown_cells_hold_anything():
 @pytest.fixture(scope="module")
 def studied():
     """A run at three time steps, with an engine that has a model error, and its page."""
-    found = run("spin-asymmetric", ["document", "mujoco"], [8e-3, 4e-3, 2e-3])
+    found = run("spin-asymmetric", ["wang", "mujoco"], [8e-3, 4e-3, 2e-3])
     return found, html_report(found, overview(found))
 
 
@@ -346,7 +349,7 @@ def test_the_terminal_shows_orders_and_asymptotic_errors(studied, capsys):
 
     print_table(studied[0], Console(width=200, no_color=True))
     text = capsys.readouterr().out
-    assert "as dt → 0, document: angular momentum error → 0.736" in text
+    assert "as dt → 0, wang: angular momentum error → 0.736" in text
     assert re.search(r"as dt → 0, mujoco: orders 0\.99 to 1\.02|as dt → 0, mujoco: orders? 1\.0", text)
 
 

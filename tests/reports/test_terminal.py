@@ -99,7 +99,7 @@ def test_failing_scene_stays_when_others_are_left_out(core, capsys):
 @pytest.mark.parametrize("width", [40, 60, 80, 160])
 def test_matrix_of_many_engines_drops_the_errors_before_it_breaks_a_number(core, capsys, width):
     """Numbers stand for long names."""
-    labels = {"document": "document[rotation=implicit-gyroscopic]", "pybullet": "pybullet[coordinates=multibody]"}
+    labels = {"wang": "wang[rotation=implicit-gyroscopic]", "pybullet": "pybullet[coordinates=multibody]"}
     renamed = replace(
         core,
         engines=tuple(labels.get(engine, engine) for engine in core.engines),
@@ -108,7 +108,7 @@ def test_matrix_of_many_engines_drops_the_errors_before_it_breaks_a_number(core,
     lines = printed(renamed, capsys, width)
     assert max(map(len, lines)) <= width
     text = "\n".join(lines)
-    assert ("1 document[rotation=implicit-gyroscopic]" in text) == (width < 160)
+    assert ("1 wang[rotation=implicit-gyroscopic]" in text) == (width < 160)
     assert ("Errors are not shown at this width" in " ".join(text.split())) == (width < 80)
 
 
@@ -120,7 +120,7 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
     largest = known[known["value"] > 0.999 * known["value"].max()]
     assert set(largest["metric"]) == {"orientation_error"}
     scenes = " and ".join(largest["scene"])
-    assert f"; largest error orientation {largest['value'].max():.3g} rad at dt = 1 ms in {scenes}; " in of["document"][0]
+    assert f"; largest error orientation {largest['value'].max():.3g} rad at dt = 1 ms in {scenes}; " in of["wang"][0]
     assert "largest error orientation" in of["pybullet"][0]  # a known limitation, in scenes whose slip turns
     for engine in core.engines:
         words = [by_engine[engine].words for by_engine in core.statuses().values()]
@@ -128,10 +128,10 @@ def test_each_engine_has_one_sentence_with_numbers_of_the_results(core):
         assert (f", declines {words.count('declined')};" in of[engine][0]) == ("declined" in words)
         for status in set(words) - {"converges", "declined"}:
             assert f"{status} in {words.count(status)}" in of[engine][0]
-    assert of["document"][0].endswith(" ns per step.")
+    assert of["wang"][0].endswith(" ns per step.")
     for engine in ("mujoco", "pybullet"):
-        seconds, ratio = re.search(r"; ([\d.]+) µs per step, ([\d.]+) times that of document\.$", of[engine][0]).groups()
-        fastest = float(re.search(r"([\d.]+) ns per", of["document"][0])[1])
+        seconds, ratio = re.search(r"; ([\d.]+) µs per step, ([\d.]+) times that of wang\.$", of[engine][0]).groups()
+        fastest = float(re.search(r"([\d.]+) ns per", of["wang"][0])[1])
         assert float(ratio) * fastest == pytest.approx(1e3 * float(seconds), rel=0.1)
 
 

@@ -7,7 +7,7 @@ import pytest
 from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.scenarios import load, names
 
-NAMES = {engine: engine for engine in BUILT_IN} | {"document": "wang", "pybullet": "bullet"}
+NAMES = {engine: engine for engine in BUILT_IN} | {"wang": "wang", "pybullet": "bullet"}
 """What a text calls an engine, in lower case."""
 
 

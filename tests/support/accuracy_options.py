@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from dropspin.comparisons.engines.base import Engine, NumericOption, Simulation
-from dropspin.comparisons.engines.document import Document
+from dropspin.comparisons.engines.wang import Wang
 from dropspin.scenarios.rotations import cross, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 
@@ -113,7 +113,7 @@ class Substepped(Simulation):
 
 
 @dataclass(frozen=True)
-class Substeps(Document):
+class Substeps(Wang):
     """A fixed number of sub-steps a step, by methods without a model error in scenes that do not need an exact impact."""
 
     name = "substeps"

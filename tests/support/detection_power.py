@@ -139,9 +139,9 @@ FAULTS = (
     SizedFault("angular damping", changed(partial(with_damping_rates, angular=1.0)), ("spin-damped",)),
     SizedFault("time step", wrong_step, ("fall-spin", "drop-ball")),
 )
-SEQUENTIAL = "document[contact=sequential,law=coulomb,rotation=rk4]"
-ENGINES = ("exact", "document", SEQUENTIAL, "mujoco", "pybullet")
-NOT_EXPRESSED = {("gyroscopic term", "document")}  # eq 6 of Wang's method has no such term
+SEQUENTIAL = "wang[contact=sequential,law=coulomb,rotation=rk4]"
+ENGINES = ("exact", "wang", SEQUENTIAL, "mujoco", "pybullet")
+NOT_EXPRESSED = {("gyroscopic term", "wang")}  # eq 6 of Wang's method has no such term
 
 
 def sound_engine(name: str) -> Engine:

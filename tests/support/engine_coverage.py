@@ -53,12 +53,12 @@ def with_moments(factor: float) -> Callable[[Scenario], Scenario]:
 
 
 FLIGHT = ("mujoco", "pybullet")
-BOUNCES = (("drop-ball", "drop-ball-dull", "drop-box-flat"), ("document",))
+BOUNCES = (("drop-ball", "drop-ball-dull", "drop-box-flat"), ("wang",))
 KINDS = (
     Kind("restitution", lambda factor: with_restitution(lambda e: factor * e), (BOUNCES,)),
-    Kind("gravity", lambda factor: with_gravity(factor * np.eye(3)), (BOUNCES, (("fall-spin", "fall-damped"), ("document", *FLIGHT)))),
+    Kind("gravity", lambda factor: with_gravity(factor * np.eye(3)), (BOUNCES, (("fall-spin", "fall-damped"), ("wang", *FLIGHT)))),
     Kind("inertia", with_moments, ((("spin-asymmetric", "spin-damped", "spin-coin"), FLIGHT),)),
-    Kind("friction", with_coefficient, ((("slide-box",), ("document[law=coulomb]", "pybullet")), (("turn-box-rough",), ("pybullet",)))),
+    Kind("friction", with_coefficient, ((("slide-box",), ("wang[law=coulomb]", "pybullet")), (("turn-box-rough",), ("pybullet",)))),
 )
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from dropspin.comparisons.engines.base import Simulation
-from dropspin.comparisons.engines.document import DocumentSimulation
 from dropspin.comparisons.engines.mujoco_simulation import MuJoCoSimulation
 from dropspin.comparisons.engines.pybullet_simulation import PyBulletSimulation
+from dropspin.comparisons.engines.wang import WangSimulation
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, VELOCITY
 from support.fault_suite import Made, WrongRotor
@@ -30,7 +30,7 @@ def turn_pybullet(simulation, added, axes):
     simulation._bullet.resetBaseVelocity(body, state[VELOCITY].tolist(), turned.tolist(), physicsClientId=client)
 
 
-TURNS = {DocumentSimulation: turn_document, MuJoCoSimulation: turn_mujoco, PyBulletSimulation: turn_pybullet}
+TURNS = {WangSimulation: turn_document, MuJoCoSimulation: turn_mujoco, PyBulletSimulation: turn_pybullet}
 
 
 class WrongGyroscope(Simulation):

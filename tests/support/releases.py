@@ -21,7 +21,7 @@ class Candidate(Engine):
     """An engine of a library under test."""
 
     name = "candidate"
-    inner = "document[rotation=rk4]"
+    inner = "wang[rotation=rk4]"
 
     def order_in(self, scene):
         return None
@@ -55,14 +55,14 @@ class WithoutGyroscopicTerm(Candidate):
     """The update of the spin in Wang's method, which has no gyroscopic torque."""
 
     name = "without-gyroscopic-term"
-    inner = "document"
+    inner = "wang"
 
 
 class Euler(Candidate):
     """Semi-implicit Euler in the place of Runge-Kutta."""
 
     name = "euler"
-    inner = "document[rotation=gyroscopic]"
+    inner = "wang[rotation=gyroscopic]"
 
 
 class OnAnotherMachine(Candidate):

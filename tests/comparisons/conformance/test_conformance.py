@@ -17,9 +17,9 @@ from dropspin.comparisons.conformance.clock import check_velocity_lag
 from dropspin.comparisons.conformance.outcomes import CheckFailed
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import KnownLimitation, Simulation
-from dropspin.comparisons.engines.document import Document
 from dropspin.comparisons.engines.pybullet_engine import PyBullet
 from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.running import recording
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.recording import time_steps
@@ -62,9 +62,9 @@ def test_documented_adapter_passes_and_is_short():
 @pytest.mark.parametrize(
     ("name", "noted"),
     [
-        ("document", {"tumbling", "tumbling askew", "corner"}),
-        pytest.param("document[law=coulomb,rotation=exact]", set(), marks=pytest.mark.slow),
-        pytest.param("document[rotation=rk4]", {"corner"}, marks=pytest.mark.slow),
+        ("wang", {"tumbling", "tumbling askew", "corner"}),
+        pytest.param("wang[law=coulomb,rotation=exact]", set(), marks=pytest.mark.slow),
+        pytest.param("wang[rotation=rk4]", {"corner"}, marks=pytest.mark.slow),
         ("mujoco", {"slippery floor", "sliding box"}),
         pytest.param("mujoco[integrator=rk4]", set(), marks=pytest.mark.slow),
         pytest.param("mujoco[integrator=implicitfast]", {"slippery floor", "sliding box"}, marks=pytest.mark.slow),
@@ -371,7 +371,7 @@ def test_friction_fault_exceeds_the_known_limitation(factor, monkeypatch):
 
 def test_unknown_check_suggests_the_nearest_name():
     with pytest.raises(UnknownName, match="Did you mean 'bouncing ball'"):
-        conform(engine("document"), checks=["bounce ball"])
+        conform(engine("wang"), checks=["bounce ball"])
 
 
 BATCHES = {
@@ -441,14 +441,14 @@ def test_engine_without_batches_declines_their_check():
 
 @pytest.mark.parametrize(("attribute", "member", "scene"), [("friction", 2, "slippery-floor"), ("rest_speed", 3, "corner")])
 def test_batch_with_a_number_of_its_first_scene_fails(attribute, member, scene):
-    class First(Document):
+    class First(Wang):
         def prepare_batch(self, members, dt):
             number = members[0].floor and {attribute: getattr(members[0].floor, attribute)}
             floors = [one.floor and one.floor.model_copy(update=number) for one in members]
             same = [one.model_copy(update={"floor": floor}) for one, floor in zip(members, floors, strict=True)]
             return super().prepare_batch(same, dt)
 
-    sound, faulty = (kind({"law": "coulomb"}) for kind in (Document, First))
+    sound, faulty = (kind({"law": "coulomb"}) for kind in (Wang, First))
     assert not_passed(sound, "batches") == {}
     [(_, message)] = not_passed(faulty, "batches").values()
     assert message.startswith(f"simulation {member} differs from the same one by itself from step ")

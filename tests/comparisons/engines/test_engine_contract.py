@@ -17,7 +17,7 @@ from dropspin.comparisons.running.verification import verify_build
 from dropspin.scenarios import DropspinError, UnknownName
 
 ENGINES = [
-    "document", "mujoco", "mujoco[integrator=rk4]", "mujoco[integrator=implicitfast]", "mujoco[profile=default]",
+    "wang", "mujoco", "mujoco[integrator=rk4]", "mujoco[integrator=implicitfast]", "mujoco[profile=default]",
     "mujoco[kappa=0.002]", "mujoco[spring_steps=20]", "mujoco[integrator=rk4,spring_steps=20]",
     "pybullet", "pybullet[coordinates=multibody]", "pybullet[profile=default]",
     "rapier", "dart", "drake",
@@ -37,10 +37,10 @@ def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
             return
         of_its_own = name == "rapier" or (name == "drake" and scene.floor.restitution > 0.0)
         undamped = "spring_steps" in name and scene.floor.restitution == 0.0
-        coulomb = name == "document" and scene.floor.friction not in ("none", "infinite")
+        coulomb = name == "wang" and scene.floor.friction not in ("none", "infinite")
         products = name.startswith("pybullet") and scene.name == "fall-tilted"
         corners = name == "dart" and scene.body.shape == "vertices"
-        threshold = scene.floor is not None and scene.floor.rest_speed > 0.0 and not name.startswith(("document", "pybullet"))
+        threshold = scene.floor is not None and scene.floor.rest_speed > 0.0 and not name.startswith(("wang", "pybullet"))
         assert stages or of_its_own or undamped or coulomb or products or corners or threshold
         return
     dt = 2e-3
@@ -118,7 +118,7 @@ def box_in_flight():
     }
 
 
-@pytest.mark.parametrize(("name", "tolerance"), [("document", 1e-12), ("pybullet", 1e-12), ("mujoco", 1e-3)])
+@pytest.mark.parametrize(("name", "tolerance"), [("wang", 1e-12), ("pybullet", 1e-12), ("mujoco", 1e-3)])
 def test_damping_decays_exponentially(name, tolerance):
     """v(1 s) = v₀ exp(-rate); MuJoCo damps implicitly, hence to first order in dt = 1 ms (measured 2.5e-4, 8e-4)."""
     motion = simulate(scenarios.load(box_in_flight()), name, 1e-3)
@@ -146,7 +146,7 @@ def prism(count=8, half_length=0.1, **more):
     return scenarios.load({"duration": 0.5, "body": body, "start": start, "gravity": gravity, "floor": floor} | more)
 
 
-@pytest.mark.parametrize("name", ["document", "mujoco", "pybullet", "pybullet[floor=box]"])
+@pytest.mark.parametrize("name", ["wang", "mujoco", "pybullet", "pybullet[floor=box]"])
 def test_body_of_vertices_lands_flat(name):
     """It rebounds at half its speed (MuJoCo's impedance costs 6e-5) and does not turn (measured 3e-7 rad, on PyBullet's box)."""
     motion = simulate(prism(), name, 1e-3)
@@ -179,13 +179,13 @@ def test_engines_decline_scenes_with_a_reason():
     ball = scenarios.load("drop-ball")
     coulomb = ball.model_copy(update={"floor": ball.floor.model_copy(update={"friction": 0.3})})
     slow = ball.model_copy(update={"floor": ball.floor.model_copy(update={"rest_speed": 0.1})})
-    assert "Coulomb" in engine("document").declines(coulomb)
+    assert "Coulomb" in engine("wang").declines(coulomb)
     assert engine("mujoco").declines(coulomb) is None
     assert engine("pybullet").declines(coulomb) is None
     assert "rest_speed" in engine("mujoco").declines(slow)
     assert engine("pybullet").declines(slow) is None
-    with pytest.raises(DropspinError, match="document declines drop-ball: law=note has no Coulomb coefficient"):
-        simulate(coulomb, "document", 1e-3)
+    with pytest.raises(DropspinError, match="wang declines drop-ball: law=note has no Coulomb coefficient"):
+        simulate(coulomb, "wang", 1e-3)
 
 
 def test_labels_are_canonical_and_unknown_options_get_suggestions():
@@ -193,7 +193,7 @@ def test_labels_are_canonical_and_unknown_options_get_suggestions():
     assert engine("mujoco[integrator=euler]").label == "mujoco"
     assert engine(" mujoco[ integrator = rk4 ]").label == "mujoco[integrator=rk4]"
     extras = ["rapier", "rapier-js", "dart", "drake", "sapien", "exudyn", "jsbsim", "mjx", "mujoco-warp", "newton", "genesis"]
-    assert engine_names() == ["document", "mujoco", "pybullet", *extras]
+    assert engine_names() == ["wang", "mujoco", "pybullet", *extras]
     with pytest.raises(DropspinError, match=r"engine 'mujco' is unknown\. Did you mean 'mujoco'"):
         engine("mujco")
     with pytest.raises(UnknownName, match=r"mujoco's option 'integrater' is unknown\. Did you mean 'integrator'"):

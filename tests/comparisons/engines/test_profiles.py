@@ -99,8 +99,8 @@ def test_error_of_the_defaults_alone_is_a_setting_error():
 
 
 def test_engine_without_profiles_keeps_its_model_errors():
-    found = run(SPIN, ["document", "mujoco", "mujoco[profile=default]"])
-    assert set(found.asymptotic_errors("model")["engine"]) == {"document"}
+    found = run(SPIN, ["wang", "mujoco", "mujoco[profile=default]"])
+    assert set(found.asymptotic_errors("model")["engine"]) == {"wang"}
     assert found.asymptotic_errors("setting").empty  # free spin has no settings to get wrong in MuJoCo
 
 

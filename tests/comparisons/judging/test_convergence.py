@@ -25,16 +25,16 @@ def run(scene, engine, dts=STEPS):
 @pytest.mark.parametrize(
     ("engine", "cause", "order"),
     [
-        ("document", "model", None),
-        ("document[rotation=gyroscopic]", "discretisation", 1),
-        ("document[rotation=implicit-gyroscopic]", "discretisation", 1),
+        ("wang", "model", None),
+        ("wang[rotation=gyroscopic]", "discretisation", 1),
+        ("wang[rotation=implicit-gyroscopic]", "discretisation", 1),
         ("mujoco", "discretisation", 1),
         ("mujoco[integrator=implicitfast]", "discretisation", 1),
         ("pybullet", "discretisation", 1),
-        ("document[rotation=midpoint]", "discretisation", 2),
+        ("wang[rotation=midpoint]", "discretisation", 2),
         ("mujoco[integrator=rk4]", "discretisation", 4),
-        ("document[rotation=rk4]", "discretisation", 4),
-        ("document[rotation=exact]", "rounding", None),
+        ("wang[rotation=rk4]", "discretisation", 4),
+        ("wang[rotation=exact]", "rounding", None),
     ],
 )
 def test_cause_and_order_of_the_attitude_error_are_those_of_the_method(engine, cause, order):
@@ -190,8 +190,8 @@ def test_exact_engine_has_rounding_errors_only():
 
 
 def test_known_fault_is_allowed_for_the_named_engine_only(core_run):
-    """The plateau is expected of `document`; the same plateau of another engine fails."""
-    table = ds.load_results(core_run, arrays=False).table.query("scene == 'spin-asymmetric' and engine == 'document'")
+    """The plateau is expected of `wang`; the same plateau of another engine fails."""
+    table = ds.load_results(core_run, arrays=False).table.query("scene == 'spin-asymmetric' and engine == 'wang'")
     [known] = table.query("metric == 'angular_momentum_direction_error' and kind == 'asymptotic_error'").to_dict("records")
     assert (known["cause"], known["verdict"]) == ("model", "known")
     assert "fault of Wang's method" in known["reason"]
@@ -204,9 +204,9 @@ def test_known_fault_is_allowed_for_the_named_engine_only(core_run):
 @pytest.mark.parametrize(
     ("scene", "engine"),
     [
-        ("spin-asymmetric", "document[rotation=rk4]"),
-        ("spin-dzhanibekov", "document[rotation=symmetric-top]"),
-        ("spin-damped", "document[rotation=rk4]"),
+        ("spin-asymmetric", "wang[rotation=rk4]"),
+        ("spin-dzhanibekov", "wang[rotation=symmetric-top]"),
+        ("spin-damped", "wang[rotation=rk4]"),
     ],
 )
 def test_method_of_the_project_raises_no_false_alarm(scene, engine):
@@ -215,7 +215,7 @@ def test_method_of_the_project_raises_no_false_alarm(scene, engine):
 
 
 def test_lost_attitude_is_a_known_fault_and_does_not_pass():
-    table = ds.run("spin-principal-500", "document").table
+    table = ds.run("spin-principal-500", "wang").table
     [row] = table[(table["metric"] == "orientation_error") & (table["kind"] == "truth") & (table["dt"] == 1e-3)].to_dict("records")
     assert row["value"] == pytest.approx(math.pi, abs=1e-3)
     assert row["verdict"] == "known"

@@ -145,7 +145,7 @@ def test_known_limitation_excuses_failures_of_its_metric_and_size_only():
         ({"metric": "restitution_error"}, r"restitution_error'; it needs an exact solution with an impact, which this scene does not have"),
         ({"metric": "energy_error", "engine": "mujocco"}, r"^scene\['expect'\]\[0\]\['engine'\]: got 'mujocco'; no such engine\..*mujoco"),
         ({"metric": "energy_error", "engine": "mujoco[integrator=euler]"}, r"write it as 'mujoco', as the results do"),
-        ({"metric": "energy_error", "engine": "document[law=nune]"}, r"document\[law=nune\]'; .*nune"),
+        ({"metric": "energy_error", "engine": "wang[law=nune]"}, r"wang\[law=nune\]'; .*nune"),
     ],
 )
 def test_expectation_that_cannot_be_judged_is_refused(expectation, message):

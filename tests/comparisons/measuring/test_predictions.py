@@ -11,7 +11,7 @@ from dropspin import scenarios
 from dropspin.scenarios import discrete_flight, load
 from dropspin.scenarios.state import PARTS
 
-ENGINES = ["document", "document[rotation=exact]", "mujoco", "pybullet"]
+ENGINES = ["wang", "wang[rotation=exact]", "mujoco", "pybullet"]
 FREE = [name for name in QUICK if load(name).floor is None]
 
 
@@ -24,7 +24,7 @@ def flat():
 @pytest.fixture(scope="module")
 def rows(core_run):
     """The measurements and predictions of all scenes that have predictions, with all engines."""
-    runs = ds.load_results(core_run, arrays=False), ds.run(FREE, "document[rotation=exact]", [4e-3, 1e-3])
+    runs = ds.load_results(core_run, arrays=False), ds.run(FREE, "wang[rotation=exact]", [4e-3, 1e-3])
     return tuple(pd.concat([getattr(one, kind) for one in runs], ignore_index=True) for kind in ("measurements", "predictions"))
 
 
@@ -35,12 +35,12 @@ def measured_and_predicted(rows, names, dts):
 
 
 def test_errors_in_flight_are_the_predicted_ones(rows):
-    """All errors of `document`, and of the others where the spin is steady, to a relative 1e-6 or to 1e-9 (measured 2e-10): 250 values."""
+    """All errors of `wang`, and of the others where the spin is steady, to a relative 1e-6 or to 1e-9 (measured 2e-10): 250 values."""
     measured, predicted = measured_and_predicted(rows, FREE, [4e-3, 1e-3])
     assert len(predicted) > 250
     assert set(predicted.index.get_level_values("engine")) == set(ENGINES)
     np.testing.assert_allclose(measured, predicted, rtol=1e-6, atol=1e-9)
-    note = predicted.xs(("spin-asymmetric", "document", 1e-3), level=("scene", "engine", "dt"))
+    note = predicted.xs(("spin-asymmetric", "wang", 1e-3), level=("scene", "engine", "dt"))
     assert note["angular_momentum_direction_error"] == pytest.approx(0.7532, abs=1e-4)  # a model error, predicted like any other
 
 
@@ -87,9 +87,9 @@ def test_discrete_flight_equals_the_recursion():
 
 
 def test_no_prediction_without_theory():
-    """A tumbling body (except with `document`), oblique impacts, Runge-Kutta, and steps in which Bullet limits the rotation."""
+    """A tumbling body (except with `wang`), oblique impacts, Runge-Kutta, and steps in which Bullet limits the rotation."""
     tumble, corner, fast = load("spin-asymmetric"), load("drop-box-corner"), load("spin-principal-500")
-    for name in ("document[rotation=exact]", "mujoco", "pybullet"):
+    for name in ("wang[rotation=exact]", "mujoco", "pybullet"):
         assert ds.engine(name).predicted_error(tumble, scenarios.truth_for(tumble), "orientation_error", 1e-3) is None
     for name in ENGINES:
         assert ds.engine(name).predicted_error(corner, scenarios.truth_for(corner), "restitution_error", 1e-3) is None

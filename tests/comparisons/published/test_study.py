@@ -120,9 +120,9 @@ CHANGED_DIGIT = {"printed": ("0.0130709", "0.012462", "0.049")}
 @pytest.mark.parametrize(
     ("name", "tool", "case", "changes"),
     [
-        ("gazebo-boxes", "ODE", "1 ms", {"by": "document[rotation=implicit-gyroscopic]"}),
+        ("gazebo-boxes", "ODE", "1 ms", {"by": "wang[rotation=implicit-gyroscopic]"}),
         ("gazebo-boxes", "ODE", "1 ms", {"by": "mujoco"}),  # the rotation by the exponential map: 0.0130698
-        ("gazebo-boxes", "Bullet", "1 ms", {"by": "document[rotation=implicit-gyroscopic]"}),
+        ("gazebo-boxes", "Bullet", "1 ms", {"by": "wang[rotation=implicit-gyroscopic]"}),
         ("simbenchmark-bouncing", "ODE", "10 ms", {"by": "pybullet[coordinates=multibody]"}),
         ("fmi-bouncing-ball", "FMU", "", {"by": "mujoco[integrator=rk4]"}),
         ("newton-verification", "e = 0.5", "", {"by": "pybullet[profile=default]"}),
@@ -178,7 +178,7 @@ def test_a_missing_engine_costs_its_rows_only(why_not, outcome, monkeypatch):
 
 
 def test_an_engine_that_breaks_down_has_exit_code_3(monkeypatch):
-    monkeypatch.setattr(study, "sources", lambda names: [only("gazebo-boxes", "DART", "1 ms", by="document", why_not="")])
+    monkeypatch.setattr(study, "sources", lambda names: [only("gazebo-boxes", "DART", "1 ms", by="wang", why_not="")])
     monkeypatch.setattr(study, "_measured", breaking)
     results = study.reproduce(resources=ResourceLimits(processor_time=5.0))
     assert {(one.status, one.verdict, one.here) for one in results} == {("not run", "crashed", "")}

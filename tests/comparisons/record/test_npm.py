@@ -14,7 +14,7 @@ NPM = Plan.model_validate(
     {
         "dts": [0.01],
         "scenes": ["spin-principal"],
-        "engines": {"document": {"package": "@scope/engine", "oldest": "1.0", "labels": ["document"]}},
+        "engines": {"wang": {"package": "@scope/engine", "oldest": "1.0", "labels": ["wang"]}},
     }
 )
 NO_VERSION = """npm error code ETARGET
@@ -50,19 +50,19 @@ def test_a_release_of_npm_is_installed_into_its_environment(monkeypatch):
     real = environments.run
     monkeypatch.setattr(environments, "which", lambda name: name)
     monkeypatch.setattr(environments, "run", npm_writes("9.9"))
-    found = measured(NPM, "document", "9.9", 60.0, Event())
+    found = measured(NPM, "wang", "9.9", 60.0, Event())
     assert {row["verdict"] for row in found["rows"]} == {"measured"}
     assert found["versions"].endswith(", @scope/engine 9.9")
     monkeypatch.setattr(environments, "run", npm_writes("9.8"))
     with pytest.raises(NotMeasured, match=r"^not runnable: exit code 1: version 9\.8 is imported instead of 9\.9$"):
-        measured(NPM, "document", "9.9", 60.0, Event())
+        measured(NPM, "wang", "9.9", 60.0, Event())
 
 
 def test_npm_that_fails_or_is_absent_is_named(monkeypatch):
     monkeypatch.setattr(environments, "which", lambda name: name)
     monkeypatch.setattr(environments, "run", lambda command, stopping: (1, NO_VERSION))
     with pytest.raises(NotMeasured, match=r"^not installable: No matching version found for @scope/engine@9\.9\.$"):
-        measured(NPM, "document", "9.9", 60.0, Event())
+        measured(NPM, "wang", "9.9", 60.0, Event())
     with pytest.raises(DropspinError, match="npm cannot list the releases of @scope/engine: No matching version"):
         environments.releases("@scope/engine", "1.0")
     monkeypatch.setattr(environments, "which", lambda name: None)

@@ -30,7 +30,7 @@ PLAN = Plan.model_validate(
     {
         "dts": [0.01],
         "scenes": ["spin-principal"],
-        "engines": {"document": {"package": "dropspin", "oldest": "1.0", "labels": ["document", "document[rotation=exact]"]}},
+        "engines": {"wang": {"package": "dropspin", "oldest": "1.0", "labels": ["wang", "wang[rotation=exact]"]}},
     }
 )
 
@@ -45,7 +45,7 @@ class Stub:
         self.asked.append(release)
         if release in self.failures:
             raise self.failures[release]
-        row = {"label": "document", "scene": "spin-principal", "dt": 0.01, "metric": "energy_error", "unit": "1", "verdict": "measured"}
+        row = {"label": "wang", "scene": "spin-principal", "dt": 0.01, "metric": "energy_error", "unit": "1", "verdict": "measured"}
         return {"rows": [row | {"value": float(release), "reason": ""}], "versions": f"numpy {release}"}
 
 
@@ -231,36 +231,36 @@ def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_o
 
     real = environments.run
     monkeypatch.setattr(environments, "run", pip_writes("dropspin"))
-    found = measured(PLAN, "document", "9.9", 60.0, Event())
-    motion = ds.simulate("spin-principal", "document", 0.01)
+    found = measured(PLAN, "wang", "9.9", 60.0, Event())
+    motion = ds.simulate("spin-principal", "wang", 0.01)
     values = ds.measure("spin-principal", motion)
-    rows = [row for row in found["rows"] if row["label"] == "document"]
+    rows = [row for row in found["rows"] if row["label"] == "wang"]
     assert all(0.0 < row["cost"] <= row["median_cost"] and row["relative_cost"] > 0.0 and "low" not in row for row in rows)
     assert {row["metric"]: row["value"] for row in rows} == pytest.approx(values, rel=0.0, abs=0.0, nan_ok=True)
     assert {row["trajectory"] for row in rows} == {sha256(motion.states.tobytes())}
     assert found["versions"].startswith("dropspin 9.9, numpy ")
     monkeypatch.setattr(environments, "run", pip_writes("another"))
     with pytest.raises(NotMeasured, match=r"^not runnable: exit code 1: version .* is imported instead of 9\.9$"):
-        measured(PLAN, "document", "9.9", 60.0, Event())
+        measured(PLAN, "wang", "9.9", 60.0, Event())
 
 
 def test_range_of_the_error_is_that_of_the_step_in_which_the_impact_is_found():
     """Wang's method finds an impact up to a step late: the error of the bounce height is between 0 and the distance fallen in a step."""
     scene, dt = load("drop-ball"), 4e-3
-    found = release.range_over_phases(ds.engine("document"), scene, dt)
+    found = release.range_over_phases(ds.engine("wang"), scene, dt)
     fallen = scene.start.position[1] - scene.body.radius
     speed = np.sqrt(2.0 * 9.8 * fallen)
     assert 0.0 <= found["low"] < 0.3 * found["high"]
     assert 0.3 * speed * dt / fallen < found["high"] < speed * dt / fallen
-    assert release.range_over_phases(ds.engine("document"), load("spin-asymmetric"), dt) == {}
+    assert release.range_over_phases(ds.engine("wang"), load("spin-asymmetric"), dt) == {}
 
 
 def test_cost_is_the_least_of_five_timings_and_relative_to_document_timed_in_turn(monkeypatch):
-    """A step takes 3, 1, 2, 5 and 4 µs of a clock, and one of `document` 0.1 µs; with 1,000 steps a simulated second."""
+    """A step takes 3, 1, 2, 5 and 4 µs of a clock, and one of `wang` 0.1 µs; with 1,000 steps a simulated second."""
     micros = iter([3.0, 1.0, 2.0, 5.0, 4.0])
 
     def timed(engine, scene, dt, steps):
-        per_step = 0.1 if engine.label == "document" else next(micros)
+        per_step = 0.1 if engine.label == "wang" else next(micros)
         return TimedSteps(1.0, 0.0, 1e-6 * per_step * steps, steps, np.zeros(13))
 
     monkeypatch.setattr(release, "time_steps", timed)
@@ -271,7 +271,7 @@ def test_cost_is_the_least_of_five_timings_and_relative_to_document_timed_in_tur
 def test_pip_that_fails_is_named_with_its_error(monkeypatch, tmp_path):
     monkeypatch.setattr(environments, "run", lambda command, stopping: (1, "ERROR: first\nERROR: No matching distribution\nsome advice\n"))
     with pytest.raises(NotMeasured, match=r"^not installable: No matching distribution$"):
-        measured(PLAN, "document", "1.0", 60.0, Event())
+        measured(PLAN, "wang", "1.0", 60.0, Event())
     with pytest.raises(DropspinError, match="pip cannot list the releases of dropspin: No matching distribution"):
         environments.releases("dropspin", "1.0")
 
@@ -327,7 +327,7 @@ def test_a_file_with_any_changed_byte_is_refused_or_read(two_records):
         changed[place] ^= 0x55
         name = f"document-1.2-{sha256(changed)[:HASH]}.parquet"
         try:
-            Stored(Path(name), "document", "1.2", bytes(changed)).rows()
+            Stored(Path(name), "wang", "1.2", bytes(changed)).rows()
         except DropspinError as error:
             refused.append(str(error).startswith(f"{name}: refused: "))
     assert len(refused) > 50

@@ -129,7 +129,7 @@ def test_hashes_of_unchanged_results_stay_in_the_baseline(accepted):
         ("pybullet", "a", "same", "dropspin"),
         ("pybullet", "b", "different", "dropspin"),  # its adapter is a part of dropspin
         ("pybullet", "a", "different", "either"),
-        ("document", "a", "different", "dropspin"),  # it is a part of dropspin itself
+        ("wang", "a", "different", "dropspin"),  # it is a part of dropspin itself
         ("mine", "b", "different", "either"),
         ("mine", "b", "same", "dropspin"),
     ],

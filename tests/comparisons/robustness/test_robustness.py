@@ -99,7 +99,7 @@ def test_wang_method_does_not_depend_on_mass_and_scale(name, axis):
     value = 1024.0 * AXES[axis].base(nominal)
     moved = AXES[axis].at(nominal, value)
     steps = nominal.scene.steps(DT)
-    with engine("document").prepare(nominal.scene, DT) as own, engine("document").prepare(moved.scene, moved.dt) as other:
+    with engine("wang").prepare(nominal.scene, DT) as own, engine("wang").prepare(moved.scene, moved.dt) as other:
         assert np.array_equal(own.record(steps), in_nominal_units(other.record(steps), axis, AXES[axis].base(nominal), value))
 
 
@@ -319,9 +319,7 @@ def test_limits_do_not_depend_on_the_number_of_jobs():
                 os.abort()
             return super().prepare(scene, dt)
 
-    studies = [
-        find_limits("spin-principal", ["document", Aborting()], ["spin", "step", "mass"], resources=QUICK, jobs=jobs) for jobs in (1, 2)
-    ]
+    studies = [find_limits("spin-principal", ["wang", Aborting()], ["spin", "step", "mass"], resources=QUICK, jobs=jobs) for jobs in (1, 2)]
     assert repr(studies[0]) == repr(studies[1])
     assert {point.mode for scan in studies[0].scans for point in scan.points} >= {"sound", "clamped", "crashed", "inaccurate"}
 
@@ -365,7 +363,7 @@ def test_finds_short_rotations_of_pybullet():
     assert math.pi / 4 < outside < 1.03 * math.pi / 4
 
 
-@pytest.mark.parametrize("name", ["document[rotation=gyroscopic]", "mujoco"])
+@pytest.mark.parametrize("name", ["wang[rotation=gyroscopic]", "mujoco"])
 def test_finds_the_blow_up_of_the_explicit_gyroscopic_term(name):
     """The energy rises, then the state is not finite; MuJoCo's Euler has the same term."""
     found = along("spin-asymmetric", "spin", name)
@@ -376,12 +374,12 @@ def test_finds_the_blow_up_of_the_explicit_gyroscopic_term(name):
 
 def test_finds_the_faults_of_wang_method():
     """It sinks at restitution 0, gains energy near 1, and never rests in between."""
-    sinking = along("rock-block", "duration", "document")
+    sinking = along("rock-block", "duration", "wang")
     assert sinking.points[0].mode == "sinks"
     assert first(sinking, "tunnels")[1] == pytest.approx(1333, rel=0.1)  # s, until the whole body is below the floor
-    inside, outside = first(along("drop-ball-lively", "restitution", "document"), "gains_energy")
+    inside, outside = first(along("drop-ball-lively", "restitution", "wang"), "gains_energy")
     assert 0.98 < inside < outside < 1.0
-    restless = along("drop-ball-lively", "duration", "document")
+    restless = along("drop-ball-lively", "duration", "wang")
     assert first(restless, "inaccurate")[1] == pytest.approx(9.7, rel=0.05)  # it comes to rest at 8.6 s, a tenth before the end
     assert restless.points[-1].diagnosis.criterion == "never rests"
     # Its limit cycle strikes the floor at g h/(1 - e), ten times g h.
@@ -391,7 +389,7 @@ def test_finds_the_faults_of_wang_method():
 def test_finds_that_thin_bodies_pass_the_floor():
     """A box of 0.3 m that falls at 4.4 m/s passes it in steps of 68 ms or more, as they fall; at rest, by the length of its last step."""
     assert first(along("drop-box-flat", "step", "mujoco"), "tunnels")[1] == pytest.approx(0.3 / 4.427, rel=0.1)
-    smallest = along("drop-box-flat", "size", "document").points[0]
+    smallest = along("drop-box-flat", "size", "wang").points[0]
     assert (smallest.mode, smallest.value < 2e-4) == ("tunnels", True)
 
 

@@ -7,7 +7,7 @@ from support.accuracy_options import Adaptive, InnerStep, Substeps
 
 from dropspin.comparisons.conformance.checks import conform
 from dropspin.comparisons.engines.base import NumericOption
-from dropspin.comparisons.engines.document import Document
+from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.running.run import run
 from dropspin.scenarios import load
 from dropspin.scenarios.errors import DropspinError, UnknownName
@@ -89,7 +89,7 @@ def test_substeps_conform_with_the_lag_of_a_substep():
 
 @pytest.mark.parametrize("lag", [True, "half", math.nan, 1.0])
 def test_lag_that_is_no_time_of_at_most_a_step_is_refused(lag):
-    class Wrong(Document):
+    class Wrong(Wang):
         def prepare(self, scene, dt):
             simulation = super().prepare(scene, dt)
             simulation.velocity_lag = lag

@@ -81,7 +81,7 @@ def run(monkeypatch, folder, extra, name="mine"):
     """The rows of an adapter with some extra code, beside the reference implementation."""
     (folder / f"{name}.py").write_text(f"{SOUND}\n{extra}\n")
     monkeypatch.chdir(folder)
-    return ds.run(DRIFT, [f"{name}:Mine", "document"], 1e-2, resources=LIMITS)
+    return ds.run(DRIFT, [f"{name}:Mine", "wang"], 1e-2, resources=LIMITS)
 
 
 def judged(found, engine):
@@ -110,7 +110,7 @@ def test_wrong_answers_of_an_adapter_cost_its_own_row(extra, reason, tmp_path, m
     assert verdict == "crashed"
     assert reason in text
     assert found.exit_code() == 3
-    assert all(verdict in ("passed", "measured") for verdict, _ in judged(found, "document"))
+    assert all(verdict in ("passed", "measured") for verdict, _ in judged(found, "wang"))
 
 
 @pytest.mark.parametrize(("extra", "reason"), CONSTRUCTED, ids=range(len(CONSTRUCTED)))
@@ -120,7 +120,7 @@ def test_adapter_that_cannot_be_constructed_is_broken(extra, reason, tmp_path, m
     assert verdict == "broken"
     assert reason in text
     assert found.exit_code() == 3
-    assert all(verdict in ("passed", "measured") for verdict, _ in judged(found, "document"))
+    assert all(verdict in ("passed", "measured") for verdict, _ in judged(found, "wang"))
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="the processes are looked for in /proc")

@@ -37,7 +37,7 @@ def mixed(name):
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("label", ["document", "document[law=coulomb,contact=sequential]", "mujoco", "mujoco[body=mesh]"])
+@pytest.mark.parametrize("label", ["wang", "wang[law=coulomb,contact=sequential]", "mujoco", "mujoco[body=mesh]"])
 def test_scenes_with_other_numbers_have_the_bits_of_single_simulations(label, name):
     chosen, members = engine(label), mixed(name)
     if any(map(chosen.declines, members)):
@@ -48,7 +48,7 @@ def test_scenes_with_other_numbers_have_the_bits_of_single_simulations(label, na
     for member, together in zip(members, record_batch(chosen, members, DT, limitations=True), strict=True):
         alone = record(chosen, member, DT)
         np.testing.assert_array_equal(together.motion.states, alone.motion.states)
-        if chosen.name == "mujoco":  # `document` counts unsolved steps in single simulations alone
+        if chosen.name == "mujoco":  # `wang` counts unsolved steps in single simulations alone
             assert together.limitations == alone.limitations
 
 
@@ -86,6 +86,6 @@ def test_calls_of_engines_in_the_benchmark_end_where_batches_end(monkeypatch):
     monkeypatch.setattr(bench, "STEPS", 20)
     members = bench.members("drop", 3)
     alone = bench.document_alone(members, 20)()
-    np.testing.assert_array_equal(alone[:, -1], bench.last_states(engine("document"), members))
+    np.testing.assert_array_equal(alone[:, -1], bench.last_states(engine("wang"), members))
     states, _ = bench.mujoco_alone(members, 1)()
     np.testing.assert_array_equal(states[:, -1, 1:4], bench.last_states(engine("mujoco"), members)[:, [0, 1, 2]])

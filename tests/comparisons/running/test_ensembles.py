@@ -38,7 +38,7 @@ class Alone(Engine):
         return self._engine.prepare(scene, dt)
 
 
-@pytest.mark.parametrize("name", ["document", "document[contact=sequential,law=coulomb]", "mujoco", "mujoco[profile=default]"])
+@pytest.mark.parametrize("name", ["wang", "wang[contact=sequential,law=coulomb]", "mujoco", "mujoco[profile=default]"])
 def test_batch_equals_single_runs_bit_for_bit(name):
     drawn = members(FEW)
     together, alone = (record_batch(chosen, drawn, 1e-3) for chosen in (engine(name), Alone(name)))
@@ -46,7 +46,7 @@ def test_batch_equals_single_runs_bit_for_bit(name):
         np.testing.assert_array_equal(one.motion.states, other.motion.states)
 
 
-@pytest.mark.parametrize("name", ["document", "document[rotation=exact]", "mujoco", "mujoco[profile=default]"])
+@pytest.mark.parametrize("name", ["wang", "wang[rotation=exact]", "mujoco", "mujoco[profile=default]"])
 def test_timed_batch_ends_where_single_runs_end(name):
     """Each member of a batch ends where it ends alone; MuJoCo restarts its solver cold after a stop."""
     drawn, chosen = members(FEW), engine(name)
@@ -54,13 +54,13 @@ def test_timed_batch_ends_where_single_runs_end(name):
     together.advance(400)
     together.advance(200)
     alone = [recording.motion.states[-1] for recording in record_batch(Alone(name), drawn, 1e-3)]
-    np.testing.assert_allclose(together.states(), alone, rtol=0, atol=0.0 if name.startswith("document") else 1e-6)
+    np.testing.assert_allclose(together.states(), alone, rtol=0, atol=0.0 if name.startswith("wang") else 1e-6)
 
 
 def test_ball_bounces_alike_from_every_orientation():
     """Energy e^2k after k bounces, rebound e² H, and no spread."""
     ball = load("drop-ball").model_dump(exclude_none=True, exclude={"expect", "origin"}) | {"ensemble": {"size": 4, "seed": 1}}
-    found = run_ensemble(engine("document"), load(ball), 1e-4)
+    found = run_ensemble(engine("wang"), load(ball), 1e-4)
     assert np.ptp(found.energy, axis=0).max() <= 1e-16
     at = np.searchsorted(found.t, 0.6)
     assert found.energy[0, at] == pytest.approx(0.25, abs=1e-3)
@@ -93,7 +93,7 @@ def test_differences_are_taken_start_by_start():
 
 def test_run_and_its_folder_keep_the_ensemble(tmp_path):
     """There are rows for each engine and each pair, and the outcome of each member is loaded unchanged."""
-    found = ds.run(FEW, ["document", "pybullet"], [4e-3])
+    found = ds.run(FEW, ["wang", "pybullet"], [4e-3])
     rows = found.table[found.table["kind"] == "ensemble"]
     assert list(rows["metric"]) == 2 * list(ENSEMBLE_METRICS)
     assert (rows["cause"] == "chaotic").all()
@@ -115,17 +115,17 @@ def test_member_that_is_not_finite_costs_the_engines_row():
         motions[-1, 70:] = np.nan
         return motions
 
-    found = ds.run(FEW, [made.in_batches("fails", failing, made.Exact), "document"], [4e-3])
+    found = ds.run(FEW, [made.in_batches("fails", failing, made.Exact), "wang"], [4e-3])
     [row] = found.table[found.table["engine"] == "fails"].to_dict("records")
     assert row["verdict"] == "diverged"
     assert "a start of the ensemble is not finite at t = 0.28 s" in row["reason"]
-    assert len(found.table[(found.table["engine"] == "document") & (found.table["kind"] == "ensemble")]) == 4
+    assert len(found.table[(found.table["engine"] == "wang") & (found.table["kind"] == "ensemble")]) == 4
 
 
 def test_ensemble_without_contact_has_no_rebound():
     """No start reaches the floor in time, and no difference is significant."""
     short = FEW.model_copy(update={"duration": 0.2})
-    found = ds.run(short, ["document", "pybullet"], [4e-3])
+    found = ds.run(short, ["wang", "pybullet"], [4e-3])
     means, differences = (rows[rows["metric"] == "rebound_height"] for rows in (found.table, found.agreements))
     assert list(means["value"]) == [0.0, 0.0]
     assert list(differences["value"]) == [0.0]

@@ -18,7 +18,7 @@ DTS = [8e-3, 4e-3, 2e-3]
 
 
 def test_results_do_not_depend_on_the_number_of_jobs():
-    one, several = (ds.run(SCENES, ["document", "mujoco"], DTS, jobs=jobs) for jobs in (1, 3))
+    one, several = (ds.run(SCENES, ["wang", "mujoco"], DTS, jobs=jobs) for jobs in (1, 3))
     for name in ("table", "agreements", "predictions"):
         first, second = (getattr(results, name).drop(columns="time_per_step") for results in (one, several))
         pd.testing.assert_frame_equal(first, second, check_exact=True)
@@ -47,7 +47,7 @@ def test_results_of_pieces_are_in_their_order_and_pieces_run_at_the_same_time():
 @pytest.mark.parametrize("jobs", [0, -1, 1.5, True, "2"])
 def test_number_of_jobs_that_is_none_is_refused(jobs):
     with pytest.raises(ds.DropspinError, match=r"jobs: got .*; give a whole number above 0"):
-        ds.run("fall-spin", "document", 0.01, jobs=jobs)
+        ds.run("fall-spin", "wang", 0.01, jobs=jobs)
 
 
 class Killed(made.Exact):
@@ -67,11 +67,11 @@ def test_engine_that_ends_its_process_costs_its_own_rows_and_is_tried_once(monke
     monkeypatch.setattr(
         processes.EngineProcesses, "run_engine", lambda *given, **named: called.append(given[1].label) or run_engine(*given, **named)
     )
-    table = ds.run(["fall-spin", "spin-principal"], [Killed(), "document"], 0.01, jobs=2).table
+    table = ds.run(["fall-spin", "spin-principal"], [Killed(), "wang"], 0.01, jobs=2).table
     broken = table[table["verdict"] == "crashed"]
     assert list(zip(broken["scene"], broken["engine"], strict=True)) == [("fall-spin", "killed")]
     assert "ended by SIGKILL" in broken["reason"].iloc[0]
-    assert sorted(called) == ["document", "document", "killed"]
+    assert sorted(called) == ["wang", "wang", "killed"]
 
 
 class Compiling(made.Exact):

@@ -28,8 +28,8 @@ TESTS = Path(__file__).parents[2]
 @pytest.fixture(autouse=True, scope="module")
 def _compiled():
     """Compile before the tight limits below apply."""
-    ds.simulate(BALL, "document", 4e-3)
-    ds.simulate(SPIN, "document", 4e-3)
+    ds.simulate(BALL, "wang", 4e-3)
+    ds.simulate(SPIN, "wang", 4e-3)
 
 
 @pytest.mark.parametrize(
@@ -46,14 +46,14 @@ def _compiled():
 )
 def test_broken_engine_costs_its_own_row(what, verdict, reason):
     """Of two engines and two scenes only the broken engine's broken scene is lost."""
-    found = ds.run([BALL, SPIN], [breaking.breaking(what), "document"], [4e-3], resources=TIGHT).table
+    found = ds.run([BALL, SPIN], [breaking.breaking(what), "wang"], [4e-3], resources=TIGHT).table
     bad = found[(found["engine"] == "breaking") & (found["scene"] == "drop-ball")]
     [row] = bad.to_dict("records")
     assert row["verdict"] == verdict
     assert reason in row["reason"]
-    sound = found[(found["engine"] == "document") | (found["scene"] == "fall-spin")]
+    sound = found[(found["engine"] == "wang") | (found["scene"] == "fall-spin")]
     assert not sound["verdict"].isin(["crashed", "timed_out", "diverged", "failed"]).any()
-    assert {("document", "drop-ball"), ("document", "fall-spin"), ("breaking", "fall-spin")} == set(
+    assert {("wang", "drop-ball"), ("wang", "fall-spin"), ("breaking", "fall-spin")} == set(
         zip(sound["engine"], sound["scene"], strict=True)
     )
 
@@ -78,11 +78,9 @@ def test_sleeping_engine_is_ended_by_the_wall_clock():
 def test_system_that_starts_no_process_is_not_blamed_on_the_output_folder(where, code, tmp_path, monkeypatch):
     """Such as shared memory that is full or read-only, and a limit of processes."""
     monkeypatch.setattr(where, mock.Mock(side_effect=OSError(code, os.strerror(code))))
-    done = dropspin("run", "drop-ball", "-e", "document", "--dt", "0.01", "-o", "out", cwd=tmp_path)
+    done = dropspin("run", "drop-ball", "-e", "wang", "--dt", "0.01", "-o", "out", cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].startswith(
-        f"dropspin: the system cannot start a process for document: {os.strerror(code)}; shared "
-    )
+    assert done.stderr.splitlines()[-1].startswith(f"dropspin: the system cannot start a process for wang: {os.strerror(code)}; shared ")
     assert not list(tmp_path.iterdir())
 
 
@@ -174,7 +172,7 @@ def test_runs_with_broken_engines_leave_no_process_and_no_file():
         from support import breaking as t
         kinds = (t.segfault, t.leave, t.allocate, t.loop, t.shout, t.fail, t.interrupt)
         for number in range(7):
-            ds.run([t.BALL, t.SPIN], [t.breaking(kinds[number % len(kinds)]), "document"], [4e-3], resources=t.TIGHT)
+            ds.run([t.BALL, t.SPIN], [t.breaking(kinds[number % len(kinds)]), "wang"], [4e-3], resources=t.TIGHT)
         parents = {p: open(f"/proc/{p}/stat").read().split(") ")[1].split()[1] for p in os.listdir("/proc") if p.isdigit()}
         print([p for p, parent in parents.items() if parent == str(os.getpid())], os.listdir(tempfile.gettempdir()))
     """)

@@ -19,7 +19,7 @@ STARTS = [phase.scene for phase in start_phases(BALL, ds.truth_for(BALL), DT)]
 def test_every_simulation_is_reported():
     """The scene's own start, and its 32 start phases, one by one or as a batch."""
     total = 1 + 32
-    for engine, done in ((made.Exact(), range(1, 34)), ("document", (1, 33))):
+    for engine, done in ((made.Exact(), range(1, 34)), ("wang", (1, 33))):
         reported = []
         run_engine(engine_entry(engine), BALL, DT, STARTS, lambda *counts, reported=reported: reported.append(counts))
         assert reported == [(number, total) for number in done]
@@ -53,7 +53,7 @@ def test_a_slow_engine_reports_progress_within_a_scene(monkeypatch):
 
 
 def test_scenes_of_an_earlier_run_are_finished_at_once():
-    part = ds.run("fall-spin", "document", DT)
+    part = ds.run("fall-spin", "wang", DT)
     reported = []
-    ds.run("fall-spin", "document", DT, done=[part], on_progress=reported.append)
-    assert [(one.scene, one.engine, one.dt, one.finished) for one in reported] == [("fall-spin", "document", DT, True)]
+    ds.run("fall-spin", "wang", DT, done=[part], on_progress=reported.append)
+    assert [(one.scene, one.engine, one.dt, one.finished) for one in reported] == [("fall-spin", "wang", DT, True)]

@@ -19,7 +19,7 @@ METRIC = "restitution_error"
 def row(below, quick):
     """The restitution of Wang's method, which detects an impact at the end of a step, with an expectation."""
     scene = {**BALL, "expect": [{"metric": METRIC, "below": below, "reason": "a bound"}]}
-    table = ds.run(scene, "document", DT, quick=quick).table
+    table = ds.run(scene, "wang", DT, quick=quick).table
     [found] = table[(table["metric"] == METRIC) & (table["kind"] == "truth")].to_dict("records")
     return found
 
@@ -62,7 +62,7 @@ def test_number_of_simulations(scene, engine, full, quick, monkeypatch):
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
     """A quick run of an ensemble, and its folder."""
-    results = ds.run("drop-box-anyhow", "document", DT, quick=True)
+    results = ds.run("drop-box-anyhow", "wang", DT, quick=True)
     folder = tmp_path_factory.mktemp("quick") / "run"
     ds.write_report(results, folder)
     return results, folder
@@ -100,6 +100,6 @@ def test_quick_run_is_not_compared_with_other_runs(stored):
 
 def test_results_of_a_quick_run_do_not_resume_a_full_one():
     calls = []
-    quick = ds.run("spin-principal", "document", DT, quick=True)
-    ds.run("spin-principal", "document", DT, done=[quick], keep=calls.append)
+    quick = ds.run("spin-principal", "wang", DT, quick=True)
+    ds.run("spin-principal", "wang", DT, done=[quick], keep=calls.append)
     assert len(calls) == 1

@@ -36,7 +36,7 @@ def test_catalogue_passes(core):
     declined = core.table[core.table["verdict"] == "declined"]
     rough = {name for name, scene in core.scenes.items() if scene.floor is not None and not isinstance(scene.floor.friction, str)}
     assert {"slide-box", "roll-ball", "slope-box-hold"} < rough
-    expected = {("fall-tilted", "pybullet"), ("bounce-threshold", "mujoco"), *((name, "document") for name in rough)}
+    expected = {("fall-tilted", "pybullet"), ("bounce-threshold", "mujoco"), *((name, "wang") for name in rough)}
     assert set(zip(declined["scene"], declined["engine"], strict=True)) == expected
     limited = core.table[core.table["verdict"] == "limited"]
     assert {("slide-box", "mujoco"), ("turn-box-rough", "mujoco")} <= set(zip(limited["scene"], limited["engine"], strict=True))
@@ -50,7 +50,7 @@ def test_long_rest_after_the_bounces_is_no_flight():
     heights = [
         table.loc[(table["metric"] == "bounce_height_error") & (table["kind"] == "truth"), "value"].item()
         for scene in (short, short.model_copy(update={"duration": 12.0}))
-        for table in [ds.run(scene, ["document"], 1e-3).table]
+        for table in [ds.run(scene, ["wang"], 1e-3).table]
     ]
     assert heights[0] == heights[1] == pytest.approx(1.9e-5, rel=0.05)
 
@@ -60,7 +60,7 @@ def test_long_rest_after_the_bounces_is_no_flight():
 def test_slow_scenes_pass_too(name):
     """One slow scene at a time; the one of a thousand seconds at time steps that games use."""
     dts = [1 / 60, 1 / 120, 1 / 240] if name == "rest-long" else [4e-3, 2e-3, 1e-3]
-    found = ds.run(name, ["document", "mujoco", "pybullet"], dts)
+    found = ds.run(name, ["wang", "mujoco", "pybullet"], dts)
     assert set(found.table["verdict"]) <= {"passed", "measured", "known"}, failures_of(found)
     assert (found.table["verdict"] == "passed").sum() > 30
 
@@ -100,14 +100,14 @@ def test_bias_of_the_mean_apex_is_the_predicted_one(core, restitution, dt):
     assert value(core, scene, "mujoco", "bounce_height_error", dt) == pytest.approx(-(1 - e) / 2 * u * dt, abs=resolution)
     assert value(core, scene, "pybullet", "bounce_height_error", dt) == pytest.approx(-(1 - e) / 2 * u * dt, abs=resolution)
     note = (2 * e - 1) * (1 + e) / 2 * u * dt
-    assert value(core, scene, "document", "bounce_height_error", dt) == pytest.approx(note, abs=resolution)
+    assert value(core, scene, "wang", "bounce_height_error", dt) == pytest.approx(note, abs=resolution)
 
 
 def test_document_adds_a_step_of_gravity_to_restitution(core):
     """The restitution error is + e g dt / u, to second order."""
     for dt in (4e-3, 2e-3, 1e-3):
         predicted = 0.5 * 9.8 * dt / math.sqrt(2 * 9.8)
-        assert value(core, "drop-ball", "document", "restitution_error", dt) == pytest.approx(predicted, rel=3 * dt + 1e-3)
+        assert value(core, "drop-ball", "wang", "restitution_error", dt) == pytest.approx(predicted, rel=3 * dt + 1e-3)
 
 
 def test_document_direction_of_angular_momentum_is_a_plateau(core):
@@ -117,7 +117,7 @@ def test_document_direction_of_angular_momentum_is_a_plateau(core):
     L = scene.body.inertia_tensor @ w
     swing = 2 * math.atan2(np.linalg.norm(np.cross(w, L)), w @ L)
     for dt in (4e-3, 2e-3, 1e-3):
-        assert value(core, "spin-asymmetric", "document", "angular_momentum_direction_error", dt) == pytest.approx(swing, rel=1e-4)
+        assert value(core, "spin-asymmetric", "wang", "angular_momentum_direction_error", dt) == pytest.approx(swing, rel=1e-4)
     coarse, fine = (value(core, "spin-asymmetric", "mujoco", "angular_momentum_direction_error", dt) for dt in (4e-3, 1e-3))
     assert coarse / fine == pytest.approx(4, rel=0.02)
 
@@ -130,7 +130,7 @@ def test_mujoco_rk4_keeps_the_direction_of_angular_momentum():
 
 def test_document_pushes_sideways_on_a_frictionless_floor(core):
     """Eq 11 keeps the tangential velocity, so its impulse is not normal; MuJoCo and PyBullet push straight up."""
-    assert value(core, "drop-box-corner", "document", "horizontal_momentum_error") > 0.2
+    assert value(core, "drop-box-corner", "wang", "horizontal_momentum_error") > 0.2
     for engine in ("mujoco", "pybullet"):
         assert value(core, "drop-box-corner", engine, "horizontal_momentum_error") <= 1e-12
 
@@ -149,7 +149,7 @@ def test_each_pair_of_engines_is_compared_once(core):
     """By energy, apex and angular momentum; MuJoCo and PyBullet bounce alike."""
     pairs = core.agreements
     assert set(zip(pairs["engine"], pairs["truth"], strict=True)) == {
-        ("document", "mujoco"), ("document", "pybullet"), ("mujoco", "pybullet"),
+        ("wang", "mujoco"), ("wang", "pybullet"), ("mujoco", "pybullet"),
     }  # fmt: skip
     of_ensembles = pairs["metric"].isin(list(ENSEMBLE_METRICS))
     assert set(pairs.loc[~of_ensembles, "metric"]) == {"energy_error", "bounce_height_error", "angular_momentum_error"}
@@ -174,7 +174,7 @@ def test_scene_without_truth_is_measured_by_invariants():
     scene = ds.load("drop-box-flat")
     scene = scene.model_copy(update={"floor": scene.floor.model_copy(update={"friction": 0.3})})
     scene = scene.starting_at(scene.initial_state + np.eye(13)[7])  # sideways
-    found = ds.run([scene.model_copy(update={"expect": ()})], ["document[law=coulomb]", "pybullet"], [2e-3])
+    found = ds.run([scene.model_copy(update={"expect": ()})], ["wang[law=coulomb]", "pybullet"], [2e-3])
     own, pairs = found.table, found.agreements
     assert set(own["verdict"]) == {"measured", "no_truth"}
     assert set(own[own["verdict"] == "measured"]["metric"]) == {
@@ -185,7 +185,7 @@ def test_scene_without_truth_is_measured_by_invariants():
     assert (pairs["value"].abs() < 1e-12).all()  # up to the first contact both fall freely
 
 
-@pytest.mark.parametrize("engine", [made.Frozen(), "document", "pybullet", "mujoco"])
+@pytest.mark.parametrize("engine", [made.Frozen(), "wang", "pybullet", "mujoco"])
 @pytest.mark.parametrize(
     "change",
     [
@@ -201,7 +201,7 @@ def test_scene_without_motion_does_not_break(engine, change):
     content = {key: value for key, value in (BALL.model_dump(exclude_none=True, exclude={"expect"}) | change).items() if value is not None}
     found = ds.run([ds.load(content)], [engine], [1e-2])
     assert set(found.table["verdict"]) <= {"measured", "no_truth"}, found.table.to_string()
-    if not (engine == "document" and change.get("floor") and change["floor"]["restitution"] == 1.0):  # which gains energy, as known
+    if not (engine == "wang" and change.get("floor") and change["floor"]["restitution"] == 1.0):  # which gains energy, as known
         assert (found.table["value"].dropna().abs() < 1e-2).all()
 
 
@@ -212,7 +212,7 @@ def test_restitution_near_the_end_and_below_the_rest_speed():
     [row] = found.table[found.table["metric"] == "restitution_error"].to_dict("records")
     assert (row["verdict"], row["cause"]) == ("measured", "unresolved")
     dead = BALL.model_copy(update={"floor": BALL.floor.model_copy(update={"rest_speed": 10.0}), "expect": ()})
-    found = ds.run([dead], ["document", "pybullet"], [1e-3])
+    found = ds.run([dead], ["wang", "pybullet"], [1e-3])
     assert (found.table[found.table["metric"] == "restitution_error"]["value"].abs() <= 1e-12).all()
 
 
@@ -220,22 +220,22 @@ def test_request_is_checked_before_anything_runs():
     """Time steps, names, expectations."""
     for dt in (0.0, -1e-3, math.nan, math.inf, 1.0):
         with pytest.raises(DropspinError, match=r"dt: got .* s; scene 'drop-ball' lasts 1\.5 s"):
-            ds.run([BALL], ["document"], [dt])
+            ds.run([BALL], ["wang"], [dt])
     with pytest.raises(DropspinError, match="two scenes have the same name"):
-        ds.run([BALL, BALL], ["document"])
+        ds.run([BALL, BALL], ["wang"])
     with pytest.raises(DropspinError, match="an engine is given twice"):
         ds.run([BALL], ["mujoco", "mujoco[integrator=euler]"])
     typo = ds.load(
         BALL.model_dump(exclude_none=True, exclude={"expect"}) | {"expect": [{"metric": "energy_eror", "below": 1, "reason": "typo"}]}
     )
     with pytest.raises(SceneError, match=r"^scene\['expect'\]\[0\]\['metric'\]: got 'energy_eror'.*Did you mean 'energy_error'"):
-        ds.run([typo], ["document"])
+        ds.run([typo], ["wang"])
 
 
 def test_unsolved_contacts_are_reported():
     """The sequential contact may not converge: a row says in how many steps, and the rest is measured."""
     scene = ds.load("drop-box-sticking").model_copy(update={"duration": 2.0, "expect": ()})
-    found = ds.run([scene], ["document[contact=sequential,law=coulomb]"], [1e-3])
+    found = ds.run([scene], ["wang[contact=sequential,law=coulomb]"], [1e-3])
     limited = found.table[found.table["verdict"] == "limited"]
     assert len(limited) == 1
     assert re.fullmatch(r"the contact was not solved in \d+ of 2000 steps", limited["reason"].iloc[0])
@@ -246,14 +246,14 @@ def test_unsolved_contacts_are_reported():
     ("scene", "first", "second", "same"),
     [
         ("spin-asymmetric", "mujoco[integrator=implicitfast]", "pybullet", True),
-        ("spin-asymmetric", "mujoco", "document[rotation=gyroscopic]", True),
+        ("spin-asymmetric", "mujoco", "wang[rotation=gyroscopic]", True),
         ("spin-asymmetric", "mujoco", "pybullet", False),
-        ("spin-asymmetric", "document", "pybullet", False),
-        ("spin-asymmetric", "mujoco[integrator=rk4]", "document[rotation=rk4]", False),
+        ("spin-asymmetric", "wang", "pybullet", False),
+        ("spin-asymmetric", "mujoco[integrator=rk4]", "wang[rotation=rk4]", False),
         ("fall-spin", "mujoco", "pybullet", True),
         ("drop-box-corner", "mujoco", "pybullet", False),
         ("drop-ball", "mujoco", "pybullet", True),
-        ("drop-ball", "document", "pybullet", False),
+        ("drop-ball", "wang", "pybullet", False),
         ("drop-ball", "mujoco[profile=default]", "pybullet", False),
     ],
 )
@@ -274,7 +274,7 @@ def test_scenes_at_the_limits_of_what_can_be_measured():
     turned = BALL.model_copy(update={"name": "turned", "expect": ()}).starting_at(
         np.array([0, 1.1, 0, 0.1, 0.2, 0.3, -np.sqrt(0.86), *[0] * 6])
     )
-    found = ds.run([short, turned], ["document", "mujoco", "pybullet", "pybullet[coordinates=multibody]"]).table
+    found = ds.run([short, turned], ["wang", "mujoco", "pybullet", "pybullet[coordinates=multibody]"]).table
     assert set(found["verdict"]) <= {"passed", "measured"}
     angle, half = 1e-5, np.array([0.2, 0.2, 0.2])
     corner = np.array([0.2 * (np.cos(angle) - np.sin(angle)), 0.2 * (np.cos(angle) + np.sin(angle))])
@@ -304,5 +304,5 @@ def test_desynchronised_motion_is_no_model_error():
 @pytest.mark.slow
 def test_best_method_of_the_project_passes_the_tumbling_box():
     """Its errors shrink with the step in each flight; a metric over more and more flights would not."""
-    engine = "document[contact=sequential,law=coulomb,rotation=rk4]"
+    engine = "wang[contact=sequential,law=coulomb,rotation=rk4]"
     assert ds.run("drop-box-anyhow", engine).exit_code() == 0

@@ -81,11 +81,11 @@ def test_missing_engine_costs_its_row_and_fails_only_if_named(package):
         f"import sys; sys.modules[{package!r}] = None\n"
         "from dataclasses import replace\n"
         "import dropspin as ds\n"
-        f"found = ds.run('drop-ball', ['document', {package!r}], 4e-3)\n"
+        f"found = ds.run('drop-ball', ['wang', {package!r}], 4e-3)\n"
         f"[row] = found.table[found.table['engine'] == {package!r}].to_dict('records')\n"
         "print(row['verdict'], row['reason'])\n"
         f"print(found.exit_code(), replace(found, provenance={{**found.provenance, 'named': [{package!r}]}}).exit_code())\n"
-        "print((found.table['engine'] == 'document').sum())\n"
+        "print((found.table['engine'] == 'wang').sum())\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     first, codes, rows = done.stdout.splitlines()

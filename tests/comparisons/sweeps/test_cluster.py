@@ -137,10 +137,10 @@ def test_sweep_that_was_refused_before_its_first_job_can_be_given_again(tmp_path
     for spec in (SPEC, SPEC | {"dts": [8e-3]}):
         with pytest.raises(DropspinError, match="install the same on both"):
             run_sweep(load_sweep(spec), str(tmp_path / "out"), scheduler="tcp://host:8786")
-    run_sweep(load_sweep(SPEC | {"engines": ["document"]}), str(tmp_path / "out"))
+    run_sweep(load_sweep(SPEC | {"engines": ["wang"]}), str(tmp_path / "out"))
     assert len(table(tmp_path / "out")) == 12
     with pytest.raises(DropspinError, match="holds 12 of 12 jobs of this sweep"):
-        run_sweep(load_sweep(SPEC | {"engines": ["document"]}), str(tmp_path / "out"))
+        run_sweep(load_sweep(SPEC | {"engines": ["wang"]}), str(tmp_path / "out"))
 
 
 def test_worker_with_other_versions_refuses_its_part(tmp_path):
@@ -173,7 +173,7 @@ def test_engine_processes_of_another_sweep_are_closed(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "EngineProcesses", ProcessesHere)
     used = []
     for seconds in (5.0, 6.0):
-        work = Work.of(load_sweep(SPEC | {"engines": ["document"]}), ResourceLimits(processor_time=seconds))
+        work = Work.of(load_sweep(SPEC | {"engines": ["wang"]}), ResourceLimits(processor_time=seconds))
         cluster._run_part(work, next(work.parts), str(tmp_path / str(seconds)))
         [(owner, [processes])] = cluster._idle.items()
         used.append(processes)

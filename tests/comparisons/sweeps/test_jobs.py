@@ -19,7 +19,7 @@ from dropspin.scenarios.state import ORIENTATION, RATES
 
 SPEC = {
     "scenes": ["drop-box-anyhow", "drop-ball"],
-    "engines": ["document", "document[law=poisson]"],
+    "engines": ["wang", "wang[law=poisson]"],
     "dts": [4e-3, 2e-3, 1e-3],
     "grid": {"floor.restitution": [0.1, 0.5], "body": {"mass": {"from": 1.0, "to": 4.0, "count": 3, "spacing": "log"}}},
     "random": {"count": 5, "seed": 3, "start.position[1]": {"from": 0.6, "to": 2.0}},
@@ -92,9 +92,9 @@ def test_a_sweep_with_more_draws_begins_with_those_of_fewer():
 def test_keys_are_unique_and_the_same_in_any_sweep():
     """A job has the same key in another sweep, with another number, and with a value written as 2 or 2.0."""
     assert len(set(hashes(SWEEP, 0, SWEEP.size))) == SWEEP.size
-    fewer = load_sweep(SPEC | {"scenes": ["drop-ball"], "engines": ["document[law=poisson]"], "dts": [1e-3]})
+    fewer = load_sweep(SPEC | {"scenes": ["drop-ball"], "engines": ["wang[law=poisson]"], "dts": [1e-3]})
     assert hashes(fewer, 0, fewer.size) == hashes(SWEEP, SWEEP.size - fewer.size, SWEEP.size)
-    plain = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [1e-3]}
+    plain = {"scenes": ["drop-ball"], "engines": ["wang"], "dts": [1e-3]}
     one, same, other = (load_sweep(plain | {"grid": {"body.mass": masses}}) for masses in ([2], [2.0], [3.0]))
     assert hashes(one, 0, 1) == hashes(same, 0, 1) != hashes(other, 0, 1)
 
@@ -155,7 +155,7 @@ def test_starts_are_uniform_over_all_attitudes():
         np.testing.assert_allclose((turned**2).mean(axis=0), 1 / 3, atol=0.03)
 
 
-BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
+BALL = {"scenes": ["drop-ball"], "engines": ["wang"], "dts": [4e-3]}
 
 
 @pytest.mark.parametrize(
@@ -164,8 +164,8 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"scenes": ["drop-bal"]}, "spec: scenes: scene 'drop-bal' is not in the catalogue .* Did you mean 'drop-ball'"),
         ({"scenes": ["drop-ball", "drop-ball"]}, "scenes: got .*; names one twice"),
         ({"scenes": []}, "scenes: got .*at least 1 item"),
-        ({"engines": ["documnt"]}, "Did you mean 'document'"),
-        ({"engines": ["document", "document[law=note]"]}, "engines: the same engine is named twice, written in two ways"),
+        ({"engines": ["documnt"]}, "Did you mean 'wang'"),
+        ({"engines": ["wang", "wang[law=note]"]}, "engines: the same engine is named twice, written in two ways"),
         ({"dts": []}, "the time step is missing"),
         ({"dts": [0.0]}, r"dts\[0\]: got 0.0; must be greater than 0"),
         ({"dts": [1.0]}, "dt: got 1.0 s; scene 'drop-ball' lasts 1.5 s"),
@@ -194,8 +194,8 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
         ({"grid": {"floor.restitution": [0.1], "floor": {"restitution": [0.5]}}}, "floor.restitution: is given twice"),
         ({"grid": {"engine.law": [[1, 2]]}}, "the value of an option is a word or a number"),
         (
-            {"grid": {"engine.law": ["note"]}, "engines": ["document[law=coulomb]"]},
-            r"document\[law=coulomb\] sets this option as well; leave it out there or here",
+            {"grid": {"engine.law": ["note"]}, "engines": ["wang[law=coulomb]"]},
+            r"wang\[law=coulomb\] sets this option as well; leave it out there or here",
         ),
         ({"grid": {"body.mass": [10**400]}}, "got a whole number that exceeds the range"),
         *(
@@ -229,8 +229,8 @@ BALL = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3]}
             {"grid": {"start.position": [[0, 2, 0]], "start.position[1]": [1.5]}},
             "is a part of start.position, which is swept as well; leave one of them out",
         ),
-        ({"grid": {"engine.kappa": [0.1]}}, "document's option 'kappa' is unknown"),
-        ({"grid": {"engine.law": ["notes"]}}, "document's law 'notes' is unknown. Did you mean 'note'"),
+        ({"grid": {"engine.kappa": [0.1]}}, "wang's option 'kappa' is unknown"),
+        ({"grid": {"engine.law": ["notes"]}}, "wang's law 'notes' is unknown. Did you mean 'note'"),
         ({"random": {"seed": 1, "body.mass": {"from": 1, "to": 2}}}, "random: count: missing"),
         ({"random": {"count": 2, "seed": 1}}, "random: no field is given; add one with its range"),
         ({"random": {"count": 2, "seed": 1, "body.mass": [1, 2]}}, "must be a range to draw from"),
@@ -264,7 +264,7 @@ def test_spec_that_is_not_valid_is_refused_in_one_line(change, message):
     ],
 )
 def test_equivalent_values_have_the_same_key(one, other):
-    keys = [hashes(load_sweep(BALL | {"engines": ["document[law=coulomb]"], "grid": grid}), 0, 1) for grid in (one, other)]
+    keys = [hashes(load_sweep(BALL | {"engines": ["wang[law=coulomb]"], "grid": grid}), 0, 1) for grid in (one, other)]
     assert keys[0] == keys[1]
 
 
@@ -284,5 +284,5 @@ def test_spec_of_the_documentation_is_valid(tmp_path):
 
 def test_paths_of_scenes_are_relative_to_the_spec(tmp_path):
     (tmp_path / "mine.toml").write_text('duration = 1.0\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
-    (tmp_path / "spec.toml").write_text('scenes = ["mine.toml"]\nengines = ["document"]\ndts = [0.01]\n[grid]\nbody.mass = [1.0, 2.0]\n')
+    (tmp_path / "spec.toml").write_text('scenes = ["mine.toml"]\nengines = ["wang"]\ndts = [0.01]\n[grid]\nbody.mass = [1.0, 2.0]\n')
     assert load_sweep(tmp_path / "spec.toml").size == 2

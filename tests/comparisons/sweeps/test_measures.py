@@ -40,7 +40,7 @@ def metrics_of_a_run(scene, motion):
 def test_standard_metrics_are_those_of_a_run(name):
     """All scenes, three engines: the same bits, and NaN in the same places."""
     scene = load(name)
-    for label in ("document", "mujoco", "pybullet"):
+    for label in ("wang", "mujoco", "pybullet"):
         if engine(label).declines(scene) is not None:
             continue
         with warnings.catch_warnings(action="ignore"):
@@ -60,7 +60,7 @@ def run_all(sweep):
 def test_free_fall_ends_at_the_closed_form_of_semi_implicit_euler():
     """From rest y₀ − g h² n(n+1)/2 and −g h n, for each job's own step and gravity; energy does not drift."""
     axes = {"start.position[1]": [100.0, 200.0], "gravity.acceleration[1]": {"from": -20.0, "to": -1.0, "count": 7}}
-    sweep = load_sweep({"scenes": ["drop-ball"], "engines": ["document"], "grid": {"dt": [1e-3, 3e-3, 7e-3], **axes}})
+    sweep = load_sweep({"scenes": ["drop-ball"], "engines": ["wang"], "grid": {"dt": [1e-3, 3e-3, 7e-3], **axes}})
     outcomes, metrics = run_all(sweep)
     [jobs] = sweep.jobs(0, sweep.size)
     n, g, height = outcomes.steps, jobs.values["gravity.acceleration[1]"], jobs.values["start.position[1]"]
@@ -75,7 +75,7 @@ def test_free_fall_ends_at_the_closed_form_of_semi_implicit_euler():
 def test_ball_rebounds_to_the_height_of_its_restitution():
     """A ball dropped by H comes back to R + e² H, over R + H, to 5e-4 (an impact is detected up to a step late: g h / v of the fall)."""
     sweep = load_sweep(
-        {"scenes": ["drop-ball"], "engines": ["document", "mujoco"], "dts": [1e-4], "grid": {"floor.restitution": [0.2, 0.5, 0.9]}}
+        {"scenes": ["drop-ball"], "engines": ["wang", "mujoco"], "dts": [1e-4], "grid": {"floor.restitution": [0.2, 0.5, 0.9]}}
     )
     outcomes, metrics = run_all(sweep)
     e = np.tile([0.2, 0.5, 0.9], 2)
@@ -103,7 +103,7 @@ def run_one_by_one(sweep):
 EVERYTHING = [
     {
         "scenes": ["drop-box-anyhow"],
-        "engines": ["document"],
+        "engines": ["wang"],
         "dts": [4e-3],
         "seeds": 10,
         "random": {
@@ -121,21 +121,21 @@ EVERYTHING = [
     },
     {
         "scenes": ["drop-box-anyhow"],
-        "engines": ["document[rotation=exact,law=coulomb]", "document[contact=sequential,law=coulomb]"],
+        "engines": ["wang[rotation=exact,law=coulomb]", "wang[contact=sequential,law=coulomb]"],
         "grid": {"floor.friction": [0.0, 0.3]},
         "random": {"count": 6, "seed": 1, "dt": {"from": 1e-3, "to": 0.3, "spacing": "log"}, "duration": {"from": 0.1, "to": 0.5}},
         "metrics": ["energy_error", "bounce_height_error"],
     },
     {
         "scenes": ["drop-ball"],
-        "engines": ["document"],
+        "engines": ["wang"],
         "grid": {"floor.friction": [0.0, 0.3], "engine.correction": ["none", "projection"]},
         "random": {"count": 6, "seed": 1, "dt": {"from": 1e-3, "to": 0.3, "spacing": "log"}, "duration": {"from": 0.1, "to": 0.5}},
         "metrics": ["energy_error", "bounce_height_error"],
     },
     {
         "scenes": ["drop-box-anyhow"],
-        "engines": ["document"],
+        "engines": ["wang"],
         "dts": [4e-3],
         "grid": {
             "floor.friction": ["none", "infinite", 0.3],
@@ -145,13 +145,13 @@ EVERYTHING = [
     },
     {
         "scenes": ["spin-asymmetric", "fall-spin"],
-        "engines": ["document"],
+        "engines": ["wang"],
         "dts": [4e-3],
         "grid": {"start.angular_velocity[0]": [1, 1e3, 1e50], "body.mass": [1.0, 1e-200]},
     },
     {
         "scenes": ["spin-damped"],
-        "engines": ["document", "mujoco"],
+        "engines": ["wang", "mujoco"],
         "dts": [4e-3],
         "random": {"count": 20, "seed": 2, "damping.linear": {"from": 0, "to": 2}, "damping.angular": {"from": 0, "to": 2}},
     },
@@ -237,9 +237,9 @@ def test_other_engines_keep_no_state_between_jobs(label):
 def test_requested_metrics_are_those_of_measure():
     """NaN where a metric does not apply to the scene."""
     scenes, asked = ["drop-ball", "spin-asymmetric"], ["energy_error", "bounce_height_error", "orientation_error"]
-    sweep = load_sweep({"scenes": scenes, "engines": ["document", "mujoco"], "dts": [2e-3], "metrics": asked})
+    sweep = load_sweep({"scenes": scenes, "engines": ["wang", "mujoco"], "dts": [2e-3], "metrics": asked})
     found = run_jobs(sweep, 0, sweep.size).metrics
-    for (name, label), row in zip([(name, label) for name in scenes for label in ("document", "mujoco")], found, strict=True):
+    for (name, label), row in zip([(name, label) for name in scenes for label in ("wang", "mujoco")], found, strict=True):
         expected = ds.measure(load(name), ds.simulate(load(name), label, 2e-3))
         assert list(row) == pytest.approx([expected.get(metric, np.nan) for metric in asked], nan_ok=True, rel=1e-15)
 
@@ -247,7 +247,7 @@ def test_requested_metrics_are_those_of_measure():
 def test_jobs_that_are_not_valid_report_the_reason():
     """A body below the floor, a step too long, a friction that the law does not support: each in its own row; the others are measured."""
     grid = {"start.position[1]": [0.05, 1.0], "floor.friction": [0.0, 0.3], "dt": [1e-2, 0.5]}
-    sweep = load_sweep({"scenes": ["drop-ball"], "engines": ["document"], "grid": grid | {"body.radius": [0.01, 0.1]}})
+    sweep = load_sweep({"scenes": ["drop-ball"], "engines": ["wang"], "grid": grid | {"body.radius": [0.01, 0.1]}})
     outcomes = run_jobs(sweep, 0, sweep.size)
     [jobs] = sweep.jobs(0, sweep.size)
     low = (jobs.values["start.position[1]"] == 0.05) & (jobs.values["body.radius"] == 0.1)

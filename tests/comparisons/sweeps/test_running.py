@@ -29,7 +29,7 @@ from dropspin.scenarios import DropspinError
 DROPSPIN = Path(sys.executable).with_name("dropspin")
 SPEC = {
     "scenes": ["drop-ball"],
-    "engines": ["document"],
+    "engines": ["wang"],
     "dts": [4e-3],
     "grid": {"floor.restitution": [0.2, 0.4, 0.6, 0.8], "start.position[1]": [0.5, 1.0]},
 }
@@ -87,9 +87,9 @@ def test_engine_that_breaks_costs_its_own_rows(tmp_path):
     exact = found[found["engine"] == "exact"].reset_index(drop=True)
     numbers = [name for name in found.columns if found[name].dtype == float]
     pd.testing.assert_frame_equal(bad.loc[[3, 7], numbers], exact.loc[[3, 7], numbers], check_exact=True)
-    run_sweep(sweep, str(tmp_path / "document"))
-    document = found[found["engine"] == "document"].reset_index(drop=True)
-    pd.testing.assert_frame_equal(document, table(tmp_path / "document"), check_exact=True)
+    run_sweep(sweep, str(tmp_path / "wang"))
+    document = found[found["engine"] == "wang"].reset_index(drop=True)
+    pd.testing.assert_frame_equal(document, table(tmp_path / "wang"), check_exact=True)
 
 
 class Leaking(test_engines.Exact):
@@ -256,7 +256,7 @@ def processes_of(folder):
 
 def test_killed_sweep_is_resumed_to_the_same_table(tmp_path):
     """SIGKILL at three random moments, resumed each time: the table of one never killed, bit for bit, and no process left behind."""
-    spec = write_spec(tmp_path, 60, "drop-ball", ["document", "mujoco"])
+    spec = write_spec(tmp_path, 60, "drop-ball", ["wang", "mujoco"])
     run_sweep(load_sweep(spec), str(tmp_path / "whole"))
     assert killed_and_resumed(spec, tmp_path / "killed", kills=3, seed=1) == 3
     assert_same(tmp_path / "killed", tmp_path / "whole")
@@ -268,7 +268,7 @@ def test_killed_sweep_is_resumed_to_the_same_table(tmp_path):
 @pytest.mark.slow
 def test_two_thousand_jobs_killed_twenty_times(tmp_path):
     """Three engines, 2,004 jobs, SIGKILL at twenty random moments: the same table."""
-    spec = write_spec(tmp_path, 334, "drop-box-tumble", ["document", "mujoco", "pybullet"])
+    spec = write_spec(tmp_path, 334, "drop-box-tumble", ["wang", "mujoco", "pybullet"])
     subprocess.run([DROPSPIN, "sweep", spec, "-o", tmp_path / "whole"], check=True, capture_output=True)
     assert killed_and_resumed(spec, tmp_path / "killed", kills=20, seed=2) == 20
     assert_same(tmp_path / "killed", tmp_path / "whole")

@@ -50,16 +50,16 @@ def test_transformed_scene_is_another_and_has_the_same_solution(name):
 
 def test_document_keeps_every_symmetry_of_every_scene_that_it_runs():
     """What the note gets wrong is wrong alike in every direction, at every place and in all units."""
-    found = symmetries(engines="document", dt=2e-3)
+    found = symmetries(engines="wang", dt=2e-3)
     assert {one.status for one in found if one.scene != "roll-ball"} <= {"kept", "not run"}
     assert {one.status for one in found if one.scene in ("spin-asymmetric", "drop-box-anyhow", "drop-box-sticking")} == {"kept"}
 
 
 def test_findings_do_not_depend_on_the_number_of_jobs():
-    one, two = (symmetries(["fall-tilted", "spin-principal"], [made.Exact(), "document"], dt=DT, jobs=jobs) for jobs in (1, 2))
+    one, two = (symmetries(["fall-tilted", "spin-principal"], [made.Exact(), "wang"], dt=DT, jobs=jobs) for jobs in (1, 2))
     assert repr(one) == repr(two)
     assert [(found.scene, found.engine) for found in one if found.symmetry == AGAIN] == [
-        (scene, name) for scene in ("fall-tilted", "spin-principal") for name in ("exact", "document")
+        (scene, name) for scene in ("fall-tilted", "spin-principal") for name in ("exact", "wang")
     ]
 
 
@@ -248,13 +248,13 @@ def test_boost_applies_where_nothing_slows_the_body():
 
 
 def test_engines_that_do_not_run_have_a_reason_and_cost_no_other_engine_its_findings():
-    found = symmetries(["drop-ball"], [made.Crashing(), "document"], dt=DT)
+    found = symmetries(["drop-ball"], [made.Crashing(), "wang"], dt=DT)
     crashing = [one for one in found if one.engine == "crashing"]
     assert {one.symmetry for one in crashing} == set(NAMES)
     assert {(one.status, "no such thing as a floor" in one.reason) for one in crashing} == {("not run", True)}
-    assert {one.status for one in found if one.engine == "document"} == {"kept"}
+    assert {one.status for one in found if one.engine == "wang"} == {"kept"}
 
 
 def test_time_step_is_verified():
     with pytest.raises(DropspinError, match="dt: got 0"):
-        symmetries("drop-ball", "document", dt=0.0)
+        symmetries("drop-ball", "wang", dt=0.0)

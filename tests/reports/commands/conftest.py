@@ -81,7 +81,7 @@ ENSEMBLE = {
 def small():
     """A run of two scenes, one of them an ensemble."""
     spin = load("spin-principal").model_dump(exclude_none=True, exclude={"expect"}) | {"duration": 0.2}
-    return run([spin, ENSEMBLE], ["document", "mujoco"], 1e-2)
+    return run([spin, ENSEMBLE], ["wang", "mujoco"], 1e-2)
 
 
 @pytest.fixture(scope="session")

@@ -30,7 +30,7 @@ def test_settings_and_texts_to_paste(tmp_path, monkeypatch):
         (["--restitution", "0.5", "--dt", "1"], "dt: got 1.0 s"),
         (["--restitution", "0.5", "--dt", "0.002", "--friction", "some"], "friction: got 'some'; give none, infinite or a coefficient."),
         (["--restitution", "0.5", "--dt", "0.002", "--as", "urdf"], "mujoco's language 'urdf' is unknown"),
-        (["--restitution", "0.5", "--dt", "0.002", "-e", "document"], "document has no settings to calibrate"),
+        (["--restitution", "0.5", "--dt", "0.002", "-e", "wang"], "wang has no settings to calibrate"),
     ],
 )
 def test_a_calibration_that_is_impossible_is_refused(given, message, tmp_path):

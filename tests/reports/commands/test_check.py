@@ -69,7 +69,7 @@ def test_check_reads_by_default_the_baseline_that_accept_writes_by_default(repos
 
 def test_run_that_the_default_baseline_does_not_cover_is_refused_with_the_remedy(repository, tmp_path):
     for extra, reason in ((), "none of the "), (("--quick",), "a quick run has too few starts"):
-        dropspin("run", "fall-spin", "-e", "document", "--dt", "0.01", *extra, "-o", tmp_path / "run", cwd=repository)
+        dropspin("run", "fall-spin", "-e", "wang", "--dt", "0.01", *extra, "-o", tmp_path / "run", cwd=repository)
         done = dropspin("check", tmp_path / "run", cwd=repository)
         assert done.returncode == 2
         assert done.stderr.startswith(f"dropspin: dropspin-baseline.toml: {reason}")
@@ -137,11 +137,11 @@ def test_a_crash_cannot_be_accepted(repository, tmp_path):
 def test_summary_counts_an_engine_that_could_not_be_used(fault, tmp_path):
     (tmp_path / "my_engine.py").write_text(fault)
     (tmp_path / "spin.toml").write_text('duration = 0.1\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
-    assert dropspin("run", "spin.toml", "-e", ENGINE, "-e", "document", "--dt", "0.01", "-o", "out", cwd=tmp_path).returncode == 3
+    assert dropspin("run", "spin.toml", "-e", ENGINE, "-e", "wang", "--dt", "0.01", "-o", "out", cwd=tmp_path).returncode == 3
     assert dropspin("check", "out", "--summary", "summary.md", cwd=tmp_path).returncode == 3
     rows = [line.split("|")[1:-1] for line in (tmp_path / "summary.md").read_text().splitlines() if line.startswith("| ")]
     assert [cell.strip() for cell in rows[0]] == ["engine", "passed", "failed", "known", "limited", "broke down or missing"]
-    assert {row[0].strip().replace("\\", ""): int(row[-1]) for row in rows[1:]} == {ENGINE: 1, "document": 0}
+    assert {row[0].strip().replace("\\", ""): int(row[-1]) for row in rows[1:]} == {ENGINE: 1, "wang": 0}
 
 
 def test_an_engine_that_can_no_longer_be_imported_loses_its_accepted_results(repository, junit_schema, tmp_path):

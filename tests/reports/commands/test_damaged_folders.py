@@ -82,8 +82,8 @@ JSON = (
     | {
         "unknown key": edited("more", to=1),
         "no engines": edited("engines", to=[]),
-        "an engine twice": edited("engines", to=["document", "document"]),
-        "engine that did not run": edited("engines", to=["document", "other"]),
+        "an engine twice": edited("engines", to=["wang", "wang"]),
+        "engine that did not run": edited("engines", to=["wang", "other"]),
         "control characters": edited("provenance", "cpu", to="\x1b[2J"),
         "time step of NaN": edited("provenance", "asked", "dts", to=[float("nan")]),
         "time step as text": edited("provenance", "asked", "dts", to=["0.01"]),

@@ -16,7 +16,7 @@ mass = 1.0
 [start]
 velocity = [1.0, 0.0, 0.0]
 """
-SPEC = 'scenes = ["ball.toml"]\nengines = ["document"]\ndts = [0.01]\n[grid]\n'
+SPEC = 'scenes = ["ball.toml"]\nengines = ["wang"]\ndts = [0.01]\n[grid]\n'
 DIGITS = "9" * 5000
 FILES = {
     "ball.toml": BALL,
@@ -32,7 +32,7 @@ FILES = {
     "long.toml": f"{'x' * 5000} = 1\n{BALL}",
     "not.toml": "{",
 }
-RUN = ("run", "ball.toml", "-e", "document", "--dt", "0.01")
+RUN = ("run", "ball.toml", "-e", "wang", "--dt", "0.01")
 TOO_LARGE = "has a whole number that exceeds the range of floating-point numbers."
 NOT_A_FILE = "is a pipe or a device; a"
 CASES = [
@@ -52,7 +52,7 @@ CASES = [
     (("limits", "pipe"), NOT_A_FILE),
     (("run", "/dev/zero"), NOT_A_FILE),
     ((*RUN, "-o", "/"), "cannot be replaced; choose a folder inside it."),
-    (("tradeoff", "ball.toml", "-e", "document", "-o", ""), "-o: got an empty name; give the name of a folder."),
+    (("tradeoff", "ball.toml", "-e", "wang", "-o", ""), "-o: got an empty name; give the name of a folder."),
     ((*RUN, "-o", ""), "cannot be replaced; choose a folder inside it."),
     ((*RUN, "-o", os.fsdecode(b"\xff\xfe")), r"the argument '\udcff\udcfe' is not printable text"),
     ((*RUN, "-o", "x" * 5000), "is not printable text of at most 4096 characters"),
@@ -63,17 +63,17 @@ CASES = [
     ((*RUN, "--time-limit", "nan"), "nan is not"),
     ((*RUN, "--time-limit", "1e-300"), "1e-300 is not in the range"),
     ((*RUN, "--dt", "nan"), "a step must be at least"),
-    (("limits", "ball.toml", "-e", "document", "--within", "nan"), "within"),
-    (("limits", "ball.toml", "-e", "document", "--within", "inf"), "within"),
-    (("tradeoff", "ball.toml", "-e", "document", "--budget", "nan"), "nan is not"),
-    (("tradeoff", "ball.toml", "-e", "document", "--within", "nan"), "nan is not a finite number"),
-    (("tradeoff", "ball.toml", "-e", "document", "--within", "inf"), "inf is not a finite number"),
+    (("limits", "ball.toml", "-e", "wang", "--within", "nan"), "within"),
+    (("limits", "ball.toml", "-e", "wang", "--within", "inf"), "within"),
+    (("tradeoff", "ball.toml", "-e", "wang", "--budget", "nan"), "nan is not"),
+    (("tradeoff", "ball.toml", "-e", "wang", "--within", "nan"), "nan is not a finite number"),
+    (("tradeoff", "ball.toml", "-e", "wang", "--within", "inf"), "inf is not a finite number"),
     (("replay", "out", "--speed", "inf"), "inf is not a finite number"),
     (("calibrate", "--restitution", "0.5", "--dt", "0.002", "--friction", "1e30"), "friction above 1e+09; the floor has 1e+30"),
     (("show", "bracket.toml"), "a[b: unknown key. Allowed: "),
     (("show", "member.toml"), "constrained-x: unknown key. Allowed: "),
     (("show", "two\nlines.toml"), r"the argument 'two\nlines.toml' is not printable text"),
-    (("tradeoff", "ball.toml", "-e", "document", "--budget", "1e300"), "is not in the range"),
+    (("tradeoff", "ball.toml", "-e", "wang", "--budget", "1e300"), "is not in the range"),
     (("run", "--draw", DIGITS), "is not printable text of at most 4096 characters"),
     (("run", "--draw", "9" * 4000), "whole number"),
     (("run", "--draw", "1", "--seed", "9" * 4000), "seed"),

@@ -32,7 +32,7 @@ def test_written_adapter_passes_the_written_tests(tmp_path):
         ("moteur_à_balles", "give a name for a Python module"),
         ("x" * 61, "at most 60 characters"),
         ("mujoco_warp", "'mujoco_warp', which is already the name of an engine; choose another one, such as mujoco_warp_adapter."),
-        ("document", "already the name of an engine"),
+        ("wang", "already the name of an engine"),
         ("json", "'json', which is already the name of an importable module; choose another one, such as json_adapter."),
         ("dropspin", "already the name of an importable module"),
     ],

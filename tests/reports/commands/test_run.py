@@ -42,12 +42,12 @@ friction = "infinite"
 def test_a_scene_file_runs_and_its_arrays_are_those_of_simulate(tmp_path):
     """Any path works, and the trajectories equal those of the Python call, bit for bit."""
     (tmp_path / "my-scene.toml").write_text(SCENE)
-    done = dropspin("run", "my-scene.toml", "-e", "document", "-e", "mujoco", "--dt", "0.002", "-o", "out/mine", cwd=tmp_path)
+    done = dropspin("run", "my-scene.toml", "-e", "wang", "-e", "mujoco", "--dt", "0.002", "-o", "out/mine", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "Report: out/mine/report.html" in done.stdout
     assert (tmp_path / "out/mine/report.html").is_file()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my-scene.toml", "out"]
-    for engine in ("document", "mujoco"):
+    for engine in ("wang", "mujoco"):
         motion = simulate(load(tmp_path / "my-scene.toml"), engine, dt=2e-3)
         [file] = (tmp_path / "out/mine/trajectories").glob(f"*-{engine}-*.npz")
         with np.load(file, allow_pickle=False) as arrays:
@@ -119,7 +119,7 @@ def test_expectations_for_other_steps_are_not_called_missing(tmp_path):
     [
         ('metric = "energy_eror"\nbelow = 1', "Did you mean 'energy_error'?"),
         ('metric = "horizontal_momentum_error"\nbelow = 1', "it needs a frictionless floor"),
-        ('metric = "penetration"\nbelow = 1\nengine = "documnt"', "no such engine. Did you mean 'document'?"),
+        ('metric = "penetration"\nbelow = 1\nengine = "documnt"', "no such engine. Did you mean 'wang'?"),
         ('metric = "penetration"\nbelow = 1\nengine = "mujoco[integrator=euler]"', "write it as 'mujoco'"),
     ],
 )

@@ -41,6 +41,6 @@ def test_show_prints_a_scene_or_what_an_engine_builds_of_it(tmp_path):
 
 def test_doctor_reports_that_every_installed_engine_steps(tmp_path):
     rows = {row["what"]: row["found"] for row in json.loads(dropspin("doctor", "--json", cwd=tmp_path).stdout)}
-    assert rows["engine document"].startswith("works")
+    assert rows["engine wang"].startswith("works")
     assert rows["engine mujoco"].startswith("works")
     assert rows["python"] == sys.version.split()[0]

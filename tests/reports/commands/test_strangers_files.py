@@ -120,7 +120,7 @@ def test_names_of_runs_are_printed_without_control_characters(small_folder, tmp_
 def sweep(tmp_path_factory):
     """A sweep of two jobs."""
     where = tmp_path_factory.mktemp("sweep") / "out"
-    spec = {"scenes": ["drop-ball"], "engines": ["document"], "dts": [4e-3], "grid": {"floor.restitution": [0.2, 0.4]}}
+    spec = {"scenes": ["drop-ball"], "engines": ["wang"], "dts": [4e-3], "grid": {"floor.restitution": [0.2, 0.4]}}
     run_sweep(load_sweep(spec), str(where))
     return where
 

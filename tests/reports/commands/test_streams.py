@@ -22,11 +22,11 @@ angular_velocity = [1.0, 5.0, 0.5]
 """
 FAILING = '[[expect]]\nmetric = "orientation_error"\nbelow = 1e-15\nreason = "no method of a finite order is that accurate"\n'
 MEASURING = {
-    "run": (["run", "box.toml", "-e", "document", "--dt", "0.01", "--quick"], "report.html"),
-    "run -v": (["run", "box.toml", "-e", "document", "--dt", "0.01", "--quick", "-v"], "report.html"),
-    "tradeoff": (["tradeoff", "box.toml", "-e", "document[rotation=rk4]", "--budget", "1e-9"], "tradeoff.md"),
-    "limits": (["limits", "box.toml", "-e", "document", "--axis", "mass", "--dt", "0.05"], "limits.md"),
-    "symmetries": (["symmetries", "box.toml", "-e", "document", "--dt", "0.05"], "symmetries.md"),
+    "run": (["run", "box.toml", "-e", "wang", "--dt", "0.01", "--quick"], "report.html"),
+    "run -v": (["run", "box.toml", "-e", "wang", "--dt", "0.01", "--quick", "-v"], "report.html"),
+    "tradeoff": (["tradeoff", "box.toml", "-e", "wang[rotation=rk4]", "--budget", "1e-9"], "tradeoff.md"),
+    "limits": (["limits", "box.toml", "-e", "wang", "--axis", "mass", "--dt", "0.05"], "limits.md"),
+    "symmetries": (["symmetries", "box.toml", "-e", "wang", "--dt", "0.05"], "symmetries.md"),
     "sweep": (["sweep", "spec.toml"], "parts"),
 }
 
@@ -35,7 +35,7 @@ MEASURING = {
 def scenes(tmp_path):
     (tmp_path / "box.toml").write_text(SCENE)
     (tmp_path / "failing.toml").write_text(SCENE + FAILING)
-    (tmp_path / "spec.toml").write_text('scenes = ["box.toml"]\nengines = ["document"]\ndts = [0.01]\n')
+    (tmp_path / "spec.toml").write_text('scenes = ["box.toml"]\nengines = ["wang"]\ndts = [0.01]\n')
     return tmp_path
 
 
@@ -66,7 +66,7 @@ def test_closed_pipe_loses_no_file_and_keeps_the_exit_code(name, scenes, closed_
 
 def test_exit_code_of_a_failed_check_is_that_with_a_closed_pipe_and_on_a_full_device(scenes, closed_pipe, full_device):
     for stream in (closed_pipe, full_device):
-        run = ("run", "failing.toml", "-e", "document", "--dt", "0.01", "-o", "out")
+        run = ("run", "failing.toml", "-e", "wang", "--dt", "0.01", "-o", "out")
         assert dropspin(*run, cwd=scenes, stdout=stream).returncode == 1
         assert dropspin("check", "out", cwd=scenes, stdout=stream).returncode == 1
 
@@ -86,7 +86,7 @@ def test_closed_pipe_is_quiet_in_a_process_of_its_own(arguments):
     ("arguments", "code"),
     [
         (MEASURING["run"][0], 0),
-        (["run", "failing.toml", "-e", "document", "--dt", "0.01"], 1),
+        (["run", "failing.toml", "-e", "wang", "--dt", "0.01"], 1),
         (["run", "no-such-scene"], 2),
         (["run", "--no-such-option"], 2),
         (["show", "drop-ball", "-e", "my_engine:Mine"], 3),
@@ -112,11 +112,11 @@ def test_full_device_for_the_output_is_said_and_loses_no_file(scenes):
 def test_progress_says_which_scenes_are_finished_and_which_still_run(capsys):
     """Scenes run in parallel: that one starts does not mean that the one before it is finished."""
     with progress_bar(3, 2) as shown:
-        shown.on_progress(Progress("resumed", "document", 0.01, finished=True))
+        shown.on_progress(Progress("resumed", "wang", 0.01, finished=True))
         for scene in ("long", "short"):
-            shown.on_progress(Progress(scene, "document", 0.01))
+            shown.on_progress(Progress(scene, "wang", 0.01))
         for _ in range(2):
-            shown.on_progress(Progress("short", "document", 0.01, finished=True))
+            shown.on_progress(Progress("short", "wang", 0.01, finished=True))
         shown.on_finished("short")
         shown.on_finished("long")
     lines = capsys.readouterr().err.splitlines()

@@ -24,7 +24,7 @@ mass = 1.0
 [start]
 velocity = [1.0, 0.0, 0.0]
 """
-RUN = ("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "out")
+RUN = ("run", "ball.toml", "-e", "wang", "--dt", "0.01", "-o", "out")
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_broken_engine_is_a_row_of_doctor_and_of_the_list(tmp_path):
     rows = {row["what"]: row["found"] for row in json.loads(done.stdout)}
     assert rows["engine drake"].startswith(f"broken: {REASON}")
     assert CURE in rows["engine drake"]
-    assert rows["engine document"].startswith("works")
+    assert rows["engine wang"].startswith("works")
     done = dropspin("list", "engines", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert next(row["summary"] for row in json.loads(done.stdout) if row["engine"] == "drake").startswith(REASON)
@@ -100,7 +100,7 @@ def test_broken_engine_costs_its_own_row(tmp_path):
     [row] = [row for row in rows if row["engine"] == "drake"]
     assert row["verdict"] == "broken"
     assert row["reason"].startswith(REASON)
-    assert {row["verdict"] for row in rows if row["engine"] == "document"} <= {"passed", "measured"}
+    assert {row["verdict"] for row in rows if row["engine"] == "wang"} <= {"passed", "measured"}
     assert dropspin("run", "ball.toml", "-e", "drake", "-o", "alone", cwd=tmp_path).returncode == 3
     for command in (("show", "drop-ball", "-e", "drake"), ("conform", "drake")):
         done = dropspin(*command, cwd=tmp_path)

@@ -10,17 +10,17 @@ from dropspin.comparisons.measuring.symmetries import NAMES
 
 def test_table_sentences_and_files(tmp_path):
     """An engine that keeps every symmetry, one that loses some, and one that declines the scene; the section is part of a report."""
-    asked = ("symmetries", "slide-box", "--dt", "0.002", "-e", "document", "-e", "mujoco[profile=default]", "-e", "document[law=coulomb]")
+    asked = ("symmetries", "slide-box", "--dt", "0.002", "-e", "wang", "-e", "mujoco[profile=default]", "-e", "wang[law=coulomb]")
     done = dropspin(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[0].split() == ["the", "scene", "document", "mujoco[profile=default]", "document[law=coulomb]"]
+    assert lines[0].split() == ["the", "scene", "wang", "mujoco[profile=default]", "wang[law=coulomb]"]
     table = {name: next(line for line in lines if line.startswith(name))[len(name) :].split() for name in ("turned by 1 rad", "again")}
     assert table["turned by 1 rad"][:3] == ["–", "✗", "1e+00"]
     assert table["turned by 1 rad"][3] == "✓"
     assert table["again"] == ["–", "✓", "0", "✓", "0"]
     assert any(line.startswith("mujoco[profile=default], turned by 1 rad: another motion in slide-box, from step ") for line in lines)
-    assert any(line.startswith("Not run: document in slide-box: law=note has no Coulomb coefficient") for line in lines)
+    assert any(line.startswith("Not run: wang in slide-box: law=note has no Coulomb coefficient") for line in lines)
     assert "✓ kept up to rounding" in done.stdout
     assert lines[-2:] == [
         "Written: out/symmetries/symmetries.md",
@@ -34,7 +34,7 @@ def test_table_sentences_and_files(tmp_path):
     [turned] = [row for row in rows if row["engine"].startswith("mujoco") and row["symmetry"] == "turned by 1 rad"]
     assert turned["status"] == "lost"
     assert turned["time"] == pytest.approx(0.002 * turned["step"])
-    assert dropspin("run", "drop-ball", "-e", "document", "--dt", "0.01", "-o", "run", cwd=tmp_path).returncode == 0
+    assert dropspin("run", "drop-ball", "-e", "wang", "--dt", "0.01", "-o", "run", cwd=tmp_path).returncode == 0
     assert dropspin("report", "run", "--add", "out/symmetries", cwd=tmp_path).returncode == 0
     assert "Symmetries and repeated runs" in (tmp_path / "run/report.html").read_text()
 

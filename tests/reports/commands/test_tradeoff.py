@@ -21,14 +21,14 @@ angular_velocity = [1.0, 5.0, 0.5]
 
 def test_pareto_front_recommendations_and_files(tmp_path):
     (tmp_path / "short.toml").write_text(SCENE)
-    asked = ("tradeoff", "short.toml", "-e", "document[rotation=rk4]", "-e", "document[rotation=exact]", "-e", "document")
+    asked = ("tradeoff", "short.toml", "-e", "wang[rotation=rk4]", "-e", "wang[rotation=exact]", "-e", "wang")
     done = dropspin(*asked, "--within", "1e-9", "--within", "1e-30", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     output = " ".join(done.stdout.split())
-    assert "orientation error within 1e-09 rad: document[rotation=" in output
-    assert "within 1e-30 rad: no tested configuration reaches it; the most accurate is document[rotation=" in output
-    assert "Left out: document, no convergence observed: orientation error is" in output
-    assert "No smaller time step was tried because over the last 2 steps the error fell by less than a fifth per step: document[" in output
+    assert "orientation error within 1e-09 rad: wang[rotation=" in output
+    assert "within 1e-30 rad: no tested configuration reaches it; the most accurate is wang[rotation=" in output
+    assert "Left out: wang, no convergence observed: orientation error is" in output
+    assert "No smaller time step was tried because over the last 2 steps the error fell by less than a fifth per step: wang[" in output
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "section.json",
         "short.svg",
@@ -37,8 +37,8 @@ def test_pareto_front_recommendations_and_files(tmp_path):
         "tradeoff.md",
     ]
     rows = json.loads((tmp_path / "out" / "tradeoff.json").read_text())
-    assert {row["engine"] for row in rows} == {"document[rotation=rk4]", "document[rotation=exact]", "document"}
-    assert {row["engine"] for row in rows if row["left_out"]} == {"document"}
+    assert {row["engine"] for row in rows} == {"wang[rotation=rk4]", "wang[rotation=exact]", "wang"}
+    assert {row["engine"] for row in rows if row["left_out"]} == {"wang"}
     compared = [row for row in rows if not row["left_out"]]
     assert all(row["cost_best"] <= row["cost"] for row in compared)
     assert any(row["on_pareto_front"] for row in compared)
@@ -80,14 +80,14 @@ def test_each_number_of_worlds_has_a_cost_and_a_recommendation(tmp_path):
     """And there is a plot of the throughput; an engine without batches has no cost per world."""
     (tmp_path / "short.toml").write_text(SCENE)
     done = dropspin(
-        *("tradeoff", "short.toml", "-e", "document[rotation=rk4]", "-e", "pybullet", "--worlds", "2,16", "--budget", "0.5"),
+        *("tradeoff", "short.toml", "-e", "wang[rotation=rk4]", "-e", "pybullet", "--worlds", "2,16", "--budget", "0.5"),
         *("--within", "0.1", "-o", "out"),
         cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     output = " ".join(done.stdout.split())
     for worlds in (2, 16):
-        assert f"In a batch of {worlds}, document[rotation=rk4] at " in output
+        assert f"In a batch of {worlds}, wang[rotation=rk4] at " in output
     rows = json.loads((tmp_path / "out/tradeoff.json").read_text())
     for row in rows:
         costs = [row["cost_per_world_2"], row["cost_per_world_16"]]

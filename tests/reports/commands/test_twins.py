@@ -27,11 +27,11 @@ def test_table_and_json(tmp_path):
     ("asked", "message"),
     [
         (["drop-ball"], "Missing option '-e'"),
-        (["-e", "mujoco", "-e", "document"], "Missing argument 'SCENE...'"),
+        (["-e", "mujoco", "-e", "wang"], "Missing argument 'SCENE...'"),
         (["drop-ball", "-e", "mujoco"], "got 1 engine; name at least two"),
         (["drop-ball", "-e", "mujoco", "-e", "mujoco"], "got 1 engine; name at least two"),
-        (["drop-bal", "-e", "mujoco", "-e", "document"], "Did you mean 'drop-ball'"),
-        (["drop-ball", "-e", "mujoco", "-e", "document", "--dt", "7"], "dt: got 7.0 s"),
+        (["drop-bal", "-e", "mujoco", "-e", "wang"], "Did you mean 'drop-ball'"),
+        (["drop-ball", "-e", "mujoco", "-e", "wang", "--dt", "7"], "dt: got 7.0 s"),
     ],
 )
 def test_bad_input_is_refused(asked, message, tmp_path):

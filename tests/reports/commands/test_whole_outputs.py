@@ -14,18 +14,18 @@ BALL = 'duration = 0.2\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n'
 LONG = [
     (("report", "run", "--plots", "svg", "--plots", "png"), signal.SIGTERM),
     (("replay", "run", "few", "--gif", "old.gif", "--speed", "0.001"), signal.SIGINT),
-    (("limits", "drop-ball", "-e", "document", "-e", "mujoco", "-o", "study"), signal.SIGTERM),
+    (("limits", "drop-ball", "-e", "wang", "-e", "mujoco", "-o", "study"), signal.SIGTERM),
     (("tradeoff", "drop-ball", "-o", "study"), signal.SIGINT),
 ]
 """Commands that take many seconds."""
 FULL = [
-    (("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "run"), 20_000, "run: cannot be written: File too large; the folder is "),
+    (("run", "ball.toml", "-e", "wang", "--dt", "0.01", "-o", "run"), 20_000, "run: cannot be written: File too large; the folder is "),
     (("report", "run", "--plots", "svg"), 20_000, "run: cannot be written: File too large; the folder is unchanged."),
     (("replay", "run", "--no-open"), 20_000, "run/replay.html: cannot be written: File too large; choose another file."),
     (("replay", "run", "few", "--gif", "old.gif"), 5_000, "old.gif: cannot be written: File too large; choose another file."),
     (("accept", "run", "--reason", "x", "--baseline", "old.toml"), 200, "old.toml: cannot be written: File too large"),
-    (("tradeoff", "ball.toml", "-e", "document", "--budget", "0.01", "-o", "study"), 500, "study: cannot be written: File too large"),
-    (("limits", "ball.toml", "-e", "document", "--axis", "mass", "--dt", "0.01", "-o", "study"), 500, "study: cannot be written: File"),
+    (("tradeoff", "ball.toml", "-e", "wang", "--budget", "0.01", "-o", "study"), 500, "study: cannot be written: File too large"),
+    (("limits", "ball.toml", "-e", "wang", "--axis", "mass", "--dt", "0.01", "-o", "study"), 500, "study: cannot be written: File"),
     (("check", "run", "--junit", "old.xml"), 1_000, "old.xml: cannot be written: File too large; choose another file."),
 ]
 """Commands, a size of files [bytes] that is less than that of one of their outputs, and what they say."""
@@ -56,8 +56,8 @@ def contents(folder):
         (("replay", "run", "--no-open", "-o", "pipe"), "pipe: is not a regular file; choose another file."),
         (("replay", "run", "few", "--gif", "pipe.gif"), "pipe.gif: is not a regular file; choose another file."),
         (("report", "pipe"), "pipe"),
-        (("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "pipe"), "pipe: this is a file; choose a folder."),
-        (("limits", "ball.toml", "-e", "document", "-o", "pipe"), "pipe: cannot be written: File exists"),
+        (("run", "ball.toml", "-e", "wang", "--dt", "0.01", "-o", "pipe"), "pipe: this is a file; choose a folder."),
+        (("limits", "ball.toml", "-e", "wang", "-o", "pipe"), "pipe: cannot be written: File exists"),
     ],
     ids=lambda given: " ".join(given[:3]) if isinstance(given, tuple) else "",
 )
@@ -93,7 +93,7 @@ def full_disk(size):
 
 
 def test_full_disk_says_that_what_was_measured_is_kept(outputs):
-    command = ("run", "ball.toml", "-e", "document", "--dt", "0.01", "-o", "new")
+    command = ("run", "ball.toml", "-e", "wang", "--dt", "0.01", "-o", "new")
     with full_disk(20_000):
         done = dropspin(*command, cwd=outputs)
     assert done.returncode == 2
@@ -104,7 +104,7 @@ def test_full_disk_says_that_what_was_measured_is_kept(outputs):
 
 
 def test_full_disk_says_that_a_sweep_can_be_resumed(outputs):
-    (outputs / "spec.toml").write_text('scenes = ["ball.toml"]\nengines = ["document"]\ndts = [0.01]\n')
+    (outputs / "spec.toml").write_text('scenes = ["ball.toml"]\nengines = ["wang"]\ndts = [0.01]\n')
     with full_disk(5_000):
         done = dropspin("sweep", "spec.toml", "-o", "new", cwd=outputs)
     assert done.returncode == 2

@@ -17,10 +17,10 @@ def core(core_run):
 @pytest.mark.parametrize(
     ("scene", "engine", "verdict", "words"),
     [
-        ("spin-asymmetric", "document", "known", "known model error"),
-        ("spin-principal-500", "document", "known", "known fault"),
+        ("spin-asymmetric", "wang", "known", "known model error"),
+        ("spin-principal-500", "wang", "known", "known fault"),
         ("spin-asymmetric", "mujoco", "passed", "converges"),
-        ("slide-box", "document", "declined", "declined"),
+        ("slide-box", "wang", "declined", "declined"),
         ("slide-box", "mujoco", "limited", "known limitation"),
     ],
 )
@@ -58,9 +58,9 @@ def test_known_faults_are_counted_apart_and_in_the_headline(core):
     summary = overview(core)
     assert len(judged) > summary.counts.known == len(known) > 100
     assert summary.counts.passed == (core.table["verdict"] == "passed").sum()
-    assert f"{len(known)} values show known errors of document in {known['scene'].nunique()} scenes" in summary.verdict
-    [sentence] = [one for one in summary.findings if one.startswith("document (Wang's method): ")]
-    faults = sum(by_engine["document"].words == "known fault" for by_engine in summary.statuses.values())
+    assert f"{len(known)} values show known errors of wang in {known['scene'].nunique()} scenes" in summary.verdict
+    [sentence] = [one for one in summary.findings if one.startswith("wang (Wang's method): ")]
+    faults = sum(by_engine["wang"].words == "known fault" for by_engine in summary.statuses.values())
     assert faults > 0
     assert f"known fault in {faults}" in sentence
     assert junit_xml(core).decode().count("known fault: ") == len(judged)

@@ -22,14 +22,12 @@ def found():
     """Ladders that end by the budget, by their errors and by the longest run, of which the last dominates; and two that are left out."""
     ladders = (
         Ladder("mujoco[integrator=implicitfast]", ((0.033, 0.1), (0.01, 5.2e-3)), "budget", SPENT),
-        Ladder(
-            "document[rotation=implicit-gyroscopic]", ((0.033, 2e-2), (0.01, np.nan), (0.005, 7e-3)), "error_stopped_falling", "it stays"
-        ),
+        Ladder("wang[rotation=implicit-gyroscopic]", ((0.033, 2e-2), (0.01, np.nan), (0.005, 7e-3)), "error_stopped_falling", "it stays"),
         Ladder("accurate", ((0.033, 1e-2), (0.01, 4e-3)), "longest_run", "a run would be too long"),
         Ladder("other", ((0.033, 2.0),), "budget", SPENT, "no convergence observed"),
         Ladder("missing", (), "not_run", "not installed", "not installed"),
     )
-    costs = {"mujoco[integrator=implicitfast]": 5e-6, "document[rotation=implicit-gyroscopic]": 2e-6, "accurate": 1e-6}
+    costs = {"mujoco[integrator=implicitfast]": 5e-6, "wang[rotation=implicit-gyroscopic]": 2e-6, "accurate": 1e-6}
     points = tuple(
         CostPoint(one.engine, dt, error, np.full(3, costs[one.engine] / dt), {256: 1e-7 / dt})
         for one in ladders
@@ -61,7 +59,7 @@ def test_nearest_configuration_has_the_reason_why_no_smaller_step_was_tried(foun
 def test_ladders_are_listed_with_their_ends_and_reasons(found):
     assert tradeoff.sentences(found, [])[:3] == [
         f"No smaller time step was tried because {SPENT} (option --budget): mujoco[integrator=implicitfast] at 10 ms, other at 33 ms.",
-        "No smaller time step was tried because it stays: document[rotation=implicit-gyroscopic] at 5 ms.",
+        "No smaller time step was tried because it stays: wang[rotation=implicit-gyroscopic] at 5 ms.",
         "No smaller time step was tried because a run would be too long: accurate at 10 ms.",
     ]
     assert tradeoff.sentences(found, [])[3:] == ["Left out: other, no convergence observed.", "Left out: missing, not installed."]
@@ -119,7 +117,7 @@ def test_every_engine_has_a_row_with_its_place(found):
         ("accurate", "33", "0.0100", "yes"),
         ("accurate", "10", "4.00e-03", "yes"),
         ("mujoco[integrator=implicitfast]", "10", "5.20e-03", "dominated by accurate"),
-        ("document[rotation=implicit-gyroscopic]", "5", "7.00e-03", "dominated by accurate"),
+        ("wang[rotation=implicit-gyroscopic]", "5", "7.00e-03", "dominated by accurate"),
         ("other", "–", "–", "left out, see below"),
         ("missing", "–", "–", "left out, see below"),
     ]

@@ -1,4 +1,4 @@
-"""The engine `document`: the reference implementation of Wang's lecture note, and of the methods beside it."""
+"""The engine `wang`: the reference implementation of Wang's lecture note, and of the methods beside it."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
@@ -15,10 +15,10 @@ from dropspin.scenarios.body import Body, Box, Sphere, Vertices
 from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 
-class Document(Engine):
+class Wang(Engine):
     """Algorithms 1 and 2 of Wang's lecture note; each option replaces one of their parts by another method."""
 
-    name = "document"
+    name = "wang"
     mixes_scenes = True
     choices: ClassVar = {
         "rotation": tuple(ROTATIONS),
@@ -65,13 +65,13 @@ class Document(Engine):
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return DocumentSimulation(scene, dt, self.methods())
+        return WangSimulation(scene, dt, self.methods())
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation:
-        return DocumentBatch(members, dt, self.methods())
+        return WangBatch(members, dt, self.methods())
 
 
-class DocumentSimulation(Simulation):
+class WangSimulation(Simulation):
     """A simulation of one scene by the reference implementation."""
 
     def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
@@ -106,7 +106,7 @@ class DocumentSimulation(Simulation):
         return AsBuilt(float(self._body.mass), self._body.inertia, gravity)
 
 
-class DocumentBatch(BatchSimulation):
+class WangBatch(BatchSimulation):
     """Simulations of many scenes by the reference implementation, in lanes and threads."""
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:

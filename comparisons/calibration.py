@@ -130,7 +130,7 @@ def drop(restitution: float, friction: str | float = "none", shape: Shape = "bal
 def _calibrated(entry: EngineEntry, scene: Scenario, dt: float) -> Calibration | str:
     """The settings of the engine, the programs and their measurements, or the reason why there are none; runs in its process."""
     engine = entry.adapter
-    refusal = verified_refusal(engine.declines(scene))
+    refusal = verified_refusal(engine.refusal(scene))
     if refusal is not None:
         return f"cannot be calibrated: {refusal}"
     programs = engine.programs(scene, dt)

@@ -76,7 +76,7 @@ def _is_verified(engine: Engine, scene: Scenario, size: Size) -> bool:
     first_member = whole_steps(scene, size.dt, A_FEW_STEPS)
     shares = [1.0 + SPREAD * number for number in range(1, size.simulations)]
     members = [first_member, *(batch_member(engine, first_member, share) for share in shares)]
-    if engine.mixes_scenes and engine.declines(without_rebounds := WITHOUT_REBOUNDS(members[-1])) is None:
+    if engine.mixes_scenes and engine.refusal(without_rebounds := WITHOUT_REBOUNDS(members[-1])) is None:
         members[-1] = without_rebounds
     try:
         first, second = engine.prepare_batch(members, size.dt), engine.prepare_batch(members, size.dt)

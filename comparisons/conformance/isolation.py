@@ -46,7 +46,7 @@ def check_files(engine: Engine, check: str) -> CheckResult:
     breakdown = ""
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         recorded(engine, scene)
-        if engine.declines(wild) is None:
+        if engine.refusal(wild) is None:
             try:
                 recorded(engine, wild, 100 * DT)
             except Exception as error:  # a breakdown is allowed, files are not

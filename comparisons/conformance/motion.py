@@ -19,7 +19,7 @@ def check_motion(engine: Engine, check: str) -> CheckResult:
     """The motion of the probe that the check is named for."""
     probe = next(probe for probe in PROBES if probe.name == check)
     scene = probe.scene
-    refusal = engine.declines(scene)
+    refusal = engine.refusal(scene)
     if refusal is not None:
         raise Declined(refusal)
     truth = truth_for(scene)

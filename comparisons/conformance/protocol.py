@@ -47,9 +47,9 @@ def check_refusals(engine: Engine, check: str) -> CheckResult:
             raise CheckFailed(f"declines({scene.name}) returns {answer!r}, then {again!r}; it must return the same each time")
         if not (answer is None or (isinstance(answer, str) and answer.strip())):
             raise CheckFailed(f"declines({scene.name}) returns {answer!r}; it must return None, or the reason as a sentence")
-    declined = sum(engine.declines(scene) is not None for scene in scenes)
+    declined = sum(engine.refusal(scene) is not None for scene in scenes)
     if declined == len(scenes):
-        raise CheckFailed(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.declines(scenes[0])}")
+        raise CheckFailed(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.refusal(scenes[0])}")
     return CheckResult(check, "passed", f"{len(scenes) - declined} scenes of the catalogue are accepted, {declined} declined with a reason")
 
 
@@ -57,7 +57,7 @@ def check_builds(engine: Engine, check: str) -> CheckResult:
     """The built simulation equals the scene, for the probes and for every scene of the catalogue."""
     read_back, built = 0, 0
     for scene in [ASYMMETRIC, *(probe.scene for probe in PROBES), *(load(name) for name in names())]:
-        if engine.declines(scene) is not None:
+        if engine.refusal(scene) is not None:
             continue
         try:
             read_back += _verify_built(engine, scene)

@@ -29,7 +29,7 @@ def accepted_scene(engine: Engine, *preferred: str) -> Scenario:
     refusal = None
     for name in preferred or RICHEST:
         scene = probes[name].scene
-        refusal = engine.declines(scene)
+        refusal = engine.refusal(scene)
         if refusal is None:
             return _shortly_before_contact(scene) if scene.starts_above_floor else scene
     raise Declined(f"the engine declines {', '.join(preferred or RICHEST)}: {refusal}")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.engines.npm_packages import is_npm, npm_version
 from dropspin.comparisons.measuring.symmetries import REPRESENTED
 from dropspin.scenarios import Scenario, Truth
-from dropspin.scenarios.body import Box, Sphere
+from dropspin.scenarios.body import Sphere
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.mechanics import is_diagonal
 from dropspin.scenarios.validation import shown
@@ -206,19 +206,11 @@ def may_tumble(scene: Scenario) -> bool:
     return bool(np.ptp(moments) > 1e-12 * moments[-1]) and (any(scene.start.angular_velocity) or scene.floor is not None)
 
 
-def refusal_of_shape(scene: Scenario, hull: str = "", maps_vertices: bool = False) -> str | None:
-    """Why the shape of a scene's body cannot strike a floor; None if it can, or need not.
-
-    Args:
-        scene: The scene.
-        hull: What the engine calls a body of corners, if the shape is represented so; empty for spheres and boxes themselves.
-        maps_vertices: Whether the engine maps bodies of vertices onto a floor.
-    """
+def refusal_of_hull(scene: Scenario, name: str) -> str | None:
+    """Why a scene's body is not represented by its corners, which an engine calls `name`; None if it can be."""
     if scene.floor is None:
-        return f"there is no shape without a floor, and no {hull}" if hull else None
-    if isinstance(scene.body, Sphere) and hull:
-        return f"a {hull} would only approximate a ball"
-    return None if maps_vertices or isinstance(scene.body, (Sphere, Box)) else "only spheres and boxes are mapped onto a floor"
+        return f"there is no shape without a floor, and no {name}"
+    return f"a {name} would only approximate a ball" if isinstance(scene.body, Sphere) else None
 
 
 def refusal_of_axes(scene: Scenario, does: str) -> str | None:
@@ -292,6 +284,8 @@ class Engine(ABC):
     """Claimed order of accuracy in free flight; inf for exact, None for no claim."""
     precision: ClassVar[type] = np.float64
     """The precision of the engine's state: numpy.float64 or numpy.float32."""
+    shapes: ClassVar[tuple[str, ...]] = ("sphere", "box", "vertices")
+    """The shapes of bodies that it builds on a floor; scenes with others are declined."""
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Each option's values, the default first."""
     numbers: ClassVar[Mapping[str, NumericOption]] = {}
@@ -410,6 +404,12 @@ class Engine(ABC):
     def declines(self, scene: Scenario) -> str | None:
         """Why a scene is not simulated: a limit of the engine, or of its adapter ("the adapter ..."); None if it is."""
         return None
+
+    def refusal(self, scene: Scenario) -> str | None:
+        """Why a scene is not simulated, by the shape of its body or as `declines` says; None if it is."""
+        if scene.floor is not None and scene.body.shape not in self.shapes:
+            return f"the adapter maps the shapes {', '.join(self.shapes)} onto a floor, not {scene.body.shape}"
+        return self.declines(scene)
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """Programs and models with the settings of a scene at a time step [s], ready to paste, by language; may be empty.

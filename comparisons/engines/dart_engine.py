@@ -28,6 +28,7 @@ class Dart(Engine):
     """DART's rigid body over a plane, or over a box."""
 
     name, order, reasons = "dart", 1.0, REASONS
+    shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"floor": ("plane", "box"), "beside": ("none", "heavy")}
     representations: ClassVar = ("floor", "beside")
 
@@ -37,7 +38,7 @@ class Dart(Engine):
         return flight if scene.floor is None and scene.damping is None else None
 
     def declines(self, scene: Scenario) -> str | None:
-        unfit = base.refusal_of_unequal_damping(scene) or base.refusal_of_shape(scene)
+        unfit = base.refusal_of_unequal_damping(scene)
         if (unfit := unfit or base.refusal_of_floor(scene, self.option("floor"))) is not None:
             return unfit
         if scene.floor is not None and not hasattr(dart.constraint, "NsgsFrictionSolver"):

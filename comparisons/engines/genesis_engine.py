@@ -20,7 +20,6 @@ from dropspin.comparisons.engines.base import (
     refusal_of_axes,
     refusal_of_floor,
     refusal_of_rest_speed,
-    refusal_of_shape,
     version,
 )
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
@@ -44,6 +43,7 @@ class Genesis(Engine):
     """Genesis's rigid body."""
 
     name, order, compiles, reasons = "genesis", 1.0, True, REASONS
+    shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"precision": tuple(PRECISIONS), "integrator": tuple(INTEGRATORS)}
 
     @property
@@ -54,7 +54,7 @@ class Genesis(Engine):
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor
         unfit = refusal_of_axes(scene, "damps") if scene.damping is not None else None
-        if (unfit := unfit or refusal_of_shape(scene)) is not None or floor is None:
+        if unfit is not None or floor is None:
             return unfit
         if floor.coefficient < LEAST_FRICTION:
             return "Genesis raises a contact's coefficient of friction to 0.01: a body that slides without friction loses 0.098 m/s in 1 s"

@@ -18,8 +18,8 @@ from dropspin.comparisons.engines.base import (
     may_tumble,
     refusal_of_axes,
     refusal_of_floor,
+    refusal_of_hull,
     refusal_of_rest_speed,
-    refusal_of_shape,
 )
 from dropspin.comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
 from dropspin.comparisons.engines.mujoco_model import INTEGRATORS, Form, calibrated_specification, default_specification
@@ -150,7 +150,7 @@ class MuJoCo(Engine):
 
     def _refusal_of_shape(self, scene: Scenario) -> str | None:
         """Why the shape of a scene's body cannot strike a floor."""
-        unfit = refusal_of_shape(scene, "mesh" if self.option("body") == "mesh" else "", maps_vertices=True)
+        unfit = refusal_of_hull(scene, "mesh") if self.option("body") == "mesh" else None
         unfit = unfit or refusal_of_floor(scene, self.option("floor"))
         if unfit is None and scene.floor is not None and isinstance(scene.body, Vertices) and scene.body.resting_height == 0.0:
             return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo has no convex hull of a flat mesh"

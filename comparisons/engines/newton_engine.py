@@ -19,7 +19,6 @@ from dropspin.comparisons.engines.base import (
     KnownLimitation,
     Simulation,
     refusal_of_rest_speed,
-    refusal_of_shape,
     version,
 )
 from dropspin.comparisons.engines.newton_rounding import rounding_met
@@ -51,6 +50,7 @@ class Newton(Engine):
     """Newton's rigid body."""
 
     name, order, compiles, precision, reasons, mixes_scenes = "newton", 1.0, True, np.float32, REASONS, True
+    shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"solver": tuple(SOLVERS)}
 
     def declines(self, scene: Scenario) -> str | None:
@@ -59,8 +59,8 @@ class Newton(Engine):
             return "Newton's MuJoCo solver needs mujoco-warp; install newton[sim]"
         if scene.damping is not None:
             return "the adapter maps no damping"
-        if (unfit := refusal_of_shape(scene)) is not None or floor is None:
-            return unfit
+        if floor is None:
+            return None
         if solver != "xpbd":
             return "this solver's contacts are springs and dampers without a restitution: a ball rebounds alike with 0.5 and with 0.9"
         if (fixed := refusal_of_rest_speed(scene, "Newton's XPBD", "it drops restitution below 2 g dt")) is not None:

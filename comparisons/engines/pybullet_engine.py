@@ -17,7 +17,7 @@ from dropspin.comparisons.engines.base import (
     may_tumble,
     refusal_of_axes,
     refusal_of_floor,
-    refusal_of_shape,
+    refusal_of_hull,
 )
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_settings import (
@@ -103,7 +103,8 @@ class PyBullet(Engine):
         if scene.damping is not None and self.is_multibody and not self.is_default:
             return "Bullet's multibodies damp by another law, k v (1 + |v|)"
         is_hull = self.option("body") == "hull"
-        if (unfit := refusal_of_shape(scene, "hull" if is_hull else "", maps_vertices=True)) is not None or floor is None:
+        unfit = refusal_of_hull(scene, "hull") if is_hull else None
+        if unfit is not None or floor is None:
             return unfit
         if isinstance(scene.body, Vertices) and not is_hull and len(scene.body.hull) > MOST_BALLS:
             return f"the adapter builds compound shapes of at most {MOST_BALLS} parts; the convex hull has {len(scene.body.hull)} vertices"

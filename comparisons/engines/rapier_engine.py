@@ -49,6 +49,7 @@ class Rapier(Engine):
     """Rapier's rigid body on a half-space, on a box, or on a mesh of two triangles."""
 
     name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
+    shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": ("none", "heavy")}
     representations: ClassVar = ("floor", "beside")
 

@@ -42,6 +42,7 @@ class RapierJS(Engine):
     """Rapier's rigid body in Node.js, on a half-space, a box or two triangles; or with Rapier's defaults (profile=default)."""
 
     name, order, precision, reasons = "rapier-js", 1.0, np.float32, REASONS
+    shapes: ClassVar = ("sphere", "box")
     choices: ClassVar = {"profile": base.PROFILES, "floor": ("plane", "box", "mesh"), "beside": ("none", "heavy")}
     representations: ClassVar = ("floor", "beside")
 

@@ -16,7 +16,7 @@ WHY_DAMPING = "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives th
 def refusal(scene: Scenario, kind: str) -> str | None:
     """Why Rapier cannot reproduce a scene on a floor of a kind, `plane`, `box` or `mesh`; None if it can."""
     body, floor = scene.body, scene.floor
-    if (unfit := base.refusal_of_shape(scene) or base.refusal_of_floor(scene, kind)) is not None or floor is None:
+    if (unfit := base.refusal_of_floor(scene, kind)) is not None or floor is None:
         return unfit
     if (unfit := base.refusal_of_rest_speed(scene, "Rapier")) is not None:
         return unfit

@@ -5,7 +5,7 @@ PhysX applies gravity before it solves contacts, hence v+ = e (u + g dt). A step
 
 import warnings
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -17,7 +17,6 @@ from dropspin.comparisons.engines.base import (
     Engine,
     Simulation,
     may_tumble,
-    refusal_of_shape,
     version,
 )
 from dropspin.scenarios.body import Array, Body, Sphere
@@ -52,6 +51,7 @@ class Sapien(Engine):
     """PhysX's rigid body on a plane."""
 
     name, order, precision, reasons = "sapien", 1.0, np.float32, REASONS
+    shapes: ClassVar = ("sphere", "box")
 
     def discretisation(self, scene: Scenario) -> str | None:
         return SEMI_IMPLICIT_EULER if scene.floor is None and scene.damping is None and not may_tumble(scene) else None
@@ -60,7 +60,7 @@ class Sapien(Engine):
         floor = scene.floor
         if floor is not None and floor.restitution > 0.0 and not isinstance(floor.friction, str) and not isinstance(scene.body, Sphere):
             return "of SAPIEN's two solvers TGS alone has a cone of friction, and with TGS a box that bounces flat turns by 0.1 rad or more"
-        return refusal_of_shape(scene)
+        return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return SapienSimulation(scene, dt)

@@ -81,7 +81,7 @@ def run_engine(
         return found
     assert engine is not None
     try:
-        refusal = verified_refusal(engine.declines(scene))
+        refusal = verified_refusal(engine.refusal(scene))
         if refusal is not None:
             found.breakdown = Breakdown("declined", refusal)
             return found
@@ -126,7 +126,7 @@ def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
     """Time whole simulations of a scene, native steps only, and compilation apart; a failure is part of the result."""
     engine, steps = entry.adapter, scene.steps(dt)
     try:
-        if verified_refusal(engine.declines(scene)) is not None:
+        if verified_refusal(engine.refusal(scene)) is not None:
             return Timing()
         first = time_steps(engine, scene, dt, steps) if engine.compiles else None
         timed = [time_steps(engine, scene, dt, steps)]

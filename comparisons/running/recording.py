@@ -79,7 +79,7 @@ def simulate(scene: SceneLike, engine: Engine | str, dt: float, every: int = 1) 
     scene = as_scene(scene)
     chosen = engine if isinstance(engine, Engine) else engine_named(engine)
     verify_time_step(scene, dt)
-    refusal = verified_refusal(chosen.declines(scene))
+    refusal = verified_refusal(chosen.refusal(scene))
     if refusal is not None:
         raise DropspinError(f"{chosen.label} declines {scene.name}: {refusal}.")
     recording = record(chosen, scene, dt, every)
@@ -173,7 +173,7 @@ def try_record(
 ) -> Recording | Breakdown:
     """Drive an engine through a scene; a refusal, a divergence or an exception is returned, not raised."""
     try:
-        refusal = verified_refusal(engine.declines(scene))
+        refusal = verified_refusal(engine.refusal(scene))
         if refusal is not None:
             return Breakdown("declined", refusal)
         return record(engine, scene, dt, every, extra_steps=extra_steps, verify=verify)

@@ -36,7 +36,7 @@ def _batches(jobs: Jobs) -> Iterator[tuple[Engine, float, dict[int, Scenario]]]:
         try:
             scene, engine = scene_of(jobs, index), jobs.engine_at(index)
             verify_time_step(scene, dt)
-            if verified_refusal(engine.declines(scene)) is not None:
+            if verified_refusal(engine.refusal(scene)) is not None:
                 continue
         except Exception:
             continue

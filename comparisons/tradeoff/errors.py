@@ -99,7 +99,7 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
 
 def _refusal(entry: EngineEntry, scene: Scenario) -> str | None:
     """The reason why the engine declines a scene; runs in the engine's process."""
-    return verified_refusal(entry.adapter.declines(scene))
+    return verified_refusal(entry.adapter.refusal(scene))
 
 
 def _stalled(errors: Sequence[float]) -> int:

@@ -94,7 +94,7 @@ def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
     from dropspin.comparisons.running.verification import verified_refusal, verified_settings, verify_build
 
     engine = entry.adapter
-    refusal = verified_refusal(engine.declines(scene))
+    refusal = verified_refusal(engine.refusal(scene))
     if refusal is not None:
         return [{"what": engine.label, "is": f"declines {scene.name}: {refusal}"}]
     with engine.prepare(scene, dt) as simulation:

@@ -41,7 +41,7 @@ def test_free_rotation_has_the_error_that_was_measured(case):
 def test_ball_rebounds_with_the_restitution_of_the_scene(case):
     scene = shortened("drop-ball", 0.8)
     if case.restitution is None:
-        assert engine(case.label).declines(scene)
+        assert engine(case.label).refusal(scene)
         return
     assert abs(measure(scene, simulate(scene, case.label, DT))["restitution_error"]) <= case.restitution
 

@@ -215,7 +215,7 @@ def _percent(size: float) -> str:
 def detection_power(number: int, name: str) -> Power:
     """The smallest detectable size of a fault in an engine at the default time steps and, where that is too large, at finer ones too."""
     fault = FAULTS[number]
-    if (fault.title, name) in NOT_EXPRESSED or any(sound_engine(name).declines(load(scene)) for scene in fault.scenes):
+    if (fault.title, name) in NOT_EXPRESSED or any(sound_engine(name).refusal(load(scene)) for scene in fault.scenes):
         return Power("–", True)
     size = smallest_caught(name, fault, DEFAULT_DTS)
     if size <= REQUIRED:

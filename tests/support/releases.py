@@ -27,7 +27,7 @@ class Candidate(Engine):
         return None
 
     def declines(self, scene):
-        return engine(self.inner).declines(scene)
+        return engine(self.inner).refusal(scene)
 
     def prepare(self, scene, dt):
         simulation = engine(self.inner).prepare(self.changed(scene), dt)

@@ -29,7 +29,7 @@ CASES = list(product(ENGINES, QUICK))
 def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
     """State, mass, inertia and gravity to 8 eps; shapes; finite; advance and record take the same steps, bit for bit."""
     chosen, scene = engine(name), scenarios.load(scene_name)
-    refusal = chosen.declines(scene)
+    refusal = chosen.refusal(scene)
     if refusal is not None:
         damped = name in ("pybullet[coordinates=multibody]", "dart", "drake") and scene.damping is not None
         stages = name == "mujoco[integrator=rk4]"
@@ -63,7 +63,7 @@ def test_engine_builds_the_scene_and_records_what_it_steps(name, scene_name):
 def test_scene_gives_the_same_bits_after_and_beside_others(name):
     """A, B, A: a scene gives the same bits after another scene, and while another simulation is open."""
     a, b = scenarios.load("spin-asymmetric"), scenarios.load("spin-dzhanibekov")
-    if engine(name).declines(scenarios.load("drop-ball")) is None:
+    if engine(name).refusal(scenarios.load("drop-ball")) is None:
         a, b = scenarios.load("drop-box-corner"), scenarios.load("drop-ball")
     first = simulate(a, name, 2e-3)
     with engine(name).prepare(b, 1e-3) as other:
@@ -164,7 +164,7 @@ def test_bodies_of_vertices_are_declined_where_an_engine_cannot_represent_them()
     assert engine("pybullet[body=hull]").declines(prism(12)) is None
     assert "three contact points" in refusal_of_meshes((3, 9))
     assert refusal_of_meshes((4, 0)) is None
-    assert "only spheres and boxes" in engine("dart").declines(prism())
+    assert engine("dart").refusal(prism()) == "the adapter maps the shapes sphere, box onto a floor, not vertices"
 
 
 @pytest.mark.parametrize(("name", "least", "most"), [("pybullet", 0.0, 1e-12), ("pybullet[body=hull]", 0.01, 1.0)])

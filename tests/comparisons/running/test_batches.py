@@ -41,7 +41,7 @@ def mixed(name):
 def test_scenes_with_other_numbers_have_the_bits_of_single_simulations(label, name):
     chosen, members = engine(label), mixed(name)
     if any(map(chosen.declines, members)):
-        assert chosen.declines(members[0])
+        assert chosen.refusal(members[0])
         return
     assert chosen.mixes_scenes
     assert chosen.prepare_batch(members, DT) is not None

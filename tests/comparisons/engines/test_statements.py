@@ -42,7 +42,10 @@ def test_pybullet_itself_builds_compound_shapes_of_more_than_16_parts(tmp_path):
     try:
         parts = {"radii": [1e-3] * 24, "collisionFramePositions": [[0.1 * number, 0.0, 0.0] for number in range(24)]}
         shape = pybullet.createCollisionShapeArray([pybullet.GEOM_SPHERE] * 24, physicsClientId=client, **parts)
-        bodies = pybullet.createMultiBody(1.0, shape, physicsClientId=client), pybullet.loadURDF(str(tmp_path / "many.urdf"))
+        bodies = (
+            pybullet.createMultiBody(1.0, shape, physicsClientId=client),
+            pybullet.loadURDF(str(tmp_path / "many.urdf"), physicsClientId=client),
+        )
         assert [len(pybullet.getCollisionShapeData(body, -1, client)) for body in bodies] == [16, 24]
     finally:
         pybullet.disconnect(client)

@@ -18,7 +18,7 @@ from dropspin.comparisons.results.provenance import digest
 from dropspin.scenarios import Scenario, Trajectory, UnknownName, truth_for
 
 TrajectoryKey = tuple[str, str, float]
-NEGLIGIBLE = 1e-4
+SMALLEST_STATED = 1e-4
 """Errors below this (relative to the scene's scale, in m or in rad) are not mentioned in summaries and reports."""
 
 STATUS_WORDS = {**WORDS, "limited": "known limitation"}
@@ -103,7 +103,7 @@ class Results:
             By scene and engine: the worst verdict, and the status in words, such as `converges`.
         """
         table, verdicts = self.table, self.table["verdict"]
-        is_small = (verdicts == "known") & ~(table["value"].abs() > NEGLIGIBLE)
+        is_small = (verdicts == "known") & ~(table["value"].abs() > SMALLEST_STATED)
         explains_nothing = (verdicts == "limited") & (table["metric"] == "")
         of_rows = {
             "severity": verdicts.map(SEVERITY.index).where(~(is_small | explains_nothing)),
@@ -147,7 +147,7 @@ class Results:
 
     def _metric_of_findings(self, rows: pd.DataFrame) -> str:
         """The metric of the largest error, relative to its scale, among those that set a status; empty if there is none."""
-        findings = rows[rows["verdict"].isin(["known", "limited", *FAILURES]) & (rows["value"].abs() > NEGLIGIBLE)]
+        findings = rows[rows["verdict"].isin(["known", "limited", *FAILURES]) & (rows["value"].abs() > SMALLEST_STATED)]
         findings = findings[~findings["metric"].isin([*JUMPING, *ARTEFACTS, *PARTS])]
         if findings.empty:
             return ""
@@ -161,7 +161,7 @@ class Results:
         verdicts = self.table.loc[self.table["engine"] == engine, "verdict"]
         parts = [_counted(verdicts)]
         errors = self.asymptotic_errors("model")
-        scenes = errors.loc[(errors["engine"] == engine) & (errors["value"].abs() > NEGLIGIBLE), "scene"].unique()
+        scenes = errors.loc[(errors["engine"] == engine) & (errors["value"].abs() > SMALLEST_STATED), "scene"].unique()
         if len(scenes):
             parts.append(f"model errors in {', '.join(scenes)}")
         return f"{engine}: {'; '.join(parts)}."
@@ -204,7 +204,7 @@ def relative_sizes(rows: pd.DataFrame, scenes: Mapping[str, Scenario]) -> list[f
 def is_undecided(rows: pd.DataFrame) -> "pd.Series[bool]":
     """Which rows are asymptotic errors whose interval contains 0 and values that are not negligible, so that no cause is stated."""
     reach = rows[["lower", "upper"]].abs().max(axis=1)
-    return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > NEGLIGIBLE)
+    return (rows["kind"] == "asymptotic_error") & (rows["cause"] == "unresolved") & (reach > SMALLEST_STATED)
 
 
 def _status(worst: str, of_model: bool, studied: bool, undecided: bool) -> Status:

@@ -11,7 +11,7 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.provenance import first_settings
-from dropspin.comparisons.results.results import NEGLIGIBLE, Results
+from dropspin.comparisons.results.results import SMALLEST_STATED, Results
 from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.pages import page
@@ -56,7 +56,7 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
         "provenance": results.provenance,
         "passed": tally.failed == 0 and tally.broken == 0,
         "colours": engine_colours(results.engines),
-        "negligible": NEGLIGIBLE,
+        "negligible": SMALLEST_STATED,
         "leading": leading_errors(results),
         "steps": numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
         "times": step_times(results),

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import ARTEFACTS, SATURATION
-from dropspin.comparisons.results.results import NEGLIGIBLE, Results, is_undecided
+from dropspin.comparisons.results.results import SMALLEST_STATED, Results, is_undecided
 from dropspin.reports.views.numbers import formatted, observed_order
 
 OF = ["metric", "engine"]
@@ -52,7 +52,7 @@ def error_budgets(results: Results, scene_name: str) -> list[BudgetRow]:
     columns = [*OF, "value", "lower", "upper", "cause", "verdict", "reason"]
     limits, orders = (table[table["kind"] == kind][columns] for kind in ("asymptotic_error", "order"))
     undecided = pd.MultiIndex.from_frame(table.loc[is_undecided(table), OF])
-    worth = (errors["value"].abs() > NEGLIGIBLE) | pd.MultiIndex.from_frame(errors[OF]).isin(undecided)
+    worth = (errors["value"].abs() > SMALLEST_STATED) | pd.MultiIndex.from_frame(errors[OF]).isin(undecided)
     worth &= (errors["dt"] == errors["dt"].min()) & errors["engine"].isin(limits["engine"])
     both = errors[worth].merge(limits, on=OF, how="left", suffixes=("", "_of_limit"))
     both = both.merge(orders, on=OF, how="left", suffixes=("", "_of_order"))

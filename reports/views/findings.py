@@ -13,7 +13,7 @@ from dropspin.comparisons.engines.base import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
-from dropspin.comparisons.results.results import NEGLIGIBLE, UNDECIDED, Results, Status, is_undecided, relative_sizes
+from dropspin.comparisons.results.results import SMALLEST_STATED, UNDECIDED, Results, Status, is_undecided, relative_sizes
 from dropspin.reports.views.leading_errors import step_times
 from dropspin.reports.views.numbers import duration, failing, formatted, in_ms, quantity
 from dropspin.scenarios.text import counted
@@ -62,7 +62,7 @@ def counts(results: Results) -> Counts:
     """Count the verdicts of a run."""
     verdicts = results.table["verdict"]
     passed, failed = verdicts == "passed", verdicts.isin(FAILURES)
-    known = (verdicts == "known") & (results.table["value"].abs() > NEGLIGIBLE)
+    known = (verdicts == "known") & (results.table["value"].abs() > SMALLEST_STATED)
     fixed = passed & (results.table["basis"] == "fault_absent")
     limited = (verdicts == "limited") & (results.table["metric"] != "")
     broken = verdicts.isin(BREAKDOWNS)
@@ -88,7 +88,7 @@ def _engines(results: Results, rows: "pd.Series[bool]") -> tuple[str, ...]:
 def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
     """For each engine, the scenes in which an error with this cause does not vanish as dt → 0; negligible errors are left out."""
     rows = results.asymptotic_errors(cause)
-    worth = rows[rows["value"].abs() > NEGLIGIBLE]
+    worth = rows[rows["value"].abs() > SMALLEST_STATED]
     pairs = set(zip(worth["engine"], worth["scene"], strict=True))
     return {engine: [scene for scene in results.scenes if (engine, scene) in pairs] for engine in results.engines}
 
@@ -114,7 +114,7 @@ class ProfileComparison:
         most = sum(part > 0.5 for part in parts)
         are = "is mostly a setting error" if most == 1 else "are mostly setting errors"
         return (
-            f"{most} of its {counted(len(parts), 'error')} above {NEGLIGIBLE:g} at the finest time step {are} "
+            f"{most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} at the finest time step {are} "
             f"(median share {100 * statistics.median(parts):.1f} %)"
         )
 
@@ -136,7 +136,7 @@ def profile_comparisons(results: Results) -> list[ProfileComparison]:
         finest = truths[truths["dt"] == truths["dt"].min()].set_index(["scene", "metric"])
         mine, other = (finest[finest["engine"] == label] for label in (engine, twin))
         both = mine.join(other["value"].rename("calibrated"), how="inner")
-        worth = both[both["value"].abs() > NEGLIGIBLE].reset_index()
+        worth = both[both["value"].abs() > SMALLEST_STATED].reset_index()
         rows = [
             {
                 "scene": row["scene"],
@@ -255,7 +255,7 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
         none = "no asymptotic errors" + ("" if enough else ", which need three time steps that span a factor of four")
         return f"{', '.join(others)} of {counted(len(statuses), 'scene')}; {none}"
     converges = ", ".join([f"converges in {kinds['converges']} of {counted(len(statuses), 'scene')}", *others])
-    found = mine[mine["kind"].isin(["truth", "invariant"]) & (mine["value"].abs() > NEGLIGIBLE)]
+    found = mine[mine["kind"].isin(["truth", "invariant"]) & (mine["value"].abs() > SMALLEST_STATED)]
     found = found[~found["metric"].isin([*JUMPING, *ARTEFACTS])]
     finest = found[found["dt"] == found.groupby("scene")["dt"].transform("min")]
     wrong = finest[finest["verdict"].isin(["known", "limited", *FAILURES]) | finest["cause"].isin(["model", "setting"])]

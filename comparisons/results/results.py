@@ -2,7 +2,8 @@
 
 import html
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,6 +70,21 @@ class Results:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     predictions: pd.DataFrame = field(default_factory=empty_table)
     agreements: pd.DataFrame = field(default_factory=empty_table)
+
+    @cached_property
+    def by_scene(self) -> Mapping[str, "Results"]:
+        """The run of each scene alone, by name, with texts as objects, of which pandas selects rows faster.
+
+        To select rows of one scene after the other from all rows takes most of the time of a report.
+        """
+        names = ("table", "predictions", "agreements")
+        texts: dict[str, Any] = dict.fromkeys(self.table.select_dtypes("str"), object)
+        frames = {name: getattr(self, name).astype(texts) for name in names}
+        rows = {name: dict(iter(frame.groupby("scene"))) for name, frame in frames.items()}
+        return {
+            scene: replace(self, scenes={scene: self.scenes[scene]}, **{name: rows[name].get(scene, frames[name][:0]) for name in names})
+            for scene in self.scenes
+        }
 
     def __repr__(self) -> str:
         return f"<Results: {self._title}>"

@@ -62,7 +62,9 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
         "times": step_times(results),
         "legend": legend_of_marks(summary.statuses),
         "plotted": len(charts),
-        "scenes": [_scene(results, number, name, charts.get(name, {}), name in failing) for number, name in enumerate(results.scenes)],
+        "scenes": [
+            _scene(one, number, charts.get(name, {}), name in failing) for number, (name, one) in enumerate(results.by_scene.items())
+        ],
         "metrics": METRICS,
         "ensemble_metrics": ENSEMBLE_METRICS,
         "start_phases": QUICK_START_PHASES if results.is_quick else START_PHASES,
@@ -71,12 +73,11 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
     }
 
 
-def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:
-    scene = results.scenes[name]
+def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:
+    [(name, scene)] = results.scenes.items()
     truth = truth_for(scene)
-    frame, agreements = (rows[rows["scene"] == name] for rows in (results.table, results.agreements))
+    frame, agreements, own = results.table, results.agreements, results.measurements
     dts = sorted(frame["dt"].dropna().unique(), reverse=True)
-    own = results.measurements[results.measurements["scene"] == name]
     studies = frame[frame["kind"].isin(STUDIES)]
     motions = replay_of(results, name)
     budgets = error_budgets(results, name)
@@ -112,14 +113,16 @@ def _scene(results: Results, number: int, name: str, charts: Mapping[str, Sequen
 
 def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, str]]:
     """For each metric and engine, the behaviour of the error as dt → 0, its cause, and the worse of the verdicts of its two checks."""
+    by_pair: dict[tuple[str, str], dict[str, Any]] = {}
+    for row in studies.to_dict("records"):
+        by_pair.setdefault((row["metric"], row["engine"]), {})[row["kind"]] = row
     trends = {}
-    for (metric, engine), rows in studies.groupby(["metric", "engine"]):
-        order, asymptotic = (rows[rows["kind"] == kind] for kind in STUDIES)
-        m = float(asymptotic["value"].iloc[0]) if len(asymptotic) else float("nan")
-        p = numbers.observed_order(*order[["value", "lower", "upper"]].iloc[0]) if len(order) else ""
-        cause = str(rows["cause"].iloc[0])
-        verdict = "failed" if (rows["verdict"] == "failed").any() else str(rows["verdict"].iloc[-1])
-        trends[str(metric), str(engine)] = {"text": numbers.trend(m, cause, p), "cause": cause, "verdict": verdict}
+    for pair, by_kind in by_pair.items():
+        rows, (order, asymptotic) = list(by_kind.values()), map(by_kind.get, STUDIES)
+        m = asymptotic["value"] if asymptotic else float("nan")
+        p = numbers.observed_order(order["value"], order["lower"], order["upper"]) if order else ""
+        cause, verdict = rows[0]["cause"], "failed" if any(row["verdict"] == "failed" for row in rows) else rows[-1]["verdict"]
+        trends[pair] = {"text": numbers.trend(m, cause, p), "cause": cause, "verdict": verdict}
     return trends
 
 
@@ -146,7 +149,7 @@ def _agreement(agreements: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
 def _ensemble(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
     """For each metric, the means over the ensemble, followed by the differences between engines."""
     rows = frame[(frame["dt"] == dt) & frame["metric"].isin(list(ENSEMBLE_METRICS))]
-    return [_row(row) for metric in ENSEMBLE_METRICS for row in rows[rows["metric"] == metric].itertuples()]
+    return sorted(map(_row, rows.itertuples()), key=lambda row: list(ENSEMBLE_METRICS).index(row["metric"]))
 
 
 def _row(row: Any) -> dict[str, Any]:

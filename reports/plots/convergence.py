@@ -1,7 +1,8 @@
 """Errors as functions of the time step."""
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Hashable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,31 +36,32 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
         scene_name: One of its scenes.
         metric: One of its metrics.
     """
-    frame, predictions = (rows[(rows["scene"] == scene_name) & (rows["metric"] == metric)] for rows in (results.table, results.predictions))
-    values = frame[frame["kind"].isin(["truth", "invariant"])]
+    shown, predictions = (
+        rows[(rows["scene"] == scene_name) & (rows["metric"] == metric)].to_dict("records") for rows in (results.table, results.predictions)
+    )
+    values = sorted((row for row in shown if row["kind"] in ("truth", "invariant")), key=lambda row: row["dt"])
     lines: list[Line] = []
     guides: dict[int, float] = {}  # by order: the largest error at the coarsest time step
     for engine, (colour, marker) in engine_styles(results.engines).items():
-        mine = frame[frame["engine"] == engine]
-        rows = values[(values["engine"] == engine) & values["value"].notna()].sort_values("dt")
-        dts, errors = rows["dt"].to_numpy(), rows["value"].to_numpy()
+        dts, errors = _points(row for row in values if row["engine"] == engine and not math.isnan(row["value"]))
         lines.append(Line(engine, dts, np.abs(errors), colour, marker=marker))
-        predicted = predictions[(predictions["engine"] == engine) & (predictions["value"] != 0.0)]
-        if len(predicted):
-            lines.append(Line(PREDICTED, predicted["dt"].to_numpy(), predicted["value"].abs().to_numpy(), width=0.0, marker="x"))
-        order, asymptotic = (mine[mine["kind"] == kind] for kind in ("order", "asymptotic_error"))
+        at, predicted = _points(row for row in predictions if row["engine"] == engine and row["value"] != 0.0)
+        if len(at):
+            lines.append(Line(PREDICTED, at, np.abs(predicted), width=0.0, marker="x"))
+        studies = {row["kind"]: row for row in shown if row["engine"] == engine}
+        order, asymptotic = studies.get("order"), studies.get("asymptotic_error")
         m = 0.0
-        if len(asymptotic) and asymptotic["cause"].iloc[0] in ("model", "setting"):
-            m = float(asymptotic["value"].iloc[0])
-            ends = sorted(abs(float(asymptotic[side].iloc[0])) for side in ("lower", "upper"))
+        if asymptotic and asymptotic["cause"] in ("model", "setting"):
+            m = asymptotic["value"]
+            ends = sorted(abs(asymptotic[side]) for side in ("lower", "upper"))
             lines.append(Line(engine, np.full(2, FINER * dts.min()), np.array(ends), colour, width=INTERVAL_WIDTH))
-        if len(asymptotic) and (len(order) or m != 0.0):
+        if asymptotic and (order or m != 0.0):
             # An error that hardly depends on dt has no order; the line to its asymptotic error then has order 1.
-            lines.append(_fit(engine, dts, errors, float(order["value"].iloc[0]) if len(order) else 1.0, m, colour))
-        if len(order) and order["cause"].iloc[0] == "discretisation" and math.isfinite(order["value"].iloc[0]):
-            rounded = max(1, round(float(order["value"].iloc[0])))
+            lines.append(_fit(engine, dts, errors, order["value"] if order else 1.0, m, colour))
+        if order and order["cause"] == "discretisation" and math.isfinite(order["value"]):
+            rounded = max(1, round(order["value"]))
             guides[rounded] = max(guides.get(rounded, 0.0), abs(errors[-1]))
-    dts = np.sort(values["dt"].unique())
+    dts = np.unique([row["dt"] for row in values])
     for p, largest in sorted(guides.items()):
         # Above the data, so that it hides no line.
         lines.append(Line(f"order {p}", dts, 2.0 * largest * (dts / dts[-1]) ** p, width=1.0, dashes="dotted"))
@@ -78,6 +80,12 @@ def error_over_dt(results: Results, scene_name: str, metric: str) -> Chart:
 def plot_error_over_dt(results: Results, scene_name: str, metric: str, axes: "Axes") -> None:
     """Draw `error_over_dt` into axes."""
     draw(error_over_dt(results, scene_name, metric), axes)
+
+
+def _points(rows: Iterable[Mapping[Hashable, Any]]) -> tuple[Array, Array]:
+    """Time steps and values of rows, shape (n,) each."""
+    found = [(row["dt"], row["value"]) for row in rows]
+    return tuple(np.reshape(found, (-1, 2)).T)
 
 
 def _fit(engine: str, dts: Array, errors: Array, order: float, m: float, colour: str) -> Line:

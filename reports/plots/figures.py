@@ -46,7 +46,7 @@ def report_charts(results: Results) -> dict[str, dict[str, Sequence[Chart]]]:
     names = list(results.scenes)
     failing = results.table.loc[results.breakdowns | results.table["verdict"].isin(FAILURES), "scene"].unique()
     plotted = names if len(names) <= MOST_SCENES else failing[:MOST_SCENES]
-    drawn = {scene: {kind: make(results, scene) for kind, make in CHARTS.items()} for scene in plotted}
+    drawn = {scene: {kind: make(results.by_scene[scene], scene) for kind, make in CHARTS.items()} for scene in plotted}
     return {scene: {kind: charts for kind, charts in by_kind.items() if charts} for scene, by_kind in drawn.items()}
 
 
@@ -112,7 +112,8 @@ def history_figure(history: "History", scene_name: str) -> "Figure":
 def _errors(results: Results, scene_name: str, metrics: Sequence[str], worth: float) -> list[str]:
     """The metrics for which at least one engine has an error larger than `worth`."""
     mine = results.measurements[results.measurements["scene"] == scene_name]
-    return [name for name in metrics if (mine.loc[mine["metric"] == name, "value"].abs() > worth).any()]
+    largest = mine["value"].abs().groupby(mine["metric"]).max()
+    return [name for name in metrics if largest.get(name, 0.0) > worth]
 
 
 CHARTS: dict[str, Callable[[Results, str], Sequence[Chart]]] = {

@@ -39,8 +39,8 @@ class Leading:
 def leading_errors(results: Results) -> dict[str, Leading]:
     """The leading error of each scene with an exact solution, by scene."""
     found = {}
-    for name, scene in results.scenes.items():
-        finest = results.leading_errors(name)
+    for name, one in results.by_scene.items():
+        finest = one.leading_errors(name)
         if finest.empty:
             continue
         metric, dt = str(finest["metric"].iloc[0]), float(finest["dt"].iloc[0])
@@ -49,7 +49,7 @@ def leading_errors(results: Results) -> dict[str, Leading]:
         rounded = set(finest.index[finest["cause"] == "rounding"])
         least = [engine for engine, size in sizes.items() if (engine in rounded if rounded else size <= 1.01 * values.min())]
         unit = METRICS[metric].unit
-        of = scale(scene, unit)
+        of = scale(results.scenes[name], unit)
         levels = {engine: level(size / of) for engine, size in sizes.items()}
         found[name] = Leading(name, metric, unit, dt, of, sizes, levels, least)
     return found

@@ -23,12 +23,14 @@ class Forecast(NamedTuple):
         seconds: Wall time [s].
         jobs: Number of scenes that run at a time.
         by_engine: The part of each engine in it [s].
+        by_scene: Wall time of each scene alone [s].
         quick: Wall time of a quick run of the same [s].
     """
 
     seconds: float
     jobs: int
     by_engine: Mapping[str, float]
+    by_scene: Mapping[str, float]
     quick: float
 
 
@@ -63,7 +65,8 @@ def forecast(
     seconds, of_quick = (max(one.sum() / jobs, one.sum(axis=1).max(initial=0.0)) for one in times)
     shares = times[0].sum(axis=0) / max(times[0].sum(), np.finfo(float).tiny)
     by_engine = {entry.label: float(share * seconds) for entry, share in zip(entries, shares, strict=True)}
-    return Forecast(float(seconds), jobs, by_engine, float(of_quick))
+    by_scene = {own.scene.name: float(alone) for own, alone in zip(scenes, times[0].sum(axis=1), strict=True)}
+    return Forecast(float(seconds), jobs, by_engine, by_scene, float(of_quick))
 
 
 def simulations(own: StartPhase, entry: EngineEntry, dt: float) -> int:

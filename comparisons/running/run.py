@@ -95,8 +95,9 @@ def run(
     with ExitStack() as stack:
         crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(number)]
         timings = _timings([own.scene for own in pending], entries, dts, crews[0], report)
+        expected = forecast(pending, entries, dts, timings, number)
         if on_forecast is not None:
-            on_forecast(forecast(pending, entries, dts, timings, number))
+            on_forecast(expected)
 
         def of_scene(own: StartPhase, processes: EngineProcesses, _: Callable[[], None]) -> Results:
             return run_scene(own, entries, dts, processes, report, stamp, timings)
@@ -107,7 +108,9 @@ def run(
 
         for processes in crews[1:]:
             processes.start([entry for entry in entries if not entry.absence])
-        work_in_parallel(iter(pending), of_scene, crews, on_done)
+        # The longest first, so that no processor is idle while another one ends a long scene.
+        longest_first = sorted(pending, key=lambda own: -expected.by_scene[own.scene.name])
+        work_in_parallel(iter(longest_first), of_scene, crews, on_done)
     stamp["compilation"] = _compilation(timings)
     return joined([parts[scene.name] for scene in prepared.scenes], stamp)
 

@@ -41,6 +41,7 @@ def test_forecast_follows_from_the_times_of_the_steps():
     assert found.seconds == pytest.approx(33 * ball + 5 * spin)
     assert found.quick == pytest.approx(9 * ball + spin)
     assert found.by_engine == pytest.approx({"exact": found.seconds, entries[1].label: 0.0})
+    assert found.by_scene == pytest.approx({"drop-ball": 33 * ball, "spin-principal": 5 * spin})
     assert forecast(scenes, entries, [DT], timings, 2).seconds == pytest.approx(max(33 * ball, 5 * spin, (33 * ball + 5 * spin) / 2))
     together = {key: timing._replace(in_batches=True) for key, timing in timings.items()}
     one_ball = scenes[0].scene.steps(DT) * (2e-3 + 33 * MEASURING)
@@ -50,10 +51,10 @@ def test_forecast_follows_from_the_times_of_the_steps():
 @pytest.mark.parametrize(
     ("found", "sentence"),
     [
-        (Forecast(59.0, 2, {"slow": 59.0}, 10.0), ""),
-        (Forecast(240.0, 2, {"mujoco": 50.0, "pybullet": 190.0}, 40.0), "about 4 min on 2 processors, of which pybullet about 3 min"),
-        (Forecast(600.0, 1, {"slow": 600.0}, 150.0), "about 10 min on 1 processor; --quick takes about 2 min"),
-        (Forecast(600.0, 1, {"slow": 600.0}, 600.0), "about 10 min on 1 processor"),
+        (Forecast(59.0, 2, {"slow": 59.0}, {}, 10.0), ""),
+        (Forecast(240.0, 2, {"mujoco": 50.0, "pybullet": 190.0}, {}, 40.0), "about 4 min on 2 processors, of which pybullet about 3 min"),
+        (Forecast(600.0, 1, {"slow": 600.0}, {}, 150.0), "about 10 min on 1 processor; --quick takes about 2 min"),
+        (Forecast(600.0, 1, {"slow": 600.0}, {}, 600.0), "about 10 min on 1 processor"),
     ],
 )
 def test_time_is_said_if_a_run_takes_more_than_a_minute(found, sentence):

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -169,13 +170,20 @@ class PyBulletSimulation(Simulation):
         for _ in range(steps):
             step(client)
 
-    def state(self) -> Array:
+    def _numbers(self) -> tuple[float, ...]:
         position, orientation = self._bullet.getBasePositionAndOrientation(self._body, self._client)
         velocity, angular_velocity = self._bullet.getBaseVelocity(self._body, self._client)
-        return np.array(position + orientation + velocity + angular_velocity)
+        return position + orientation + velocity + angular_velocity
+
+    def state(self) -> Array:
+        return np.array(self._numbers())
 
     def record(self, steps: int, every: int = 1) -> Array:
-        rows = super().record(steps, every)
+        numbers = array("d", self._numbers())
+        for _ in range(steps // every):
+            self.advance(every)
+            numbers.extend(self._numbers())
+        rows = np.array(numbers).reshape(-1, 13)
         self.known_limitations = list(_limitations_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
         if every == 1 and self._turning_slip_of is not None:
             self.known_limitations += _turning_slip(self._turning_slip_of, rows, self._dt)

@@ -8,9 +8,7 @@ Array = NDArray[np.float64]
 
 def cross(a: Array, b: Array) -> Array:
     """A × b over the last axis; for few vectors, as in a root search, numpy.cross takes four times as long."""
-    if a.shape != b.shape:
-        a, b = np.broadcast_arrays(a, b)
-    product = np.empty(a.shape)
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
     product[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     product[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     product[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -9,14 +9,14 @@ import numpy as np
 from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.judging.horizon import with_horizon
 from dropspin.comparisons.judging.verdicts import Judgement, judge, with_limitations, with_precision
-from dropspin.comparisons.measuring.comparison import Comparison, Unresolved, exactly
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from dropspin.comparisons.results.measurement import Case, Measurement
 from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.comparisons.running.recording import Breakdown, divergence
-from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.comparisons.running.start_phases import StartPhase, exact_motions, start_phases
 from dropspin.scenarios import Scenario, Trajectory, Truth
 
 QUICK_NOISE = 2.0
@@ -39,13 +39,12 @@ class Measured(NamedTuple):
 def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[Trajectory | None]]:
     """The start phases at a time step [s], and the exact motion from each at every step, as far as there is an exact solution."""
     phases = start_phases(own.scene, own.truth, dt, quick=own.quick)
-    return phases, exactly_at(own.scene, dt, phases)
+    return phases, [None for _ in phases] if own.truth is None else exactly_at(own.scene, dt, own.truth, phases)
 
 
-def exactly_at(scene: Scenario, dt: float, phases: Sequence[StartPhase]) -> list[Trajectory | None]:
-    """The exact motion from each start phase of a scene at every step."""
-    times = dt * np.arange(1 + scene.steps(dt), dtype=float)
-    return [None if phase.truth is None else exactly(phase.truth, times) for phase in phases]
+def exactly_at(scene: Scenario, dt: float, truth: Truth, phases: Sequence[StartPhase]) -> list[Trajectory | None]:
+    """The exact motion of an exact solution from each start phase of a scene, at every step."""
+    return [*exact_motions(truth, phases, dt * np.arange(1 + scene.steps(dt), dtype=float))]
 
 
 def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[Trajectory | None]) -> list[Comparison]:
@@ -72,7 +71,7 @@ def measure(
     time_per_step: float = np.nan,
 ) -> list[Measured]:
     """Every metric of one engine at one time step, judged; a remark if it has no motion."""
-    scene, truth, quick = own
+    scene, truth, quick, _ = own
     case = Case(scene.name, engine_run.label, dt, scene.steps(dt), time_per_step)
     breakdown = breakdown_of(engine_run)
     if breakdown is not None:

@@ -167,9 +167,8 @@ def _other_laws(own: StartPhase, dt: float, phases: Sequence[StartPhase]) -> lis
     """The exact solutions under the impact laws that the scene does not name, from each start phase."""
     found = []
     for law, truth in other_laws(own.scene).items():
-        delays = [truth.events[0].time - phase.truth.events[0].time for phase in phases if phase.truth is not None]
-        of_law = [phase._replace(truth=truth.after(delay)) for phase, delay in zip(phases, delays, strict=True)]
-        found.append(_OtherLaw(law, of_law, exactly_at(own.scene, dt, of_law)))
+        of_law = [phase._replace(truth=truth.after(phase.delay)) for phase in phases]
+        found.append(_OtherLaw(law, of_law, exactly_at(own.scene, dt, truth, of_law)))
     return found
 
 

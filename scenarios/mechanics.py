@@ -46,15 +46,17 @@ def kinetic_energy_of(mass: float, inertia: Components, orientation: Components,
     return 0.5 * mass * scalar_product(velocity, velocity) + 0.5 * scalar_product(spin, momentum)
 
 
-def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True) -> Array:
+def energy(scene: Scenario, motion: Trajectory, synchronised: bool = True, kinetic: Array | None = None) -> Array:
     """Kinetic plus potential energy [J], shape (n,). Potential energy is 0 at rest on the floor, or at the start without a floor.
 
     The synchronised energy takes the velocity at the time of the position, to first order: E* = E + lag M g·v.
-    Semi-implicit Euler conserves E* exactly in free fall, and E only to first order in dt.
+    Semi-implicit Euler conserves E* exactly in free fall, and E only to first order in dt. `kinetic` is the kinetic energy [J], if it was
+    already computed.
     """
     position, velocity, origin, gravity = map(_components, (motion.position, motion.velocity, energy_origin(scene), scene.acceleration))
     lag = motion.velocity_lag if synchronised else 0.0
-    found: Array = energy_of(kinetic_energy(scene, motion), scene.body.mass, position, velocity, origin, gravity, lag)
+    kinetic = kinetic_energy(scene, motion) if kinetic is None else kinetic
+    found: Array = energy_of(kinetic, scene.body.mass, position, velocity, origin, gravity, lag)
     return found
 
 

@@ -1,6 +1,7 @@
 """Quantities at each state of many motions at once: the formulas of `dropspin.scenarios.mechanics` in one compiled loop."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring import motions
-from dropspin.comparisons.measuring.motions import Array, Mask, Motions, RowNumbers, Setup, is_touching
-from dropspin.scenarios import mechanics
-from dropspin.scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
+from dropspin.comparisons.measuring.motions import Array, Mask, Motions, RowNumbers, Setup, States, is_touching
+from dropspin.scenarios import Scenario, Trajectory, mechanics
+from dropspin.scenarios.mechanics import energy_of, energy_origin, kinetic_energy_of, offset_of
 
+BATCH_BYTES = 8 * 2**20
+"""States that are held in memory at a time; more would not be faster."""
+AT_ONCE = ("kinetic_energy", "energy", "lowest_height", "touching")
 REACH = 1.0 + 1e-9
 """Height of the centre of mass, relative to the size of the body, above which no point of it is below the floor."""
 
@@ -54,6 +58,26 @@ def motions_side_by_side(
         height, kinetic, energy, lowest, touching, valid, rows, unit_tolerance, np.ascontiguousarray(last_row, dtype=np.int64), *given
     )
     return Motions(setup, _States(height, states[..., 8], kinetic, energy, lowest, touching), dt, last_row), valid
+
+
+def states_of(scenes: Sequence[Scenario], motions: Sequence[Trajectory]) -> list[States]:
+    """The quantities at each state of motions of equal length, from several starts of one scene, computed at once where all are finite."""
+    found = [States(scene, motion) for scene, motion in zip(scenes, motions, strict=True)]
+    setup, rows, dt = Setup.of(scenes[0]).as_batch(), len(motions[0]), motions[0].t[1] - motions[0].t[0]
+    many = max(1, BATCH_BYTES // (rows * 13 * 8))
+    for some in (found[first : first + many] for first in range(0, len(found), many)):
+        of_each = replace(setup, origin=np.array([energy_origin(one.scene) for one in some]))
+        states, lag = np.array([one.motion.states for one in some]), np.array([one.motion.velocity_lag for one in some])
+        together, valid = motions_side_by_side(of_each, states, np.full(len(some), dt), lag, np.full(len(some), rows - 1), np.inf)
+        if valid.all():
+            for number, one in enumerate(some):
+                vars(one).update({name: getattr(together.states, name)[number] for name in AT_ONCE})
+    return found
+
+
+def compile_states(scene: Scenario) -> None:
+    """Compile the loop of `states_of` in this thread: a process that is forked while another thread compiles may wait for it forever."""
+    states_of([scene], [Trajectory.from_states(np.arange(2.0), np.tile(scene.initial_state, (2, 1)))])
 
 
 def _for_each(values: Array, size: int) -> NDArray[np.float64]:

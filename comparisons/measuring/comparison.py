@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.contacts import ContactResiduals, contact_residuals
-from dropspin.comparisons.measuring.motions import Motions
+from dropspin.comparisons.measuring.motions import Motions, States
 from dropspin.scenarios import Scenario, Trajectory, Truth
-from dropspin.scenarios.mechanics import angular_momentum, apex, energy, kinetic_energy
+from dropspin.scenarios.mechanics import apex
 from dropspin.scenarios.model import TOUCHING
-from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.rotations import cross, rotate
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -70,9 +70,10 @@ class Comparison:
 
     @classmethod
     def between(cls, one: "Comparison", other: "Comparison", until: int) -> "Comparison":
-        """Compare the motions of two engines over `until` rows; energies that were already computed are reused."""
+        """Compare the motions of two engines over `until` rows; what was already computed of them is reused."""
         case = cls(one.scene, one.motion, other.motion[:until], one.impacts)
-        vars(case).update(energy=one.energy, exact_energy=other.energy[:until])
+        vars(case)["states"] = one.states
+        vars(case.exact_states)["energy"] = other.states.energy[:until]
         return case
 
     @cached_property
@@ -98,34 +99,35 @@ class Comparison:
         return self.motion[: len(self.exact)]
 
     @cached_property
-    def motions(self) -> Motions:
-        """The motion as the input of metrics that need no reference."""
-        return Motions.of(self.scene, self.motion)
+    def states(self) -> States:
+        """Quantities at each state of the motion."""
+        return States(self.scene, self.motion)
 
     @cached_property
+    def exact_states(self) -> States:
+        """Quantities at each state of the reference."""
+        assert self.reference is not None
+        return States(self.scene, self.reference)
+
+    @cached_property
+    def motions(self) -> Motions:
+        """The motion as the input of metrics that need no reference."""
+        return Motions.of(self.scene, self.motion, self.states)
+
+    @property
     def energy(self) -> Array:
         """Energy of the motion, velocity synchronised with position [J], shape (n,)."""
-        return self.motions.energy
+        return self.states.energy
 
     @property
     def lowest_height(self) -> Array:
         """Height of the body's lowest point above the floor [m], shape (n,)."""
         return self.motions.lowest_height
 
-    @cached_property
-    def exact_energy(self) -> Array:
-        """Energy of the reference [J], shape (m,)."""
-        return energy(self.scene, self.exact)
-
-    @cached_property
+    @property
     def angular_momentum(self) -> Array:
         """Angular momentum of the motion at the reference's times [kg m²/s], shape (m, 3)."""
-        return angular_momentum(self.scene, self.compared)
-
-    @cached_property
-    def exact_angular_momentum(self) -> Array:
-        """Angular momentum of the reference [kg m²/s], shape (m, 3)."""
-        return angular_momentum(self.scene, self.exact)
+        return self.states.angular_momentum[: len(self.exact)]
 
     @cached_property
     def dt(self) -> float:
@@ -221,7 +223,7 @@ class Comparison:
             Unresolved: The scene has no energy.
         """
         if self.scene.floor is None and self.reference is not None:
-            scale = float(kinetic_energy(self.scene, self.reference).max())
+            scale = float(self.exact_states.kinetic_energy.max())
         else:
             scale = float(self.motions.energy_scale)
         if scale == 0.0:
@@ -249,4 +251,4 @@ class Comparison:
     def normal_velocity_of_contact(self, row: int, contact_row: int) -> float:
         """Vertical velocity [m/s] at one row of the point that is lowest at another row."""
         arm = self.contact_point(contact_row)
-        return float((self.motion.velocity[row] + np.cross(self.motion.angular_velocity[row], arm))[1])
+        return float((self.motion.velocity[row] + cross(self.motion.angular_velocity[row], arm))[1])

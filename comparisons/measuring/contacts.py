@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.measuring.motions import Motions
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 from dropspin.scenarios.mechanics import angular_momentum
-from dropspin.scenarios.rotations import length
+from dropspin.scenarios.rotations import cross, length
 from dropspin.scenarios.state import UP
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def contact_residuals(scene: Scenario, motion: Trajectory, motions: Motions | No
     normal, along = impulse @ UP, impulse - np.outer(impulse @ UP, UP)
     moment = (angular_momentum(scene, after) - angular_momentum(scene, before)) @ UP
     to_floor = (lowest[steps + 1] - after.position[:, 1])[:, np.newaxis] * UP
-    slip = after.velocity + np.cross(after.angular_velocity, to_floor)
+    slip = after.velocity + cross(after.angular_velocity, to_floor)
     along_slip = np.sum(along * slip, axis=1) + moment * (after.angular_velocity @ UP)
     if np.isinf(scene.floor.coefficient):
         excess = np.full_like(normal, np.nan)

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
-from dropspin.scenarios.mechanics import energy
 from dropspin.scenarios.rotations import angle_between_orientations, angle_between_vectors, length, rotation_vector
 
 Array = NDArray[np.float64]
@@ -15,8 +14,8 @@ Array = NDArray[np.float64]
 
 def energy_error(case: Comparison, synchronised: bool = True) -> Array:
     """Difference of energy from that of the exact solution, over the scene's energy."""
-    found = case.energy[: len(case.exact)] if synchronised else energy(case.scene, case.compared, synchronised=False)
-    return (found - case.exact_energy) / case.energy_scale
+    found = case.states.energy if synchronised else case.states.energy_as_stored
+    return (found[: len(case.exact)] - case.exact_states.energy) / case.energy_scale
 
 
 def angular_momentum_error(case: Comparison) -> Array:
@@ -26,17 +25,17 @@ def angular_momentum_error(case: Comparison) -> Array:
 
 def angular_momentum_difference(case: Comparison) -> Array:
     """The difference as a vector in the world frame, over the largest exact value, shape (n, 3)."""
-    exact = case.exact_angular_momentum
+    found, exact = case.angular_momentum, case.exact_states.angular_momentum
     scale = np.max(length(exact))
     if scale == 0.0:
         raise Unresolved("the angular momentum is 0 in double precision")
-    difference: Array = (case.angular_momentum - exact) / scale
+    difference: Array = (found - exact) / scale
     return difference
 
 
 def angular_momentum_direction_error(case: Comparison) -> Array:
     """Angle between the angular momentum and that of the exact solution [rad]."""
-    return angle_between_vectors(case.angular_momentum, case.exact_angular_momentum)
+    return angle_between_vectors(case.angular_momentum, case.exact_states.angular_momentum)
 
 
 def position_error(case: Comparison) -> Array:

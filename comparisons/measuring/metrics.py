@@ -13,7 +13,7 @@ from dropspin.comparisons.measuring.motions import Motions, at_rows
 from dropspin.comparisons.measuring.stored_energy import energy_with_stored
 from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.mechanics import angular_momentum, apex
-from dropspin.scenarios.rotations import angle_between_orientations, length
+from dropspin.scenarios.rotations import angle_between_orientations, cross, length
 
 TURNED = 1e-3  # rad; a body that turns by less counts as not turning
 LANDING = 3  # steps, within which every engine has completed an impact
@@ -138,7 +138,7 @@ def _moment_in_first_impact(case: Comparison) -> Array:
     scale = mass * float(np.linalg.norm(r) * np.linalg.norm(case.motion.velocity[before]))
     if scale == 0.0:
         raise Unresolved("the body is at rest before the impact")
-    return np.array([turned - np.cross(r, mass * pushed)]) / scale
+    return np.array([turned - cross(r, mass * pushed)]) / scale
 
 
 @_metric(

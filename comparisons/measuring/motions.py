@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.contact_runs import ContactRuns, contact_runs
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.mechanics import Components, energy, energy_origin, kinetic_energy, lowest_height, scalar_product
+from dropspin.scenarios.mechanics import Components, angular_momentum, energy, energy_origin, kinetic_energy, lowest_height, scalar_product
 from dropspin.scenarios.model import TOUCHING
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ class Setup:
         return cls(
             mass=np.asarray(body.mass),
             inertia=body.inertia_tensor,
-            vertices=body.vertices,
+            vertices=body.hull,
             rounding=np.asarray(body.rounding),
             size=np.asarray(body.size),
             origin=energy_origin(scene),
@@ -144,9 +144,10 @@ class Motions:
     last_row: RowNumbers
 
     @classmethod
-    def of(cls, scene: Scenario, motion: Trajectory) -> "Motions":
-        """One motion of a scene: at least two rows, equally spaced in time."""
-        return cls(Setup.of(scene), _StatesOfOne(scene, motion), np.asarray(motion.t[1] - motion.t[0]), np.asarray(len(motion) - 1))
+    def of(cls, scene: Scenario, motion: Trajectory, states: "States | None" = None) -> "Motions":
+        """One motion of a scene: at least two rows, equally spaced in time; `states` are its `States`, if there are any yet."""
+        one = states or States(scene, motion)
+        return cls(Setup.of(scene), one, np.asarray(motion.t[1] - motion.t[0]), np.asarray(len(motion) - 1))
 
     @property
     def energy(self) -> Array:
@@ -240,34 +241,50 @@ def is_touching(before: Components, after: Components, dt: float, gravity: Compo
 
 
 @dataclass(frozen=True, eq=False)
-class _StatesOfOne:
-    """`StateQuantities` of one motion of a scene."""
+class States:
+    """`StateQuantities` of one motion of a scene, each computed once."""
 
     scene: Scenario
     motion: Trajectory
 
     @property
     def height(self) -> Array:
+        """Height of the centre of mass [m], shape (n,)."""
         return self.motion.position[:, 1]
 
     @property
     def vertical_velocity(self) -> Array:
+        """Of the centre of mass [m/s], shape (n,)."""
         return self.motion.velocity[:, 1]
 
     @cached_property
+    def angular_momentum(self) -> Array:
+        """About the centre of mass, world frame [kg m²/s], shape (n, 3)."""
+        return angular_momentum(self.scene, self.motion)
+
+    @cached_property
     def kinetic_energy(self) -> Array:
+        """[J], shape (n,)."""
         return kinetic_energy(self.scene, self.motion)
 
     @cached_property
     def energy(self) -> Array:
-        return energy(self.scene, self.motion)
+        """Kinetic plus potential energy, velocity synchronised with position [J], shape (n,)."""
+        return energy(self.scene, self.motion, kinetic=self.kinetic_energy)
+
+    @cached_property
+    def energy_as_stored(self) -> Array:
+        """Kinetic plus potential energy, with velocities as stored [J], shape (n,)."""
+        return energy(self.scene, self.motion, synchronised=False, kinetic=self.kinetic_energy)
 
     @cached_property
     def lowest_height(self) -> Array:
+        """Height of the body's lowest point above the floor [m], shape (n,)."""
         return lowest_height(self.scene, self.motion)
 
     @cached_property
     def touching(self) -> Mask:
+        """For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (n - 1,)."""
         setup, dt = Setup.of(self.scene), np.asarray(self.motion.t[1] - self.motion.t[0])
         before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
         found: Mask = is_touching(

@@ -9,9 +9,11 @@ import numpy as np
 from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.judging.horizon import with_horizon
 from dropspin.comparisons.judging.verdicts import Judgement, judge, with_limitations, with_precision
+from dropspin.comparisons.measuring.batch import states_of
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.measuring.motions import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from dropspin.comparisons.results.measurement import Case, Measurement
 from dropspin.comparisons.running.engine_run import EngineRun
@@ -36,21 +38,27 @@ class Measured(NamedTuple):
     components: Average | None = None
 
 
-def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[Trajectory | None]]:
+def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[States | None]]:
     """The start phases at a time step [s], and the exact motion from each at every step, as far as there is an exact solution."""
     phases = start_phases(own.scene, own.truth, dt, quick=own.quick)
     return phases, [None for _ in phases] if own.truth is None else exactly_at(own.scene, dt, own.truth, phases)
 
 
-def exactly_at(scene: Scenario, dt: float, truth: Truth, phases: Sequence[StartPhase]) -> list[Trajectory | None]:
+def exactly_at(scene: Scenario, dt: float, truth: Truth, phases: Sequence[StartPhase]) -> list[States | None]:
     """The exact motion of an exact solution from each start phase of a scene, at every step."""
-    return [*exact_motions(truth, phases, dt * np.arange(1 + scene.steps(dt), dtype=float))]
+    exact = exact_motions(truth, phases, dt * np.arange(1 + scene.steps(dt), dtype=float))
+    return [States(phase.scene, motion) for phase, motion in zip(phases, exact, strict=True)]
 
 
-def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[Trajectory | None]) -> list[Comparison]:
+def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[States | None]) -> list[Comparison]:
     """Motions from all start phases compared with the exact solution."""
-    together = zip(phases, motions, exact, strict=True)
-    return [Comparison.with_truth(phase.scene, motion, phase.truth, known) for phase, motion, known in together]
+    cases = []
+    together = zip(phases, states_of([phase.scene for phase in phases], motions), exact, strict=True)
+    for phase, states, known in together:
+        case = Comparison.with_truth(phase.scene, states.motion, phase.truth, None if known is None else known.motion)
+        vars(case).update({"states": states} if known is None else {"states": states, "exact_states": known})
+        cases.append(case)
+    return cases
 
 
 def breakdown_of(engine_run: EngineRun) -> Breakdown | None:
@@ -66,7 +74,7 @@ def measure(
     dt: float,
     engine_run: EngineRun,
     phases: Sequence[StartPhase],
-    exact: Sequence[Trajectory | None],
+    exact: Sequence[States | None],
     cases: Sequence[Comparison],
     time_per_step: float = np.nan,
 ) -> list[Measured]:

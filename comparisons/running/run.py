@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.judging.verdicts import verify_expectations
+from dropspin.comparisons.measuring.batch import compile_states
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.results.provenance import provenance
@@ -92,6 +93,8 @@ def run(
         else:
             pending.append(StartPhase(scene, truth, quick))
     number = min(as_jobs(jobs), max(len(pending), 1))
+    for own in pending[:1]:
+        compile_states(own.scene)
     with ExitStack() as stack:
         crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(number)]
         timings = _timings([own.scene for own in pending], entries, dts, crews[0], report)

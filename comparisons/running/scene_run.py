@@ -36,7 +36,7 @@ class _OtherLaw(NamedTuple):
 
     law: str
     phases: Sequence[StartPhase]
-    exact: Sequence[Trajectory | None]
+    exact: Sequence[States | None]
 
 
 @dataclass

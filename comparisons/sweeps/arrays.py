@@ -33,8 +33,6 @@ from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-BATCH_BYTES = 8 * 2**20
-"""States that are held in memory at a time; more would not be faster."""
 ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}
 
 

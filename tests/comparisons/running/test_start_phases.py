@@ -1,0 +1,46 @@
+"""Start phases: the exact motion from each, and what all motions give at once, are those of each phase by itself, bit for bit."""
+
+import numpy as np
+import pytest
+
+import dropspin as ds
+from dropspin.comparisons.measuring.batch import AT_ONCE, states_of
+from dropspin.comparisons.measuring.motions import States
+from dropspin.comparisons.running.start_phases import exact_motions, start_phases
+
+DT = 4e-3
+SCENES = ("drop-box-flat", "spin-asymmetric", "roll-prism", "slide-box")
+
+
+def phases_of(name):
+    scene, truth = ds.load(name), ds.truth_for(ds.load(name))
+    times = DT * np.arange(1 + scene.steps(DT), dtype=float)
+    phases = start_phases(scene, truth, DT)
+    return phases, times, exact_motions(truth, phases, times)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact_motions_of_all_phases_are_those_of_each(name):
+    phases, times, motions = phases_of(name)
+    assert len(phases) == len(motions)
+    for phase, motion in zip(phases, motions, strict=True):
+        alone = phase.truth(times[phase.truth.covers(times)])
+        np.testing.assert_array_equal(motion.t, alone.t)
+        np.testing.assert_array_equal(motion.states, alone.states)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_quantities_of_all_motions_at_once_are_those_of_each(name):
+    """Below the height above which no point touches the floor; a motion that is not finite leaves all to be computed by themselves."""
+    phases, _, motions = phases_of(name)
+    shortest = min(map(len, motions))
+    scenes, motions = [phase.scene for phase in phases], [motion[:shortest] for motion in motions]
+    for scene, motion, together in zip(scenes, motions, states_of(scenes, motions), strict=True):
+        assert set(AT_ONCE) <= vars(together).keys()
+        alone = States(scene, motion)
+        for quantity in AT_ONCE:
+            found, expected = getattr(together, quantity), getattr(alone, quantity)
+            np.testing.assert_array_equal(found, np.where(np.isinf(found), np.inf, expected))
+        assert not np.isinf(together.lowest_height[alone.lowest_height <= 0.0]).any()
+    motions[-1].position[0] = np.nan
+    assert not set(AT_ONCE) & vars(states_of(scenes, motions)[-1]).keys()

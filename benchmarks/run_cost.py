@@ -31,12 +31,20 @@ SWEEP = {
     "random": {"count": JOBS, "seed": 1, "floor.restitution": {"from": 0.0, "to": 1.0}, "start.velocity[0]": {"from": -1.0, "to": 1.0}},
 }
 
+STAGES = {
+    "timing of steps": [("run", "_timings")],
+    "exact motions": [("scene_run", "phases_at"), ("studies", "phases_at")],
+    "metrics": [(module, name) for module in ("scene_run", "studies") for name in ("compare", "measure")],
+    "judging over time steps": [("studies", "study_convergence")],
+}
+"""Functions of `dropspin.comparisons.running`, by the stage of a run whose time they take."""
+
 seconds: dict[str, float] = defaultdict(float)
 active: list[str] = []
 
 
-def time_method(owner: type, name: str, part: str) -> None:
-    """Add the time spent in a method to a part of the run, unless another timed method calls it."""
+def time_method(owner: Any, name: str, part: str) -> None:
+    """Add the time spent in a method, or in a function of a module, to a part of the run, unless another timed one calls it."""
     method: Callable[..., Any] = getattr(owner, name)
 
     def timed(*given: Any, **named: Any) -> Any:
@@ -90,6 +98,9 @@ def run_cost(scenes: Sequence[ds.Scenario]) -> None:
         time_method(engine, "prepare", "building")
     for engine in (Wang, MuJoCo):
         time_method(engine, "prepare_batch", "building")
+    for stage, functions in STAGES.items():
+        for module, name in functions:
+            time_method(import_module(f"comparisons.running.{module}"), name, stage)
     import_module("dropspin.comparisons.running.run").EngineProcesses = ProcessesHere
     ds.run(scenes[:1], "wang", jobs=1)  # compiles
     seconds.clear()

@@ -72,8 +72,12 @@ def test_benchmark_of_a_run_prints_its_parts():
     code = "import run_cost; run_cost.run_cost([run_cost.ds.load('fall-spin')])"
     done = subprocess.run([sys.executable, "-c", code], cwd=BENCHMARKS, check=True, capture_output=True, text=True)
     assert [line.partition(":")[0] for line in done.stdout.splitlines()] == [
+        "timing of steps",
+        "exact motions",
         "building",
         "stepping and recording",
+        "metrics",
+        "judging over time steps",
         "all of the run",
         "the report, after the run",
     ]

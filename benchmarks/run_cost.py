@@ -100,7 +100,7 @@ def run_cost(scenes: Sequence[ds.Scenario]) -> None:
         time_method(engine, "prepare_batch", "building")
     for stage, functions in STAGES.items():
         for module, name in functions:
-            time_method(import_module(f"comparisons.running.{module}"), name, stage)
+            time_method(import_module(f"dropspin.comparisons.running.{module}"), name, stage)
     import_module("dropspin.comparisons.running.run").EngineProcesses = ProcessesHere
     ds.run(scenes[:1], "wang", jobs=1)  # compiles
     seconds.clear()

@@ -11,7 +11,7 @@ interval; docs/coverage.md counts how often the interval contains the true value
     unresolved       all other cases: the time steps do not determine the cause
 
 The interval excludes 0 if the cause is `model`, and contains 0 otherwise. It is computed as if the asymptotic error were not 0. That of a
-discretisation error with a sign ends at the allowed error, or at half of it if the probability of more is below 5 %. That an error vanishes
+discretisation error with a sign ends at the allowed error, or at half of it if the probability of more is below 1 %. That an error vanishes
 is said only if its interval ends before half of the error at the finest time step.
 """
 
@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dropspin.comparisons.judging.extrapolation import ORDERS, Posterior, extrapolate
+from dropspin.comparisons.judging.extrapolation import CREDIBLE, ORDERS, Posterior, extrapolate
 from dropspin.comparisons.judging.series import (
     ABOVE_NOISE,
     FEWEST_TIME_STEPS,
@@ -116,7 +116,7 @@ def error_budget(
     dts: ArrayLike,
     errors: ArrayLike,
     claimed_order: float | None = None,
-    resolution: ArrayLike = 0.0,
+    resolution: ArrayLike | None = None,
     rounding: ArrayLike = 0.0,
     *,
     signed: bool = True,
@@ -131,7 +131,9 @@ def error_budget(
         errors: The error at each time step, shape (n,), in any unit, with its sign if it has one; NaN if the time step was too coarse to
             resolve it.
         claimed_order: The order of accuracy claimed for the method; None or inf if there is none.
-        resolution: Standard deviation of the sampling noise of each error, shape (n,), or one for all; in the unit of the errors.
+        resolution: Standard deviation of the sampling noise of each error, shape (n,), or one for all; in the unit of the errors. 0 if the
+            error does not depend on where in a time step an impact falls. None if each error is from one start: a part of it may then be
+            proportional to the remainder of a time divided by the time step.
         rounding: The largest error that rounding alone may cause at each time step, shape (n,), or at all of them; in the unit of the
             errors.
         signed: Whether the error can be negative; an error that cannot is treated as the norm of a signed error.
@@ -144,7 +146,7 @@ def error_budget(
     Raises:
         DropspinError: An argument is invalid.
     """
-    h, e, noise, floor = verified(dts, errors, resolution, rounding)
+    h, e, noise, floor = verified(dts, errors, 0.0 if resolution is None else resolution, rounding)
     verify_options(e, claimed_order, signed, negligible, judged_together)
     coarsest_first = np.argsort(-h)
     usable = coarsest_first[np.isfinite(e[coarsest_first])]
@@ -161,7 +163,7 @@ def error_budget(
     unit = 2.0 ** (math.frexp(float(np.max(np.abs([e, noise, floor]))))[1] - 1)
     e, noise, floor, negligible = e / unit, noise / unit, floor / unit, min(max(negligible, float(floor[-1])) / unit, FAR)
     small = np.hypot(noise, floor)
-    found = extrapolate(h, e, small, claimed_order, signed=signed)
+    found = extrapolate(h, e, small, claimed_order, signed=signed, one_start=resolution is None)
     cause, limit = _attributed(h, e, found, negligible, float(noise[-1]), judged_together)
     order, fitted = fitted_order(h, e if cause == "discretisation" else e - limit[0], small)
     is_slow = cause == "model" and order < ORDERS[0] and max(limit[1], -limit[2]) < abs(float(e[-1]) - limit[0])
@@ -229,7 +231,7 @@ def _attributed(
         return "unresolved", (median, lower, upper)
     if not found.has_sign:
         return "discretisation", (median, lower, upper)
-    reach = 0.5 * allowed if sum(found.beyond(0.5 * allowed)) < DISCRETISATION_RISK else allowed
+    reach = 0.5 * allowed if sum(found.beyond(0.5 * allowed)) < 1.0 - CREDIBLE else allowed
     return "discretisation", (min(max(median, -reach), reach), max(lower, -reach), min(upper, reach))
 
 

@@ -4,11 +4,10 @@
 
 m is the asymptotic error. The cₖ and ξ(h) are independent standard normal variables: the former give a series of powers that starts at the
 order p, the latter a discrepancy that no smooth series has, such as a kink of a maximum or the time of an impact between two steps. Some
-series have another term in the bracket: c (X/H)ˡ of the lower order p - l, which is as large as the leading term at the step X; or c / √12
-times the finest step over H, the constant that a first-order error contains while the remainder of a time divided by the step does not
-change. What is not known is averaged over: p, r, d, l, X and ρ over the values below, s with the density 1/s, and m, which is 0 with even
-odds and else normal with a standard deviation of s times a value on a logarithmic grid. Given these, everything is Student-t, with closed
-forms.
+series have another term in the bracket: c (X/H)ˡ of the lower order p - l, which is as large as the leading term at the step X. In an error
+from one start, a term of first order may be multiplied by the remainder of a time T divided by the step, T/h mod 1. What is not known is
+averaged over: p, r, d, l, X, ρ and T over the values below, s with the density 1/s, and m, which is 0 with even odds and else normal with a
+standard deviation of s times a value on a logarithmic grid. Given these, everything is Student-t, with closed forms.
 
 The error of a signed metric is e itself. One that cannot be negative is a norm, |m + …|, whose square is a smooth function of the step
 where the norm itself has a kink; then e and e² have even odds of being the series above.
@@ -51,11 +50,14 @@ CROSSINGS = (1 / 2, 1 / 16, 1 / 128)
 """X: from the coarsest steps to steps so fine that the lower order hardly shows at those in use; its size varies by more than the factor of
 eight between two of these values, because c does.
 """
-REMAINDER = np.array([0.25, 0.05])
-"""Probability that a part of a first-order error is proportional to the remainder of a time divided by the step, without and beside an
-asymptotic error. If each step is a multiple of the finest, all remainders are equal with the probability h/H of the finest and the coarsest
-step; such a part is the same at all steps.
+REMAINDER, ALONE = 0.05, 0.01
+"""Probability that an error from one start has a first-order part that is proportional to the remainder of a time divided by the step: one
+as large as its other first-order part, or as the term of first order beside the second; and without any other part.
 """
+LONGEST_PERIOD = 64
+"""Largest common multiple of the steps, in finest ones, for which each remainder has a form of its own; else they count as independent."""
+UNIFORM = 1.0 / math.sqrt(12.0)
+"""Standard deviation of a number that is uniform between 0 and 1."""
 DISCREPANCIES = {0.001: 0.7, 0.2: 0.3}
 """ρ and its probability: a smooth series, or one in which chance, a kink or a change of regime changes each error by a fifth."""
 NO_ASYMPTOTIC_ERROR = 0.5
@@ -78,7 +80,6 @@ class _Forms(NamedTuple):
     orders: Array
     """The order that dominates at the finest step."""
     log_weights: Array
-    """(forms, 2): if m is 0, and if it is not."""
     without_claim: Array
     """The logarithm of the weights that no claim has changed, relative to `log_weights`."""
 
@@ -150,7 +151,9 @@ class Posterior:
         return found
 
 
-def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None = None, *, signed: bool = True) -> Posterior:
+def extrapolate(
+    dts: Array, errors: Array, noise: Array, claimed: float | None = None, *, signed: bool = True, one_start: bool = False
+) -> Posterior:
     """The posterior of the asymptotic error.
 
     Args:
@@ -159,9 +162,10 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
         noise: Standard deviation of each.
         claimed: The claimed order of the method, which gets half of the weight of all orders.
         signed: Whether the error can be negative.
+        one_start: Whether each error may depend on the remainder of a time divided by the step.
     """
     h = dts / np.max(dts)
-    forms = _forms(tuple(h), None if claimed is None or not math.isfinite(claimed) else float(claimed))
+    forms = _forms(tuple(h), None if claimed is None or not math.isfinite(claimed) else float(claimed), one_start)
     parts = [_fit(forms, errors, noise)]
     if not signed:
         squares = _fit(forms, errors**2, 2.0 * np.abs(errors) * noise + noise**2)
@@ -172,7 +176,7 @@ def extrapolate(dts: Array, errors: Array, noise: Array, claimed: float | None =
 
 
 @lru_cache(maxsize=64)
-def _forms(h: tuple[float, ...], claimed: float | None) -> _Forms:
+def _forms(h: tuple[float, ...], claimed: float | None, one_start: bool) -> _Forms:
     """All forms of a series, at time steps relative to the coarsest."""
     steps = np.array(h)
     weights = EACH_ORDER_FURTHER ** np.abs(ORDERS - 1.0)
@@ -183,21 +187,18 @@ def _forms(h: tuple[float, ...], claimed: float | None) -> _Forms:
         weights = 0.5 * weights + 0.5 * (np.arange(len(ORDERS)) == nearest)
     covariances, leading, orders, logs, ratios = [], [], [], [], []
     for order, weight, ratio_of_weights in zip(ORDERS, weights, unclaimed / weights, strict=True):
-        for terms, observed, chance in _series(steps, float(order)):
+        for terms, observed, chance in _series(steps, float(order), one_start):
             for discrepancy, share in DISCREPANCIES.items():
                 covariances.append(terms.T @ terms + discrepancy**2 * np.eye(len(steps)))
                 leading.append(steps**order)
                 orders.append(observed)
                 ratios.append(math.log(ratio_of_weights))
-                logs.append(np.log(weight * share * chance * np.ones(2)))
+                logs.append(math.log(weight * share * chance))
     return _Forms(np.array(covariances), np.array(leading), np.array(orders), np.array(logs), np.array(ratios))
 
 
-def _series(steps: Array, order: float) -> Iterator[tuple[Array, float, Array | float]]:
-    """The series that have a leading order: terms divided by the leading power, order observed at the finest step, probability.
-
-    The probability is one number, or two if it is another beside an asymptotic error.
-    """
+def _series(steps: Array, order: float, one_start: bool) -> Iterator[tuple[Array, float, float]]:
+    """The series that have a leading order: terms divided by the leading power, order observed at the finest step, probability."""
     powers = np.arange(4.0)[:, None]
     finest, sizes = float(np.min(steps)), np.where(powers > 0.0, LATER_TERMS, 1.0)
     for ratio in TERM_RATIOS:
@@ -207,19 +208,40 @@ def _series(steps: Array, order: float) -> Iterator[tuple[Array, float, Array | 
         yield sizes * logarithms, order, LOGARITHM / len(TERM_RATIOS)
     # Where a second order competes, the terms of the series itself are small, or they would be taken for it.
     plain = sizes * (min(TERM_RATIOS) * steps) ** powers
-    are_multiples = np.allclose(steps / finest, np.round(steps / finest), rtol=1e-9, atol=0.0)
-    of_remainder = finest * REMAINDER
-    remainder = finest / steps / math.sqrt(12.0)
-    if order == 1.0 and are_multiples:
-        yield np.vstack([plain, remainder]), order, of_remainder
+    of_remainder = list(remainders(steps)) if one_start else []
+    if order == 1.0:
+        for remainder, chance in of_remainder:
+            yield np.vstack([plain, remainder]), order, REMAINDER * chance
+            yield remainder, order, ALONE * chance
     lower = [order - distance for distance in LOWER_BY if order - distance >= ORDERS[0]]
     for other in lower:
         for crossing in CROSSINGS:
             term, chance = (crossing / steps) ** (order - other), COMPETING / len(lower) / len(CROSSINGS)
             observed = other if crossing > finest else order
             yield np.vstack([plain, term]), observed, chance
-            if other == 1.0 and are_multiples:
-                yield np.vstack([plain, term, term * remainder]), observed, chance * of_remainder
+            if other == 1.0 and order == 2.0:
+                for remainder, chance_of_it in of_remainder:
+                    share = REMAINDER * chance_of_it / len(CROSSINGS)
+                    yield np.vstack([plain, term * remainder]), observed, 0.5 * share
+                    yield np.vstack([plain, term, term * remainder]), observed, 0.5 * share
+
+
+def remainders(steps: Array) -> Iterator[tuple[Array, float]]:
+    """Terms of the remainder of a time divided by each step, which is uniform between 0 and 1, and their probability.
+
+    If each step is a multiple of the finest, the time is i + x finest steps. All remainders of i, up to the least common multiple of the
+    steps, are equally probable; x is uniform between 0 and 1 and the same at all steps, a constant error. Otherwise the remainders count as
+    independent.
+    """
+    finest = float(np.min(steps))
+    multiples = np.round(steps / finest).astype(int)
+    period = int(np.lcm.reduce(multiples))
+    if not np.allclose(steps / finest, multiples, rtol=1e-9, atol=0.0) or period > LONGEST_PERIOD:
+        yield np.vstack([np.full(len(steps), 0.5), np.eye(len(steps)) * UNIFORM]), 1.0
+        return
+    whole, counts = np.unique(np.arange(period)[:, None] % multiples, axis=0, return_counts=True)
+    for each, count in zip(whole, counts, strict=True):
+        yield np.array([each + 0.5, np.full(len(steps), UNIFORM)]) / multiples, float(count) / period
 
 
 def _fit(forms: _Forms, e: Array, noise: Array) -> _Fit:
@@ -242,7 +264,7 @@ def _fit(forms: _Forms, e: Array, noise: Array) -> _Fit:
     residuals = np.maximum(residual - variances * along**2 / growth, np.maximum(1e-12 * residual, np.finfo(float).tiny))
     determinants = np.linalg.slogdet(covariances)[1] + 2.0 * np.sum(np.log(leading), axis=1)
     log_weights = (
-        np.repeat(forms.log_weights, [1, len(scales)], axis=1)
+        forms.log_weights[:, None]
         + np.log(chances)
         - 0.5 * (determinants[:, None] + np.log(growth))
         - 0.5 * len(e) * (np.log(residuals) + 2.0 * math.log(scale))

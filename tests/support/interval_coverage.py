@@ -38,7 +38,7 @@ class Outcome(NamedTuple):
 def outcome(series: Series, dts: Array) -> Outcome:
     """What the error budget says about a series."""
     if series.errors.ndim == 1:
-        found, sizes = error_budget(dts, series.errors, resolution=series.noise, signed=series.signed), np.abs(series.errors)
+        found, sizes = error_budget(dts, series.errors, resolution=series.noise or None, signed=series.signed), np.abs(series.errors)
     else:
         found = vector_budget(dts, series.errors, None, np.full_like(series.errors, series.noise), np.zeros_like(dts), 0.0)
         sizes = np.linalg.norm(series.errors, axis=1)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from support.error_series import Array, Draw, Series, Vanishing, coefficient, plain, powers
+from support.error_series import Array, Draw, Series, Vanishing, coefficient, limit, plain, powers
 
 STEPS: dict[str, Array] = {
     **{str(count): 0.5 ** np.arange(count) for count in (3, 5, 6, 7)},
@@ -120,6 +120,22 @@ def growing_plateau(rng: np.random.Generator, h: Array, _least: float) -> Series
     return Series(m * (1.0 - 0.2 * h) + rest, 0.0, True, m)
 
 
+def before_impact(rng: np.random.Generator, h: Array) -> Array:
+    """First and second order, and what is left of a step after the remainder."""
+    return powers(1.0)(rng, h) + coefficient(rng, 0.03, 1.0) * h * (1.0 - remainder(rng, h))
+
+
+def as_large_as_second_order(rng: np.random.Generator, h: Array) -> Array:
+    """Second order, and the step times the remainder, of the same size at the coarsest step."""
+    return coefficient(rng, 0.3, 3.0) * h**2 + coefficient(rng, 0.3, 3.0) * h * remainder(rng, h)
+
+
+def size_with_remainder(rng: np.random.Generator, h: Array, least: float) -> Series:
+    """The size of an error of first order with a remainder."""
+    m = limit(rng, least)
+    return Series(np.abs(m + with_remainder(rng, h)), 0.0, False, abs(m))
+
+
 HELD_OUT_KINDS: dict[str, Draw] = {
     "order 2.5, a little of order 1.25": plain(competing(2.5, 1.25)),
     "order 3, a little of order 1, then of 2": plain(lambda rng, h: competing(3.0, 1.0)(rng, h) + coefficient(rng, 1e-3, 1e-2) * h**2),
@@ -129,6 +145,9 @@ HELD_OUT_KINDS: dict[str, Draw] = {
     "order 1.5, close steps": plain(powers(1.5, 0.5)),
     "plateau that is approached from below": growing_plateau,
     "order 1 with a cosine of a remainder": plain(of_cosine),
+    "orders 1 to 3 before a remainder of a time": plain(before_impact),
+    "order 2 beside a remainder of a time": plain(as_large_as_second_order),
+    "absolute values with a remainder of a time": size_with_remainder,
 }
 """Families that were not looked at until all constants had been chosen."""
 

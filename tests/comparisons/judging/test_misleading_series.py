@@ -8,6 +8,7 @@ from support import interval_coverage
 from support.misleading_series import CLOSE, STEPS
 
 import dropspin as ds
+from dropspin.comparisons.judging.extrapolation import remainders
 from dropspin.comparisons.judging.series import is_clear_power, most_informative
 
 H = np.array([4e-3, 2e-3, 1e-3])
@@ -32,11 +33,36 @@ def test_competing_orders_are_covered_and_decided(family):
     assert not any(one.cause == "model" for one in found if one.asymptotic == 0.0)
 
 
-def test_remainder_of_a_time_is_no_model_error():
-    """An error h (1 + (T/h mod 1)/2): at halved steps the remainder may be the same at all of them, which looks like a limit of c h/2."""
-    found = interval_coverage.outcomes("order 1 with a remainder of a time", 100, 5)
+@pytest.mark.parametrize("family", ["order 1 with a remainder of a time", "order 2 with a remainder of a time"])
+def test_remainder_of_a_time_is_no_model_error(family):
+    """Errors that depend on T/h mod 1, at five halved steps, where all remainders follow from that of the coarsest."""
+    found = interval_coverage.outcomes(family, 100, 5)
     assert not any(one.cause == "model" for one in found if one.asymptotic == 0.0)
-    assert np.mean([one.is_covered for one in found]) >= 0.9
+    assert np.mean([one.is_covered for one in found]) >= 0.95
+
+
+@pytest.mark.parametrize("whole", range(1, 16))
+def test_remainder_that_changes_is_recognised(whole):
+    """T mod h, for a time of whole + .3 finest steps: the errors have the bits of the whole number, and no asymptotic error."""
+    found = ds.error_budget(FIVE, np.mod((whole + 0.3) * FIVE[-1], FIVE))
+    assert found.cause != "model"
+    assert found.lower <= 0.0 <= found.upper
+
+
+def test_error_of_known_noise_has_no_remainder():
+    """A constant as large as the finest step may be a remainder if the error is from one start, and is none if it is a mean over many."""
+    errors = FIVE + 0.5 * FIVE[-1]
+    assert ds.error_budget(FIVE, errors, resolution=0.0).cause == "model"
+    assert ds.error_budget(FIVE, errors).cause != "model"
+
+
+@pytest.mark.parametrize("multiples", [(4, 2, 1), (16, 8, 4, 2, 1), (10, 5, 4, 2, 1), (6, 3, 2, 1)])
+def test_remainders_have_the_covariance_of_franel(multiples):
+    """Of {p t} and {q t}, t uniform between 0 and 1: gcd(p, q)² / (12 p q) (J. Franel, 1924)."""
+    moments = sum(chance * terms.T @ terms for terms, chance in remainders(np.array(multiples) / multiples[0]))
+    period = math.lcm(*multiples)
+    often = [period // each for each in multiples]
+    assert moments == pytest.approx(np.array([[0.25 + math.gcd(p, q) ** 2 / (12.0 * p * q) for p in often] for q in often]), abs=1e-15)
 
 
 @pytest.mark.parametrize("steps", [*CLOSE, "6", "7"])
@@ -161,7 +187,7 @@ def test_noise_or_negligible_errors_without_bound_give_no_warning(option):
 def test_time_step_without_an_error_needs_no_noise():
     """Where the error is NaN, the noise may be NaN too."""
     found = ds.error_budget([8e-3, *H], [math.nan, 4.0, 2.0, 1.0], resolution=[math.nan, 0.0, 0.0, 0.0])
-    assert found == ds.error_budget(H, [4.0, 2.0, 1.0])
+    assert found == ds.error_budget(H, [4.0, 2.0, 1.0], resolution=0.0)
 
 
 def test_families_are_judged_at_time_steps_that_suffice():

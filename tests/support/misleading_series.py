@@ -90,36 +90,6 @@ def chance_plateau(rng: np.random.Generator, h: Array, _least: float) -> Series:
     return Series(np.abs(rest) + m * rng.uniform(0.8, 1.2, len(h)), 0.0, False, m)
 
 
-KINDS: dict[str, Draw] = {
-    "order 2, a little of order 1": plain(competing(2.0, 1.0)),
-    "order 3, a little of order 2": plain(competing(3.0, 2.0)),
-    "order 4, a little of order 1": plain(competing(4.0, 1.0)),
-    "order 2, a little of order 1/2": plain(competing(2.0, 0.5)),
-    "two of the orders 1 to 4": plain(any_two),
-    "orders 1 to 3, close steps": plain(lambda rng, h: powers(float(rng.integers(1, 4)))(rng, h)),
-    "orders 1, 2 and 3 mixed, close steps": plain(powers(1.0, most=3.0)),
-    "plateau of a tolerance, added": added_plateau,
-    "plateau of a tolerance, at a right angle": root_of_squares,
-    "plateau of a tolerance, the larger": larger_of_plateau,
-    "plateau of a tolerance, by chance": chance_plateau,
-    "order 1 with a remainder of a time": plain(with_remainder),
-    "order 2 with a remainder of a time": plain(second_order_with_remainder),
-    "order 1 beside a remainder of a time": plain(dominated_by_remainder),
-    "remainder of a time alone": plain(remainder_alone),
-}
-
-
-def of_cosine(rng: np.random.Generator, h: Array) -> Array:
-    """First order, modulated by a smooth periodic function of the remainder."""
-    return coefficient(rng, 0.3, 3.0) * h * (1.0 + coefficient(rng, 0.03, 0.5) * np.cos(2.0 * math.pi * remainder(rng, h)))
-
-
-def growing_plateau(rng: np.random.Generator, h: Array, _least: float) -> Series:
-    """A plateau whose height changes by a fifth while another error vanishes."""
-    m, rest = plateau(rng, h)
-    return Series(m * (1.0 - 0.2 * h) + rest, 0.0, True, m)
-
-
 def before_impact(rng: np.random.Generator, h: Array) -> Array:
     """First and second order, and what is left of a step after the remainder."""
     return powers(1.0)(rng, h) + coefficient(rng, 0.03, 1.0) * h * (1.0 - remainder(rng, h))
@@ -136,6 +106,39 @@ def size_with_remainder(rng: np.random.Generator, h: Array, least: float) -> Ser
     return Series(np.abs(m + with_remainder(rng, h)), 0.0, False, abs(m))
 
 
+KINDS: dict[str, Draw] = {
+    "order 2, a little of order 1": plain(competing(2.0, 1.0)),
+    "order 3, a little of order 2": plain(competing(3.0, 2.0)),
+    "order 4, a little of order 1": plain(competing(4.0, 1.0)),
+    "order 2, a little of order 1/2": plain(competing(2.0, 0.5)),
+    "two of the orders 1 to 4": plain(any_two),
+    "orders 1 to 3, close steps": plain(lambda rng, h: powers(float(rng.integers(1, 4)))(rng, h)),
+    "orders 1, 2 and 3 mixed, close steps": plain(powers(1.0, most=3.0)),
+    "plateau of a tolerance, added": added_plateau,
+    "plateau of a tolerance, at a right angle": root_of_squares,
+    "plateau of a tolerance, the larger": larger_of_plateau,
+    "plateau of a tolerance, by chance": chance_plateau,
+    "order 1 with a remainder of a time": plain(with_remainder),
+    "order 2 with a remainder of a time": plain(second_order_with_remainder),
+    "order 1 beside a remainder of a time": plain(dominated_by_remainder),
+    "remainder of a time alone": plain(remainder_alone),
+    "orders 1 to 3 before a remainder of a time": plain(before_impact),
+    "order 2 beside a remainder of a time": plain(as_large_as_second_order),
+    "absolute values with a remainder of a time": size_with_remainder,
+}
+
+
+def of_cosine(rng: np.random.Generator, h: Array) -> Array:
+    """First order, modulated by a smooth periodic function of the remainder."""
+    return coefficient(rng, 0.3, 3.0) * h * (1.0 + coefficient(rng, 0.03, 0.5) * np.cos(2.0 * math.pi * remainder(rng, h)))
+
+
+def growing_plateau(rng: np.random.Generator, h: Array, _least: float) -> Series:
+    """A plateau whose height changes by a fifth while another error vanishes."""
+    m, rest = plateau(rng, h)
+    return Series(m * (1.0 - 0.2 * h) + rest, 0.0, True, m)
+
+
 HELD_OUT_KINDS: dict[str, Draw] = {
     "order 2.5, a little of order 1.25": plain(competing(2.5, 1.25)),
     "order 3, a little of order 1, then of 2": plain(lambda rng, h: competing(3.0, 1.0)(rng, h) + coefficient(rng, 1e-3, 1e-2) * h**2),
@@ -145,9 +148,6 @@ HELD_OUT_KINDS: dict[str, Draw] = {
     "order 1.5, close steps": plain(powers(1.5, 0.5)),
     "plateau that is approached from below": growing_plateau,
     "order 1 with a cosine of a remainder": plain(of_cosine),
-    "orders 1 to 3 before a remainder of a time": plain(before_impact),
-    "order 2 beside a remainder of a time": plain(as_large_as_second_order),
-    "absolute values with a remainder of a time": size_with_remainder,
 }
 """Families that were not looked at until all constants had been chosen."""
 

@@ -111,9 +111,9 @@ def run(
 
         for processes in crews[1:]:
             processes.start([entry for entry in entries if not entry.absence])
-        # The longest first, so that no processor is idle while another one ends a long scene.
-        longest_first = sorted(pending, key=lambda own: -expected.by_scene[own.scene.name])
-        work_in_parallel(iter(longest_first), of_scene, crews, on_done)
+        if len(crews) > 1:  # the longest first, so that no processor is idle while another one ends a long scene
+            pending = sorted(pending, key=lambda own: -expected.by_scene[own.scene.name])
+        work_in_parallel(iter(pending), of_scene, crews, on_done)
     stamp["compilation"] = _compilation(timings)
     return joined([parts[scene.name] for scene in prepared.scenes], stamp)
 

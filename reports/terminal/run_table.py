@@ -15,6 +15,7 @@ from dropspin.comparisons.results.results import Results
 from dropspin.reports.terminal.safe import styled
 from dropspin.reports.terminal.summary import print_summary
 from dropspin.reports.views.findings import orders
+from dropspin.reports.views.impact_laws import law_rows
 from dropspin.reports.views.numbers import formatted, trend, word
 
 NUMBER_WIDTH = 9  # of -1.23e-04; a narrow terminal folds names and splits the table, but never cuts a number
@@ -37,6 +38,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
             out.print(_scene_table(results, name, results.engines[first : first + at_once]))
         _print_trends(results, name, out)
         _print_ensemble(results, name, out)
+        _print_laws(results, name, out)
         _print_remarks(results, name, out)
         out.print()
     print_summary(results, out)
@@ -98,6 +100,15 @@ def _print_ensemble(results: Results, name: str, out: Console) -> None:
         assert spread is not None
         starts = min(spread.size, QUICK_MEMBERS) if results.is_quick else spread.size
         out.print(styled(f"over {starts} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
+
+
+def _print_laws(results: Results, name: str, out: Console) -> None:
+    """The distances of each engine to the exact solutions under other impact laws; that of the scene is marked."""
+    for row in law_rows(results):
+        scene, engine, distance, *laws = row.items()
+        if scene[1] == name:
+            listed = ", ".join(f"{law} {value}" for law, value in laws if value != "–")
+            out.print(styled(f"by impact law, {distance[1]}, {engine[1]}: {listed}", style="dim"))
 
 
 def _print_remarks(results: Results, name: str, out: Console) -> None:

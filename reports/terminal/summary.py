@@ -9,13 +9,10 @@ from dropspin.comparisons.results.results import Results
 from dropspin.reports.terminal.rows import aligned, print_sentence
 from dropspin.reports.terminal.safe import styled
 from dropspin.reports.views.failures import FailureGroup, grouped
-from dropspin.reports.views.impact_laws import NOTE
 from dropspin.reports.views.matrix import Matrix, matrix
 from dropspin.reports.views.run import overview
 from dropspin.scenarios.text import counted
 
-MOST_ROWS = 12
-"""Largest number of rows on impact laws; the report has all."""
 MOST_SENTENCES = 6
 """Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
 
@@ -27,11 +24,12 @@ def print_summary(results: Results, console: Console | None = None) -> None:
         print_sentence(sentence, out)
     _print_matrix(matrix(results, summary.statuses), results.engines, out)
     if summary.laws:
-        print_sentence(NOTE, out, "dim")
-        for line in aligned([list(summary.laws[0]), *(list(row.values()) for row in summary.laws[:MOST_ROWS])]):
-            out.print(styled(line, style="dim"), soft_wrap=True)
-    if len(summary.laws) > MOST_ROWS:
-        print_sentence(f"{len(summary.laws) - MOST_ROWS} more rows are in the report.", out, "dim")
+        differing = counted(len({row["scene"] for row in summary.laws}), "scene")
+        print_sentence(
+            f"Impact laws differ in {differing}: the report lists each engine's distances to the other laws, which are not errors.",
+            out,
+            "dim",
+        )
     print_failures(grouped(results, [one for one in summary.failures if not one.accepted]), out)
     print_sentence(summary.verdict, out, "bold")
 

@@ -142,7 +142,10 @@ def test_known_limitation_excuses_failures_of_its_metric_and_size_only():
     ("expectation", "message"),
     [
         ({"metric": "energy_eror"}, r"^scene\['expect'\]\[0\]\['metric'\]: got 'energy_eror'; no such metric\..*energy_error"),
-        ({"metric": "restitution_error"}, r"restitution_error'; it needs an exact solution with an impact, which this scene does not have"),
+        (
+            {"metric": "restitution_error"},
+            r"restitution_error'; it needs an exact impact with Newton's restitution, which this scene does not have",
+        ),
         ({"metric": "energy_error", "engine": "mujocco"}, r"^scene\['expect'\]\[0\]\['engine'\]: got 'mujocco'; no such engine\..*mujoco"),
         ({"metric": "energy_error", "engine": "mujoco[integrator=euler]"}, r"write it as 'mujoco', as the results do"),
         ({"metric": "energy_error", "engine": "wang[law=nune]"}, r"wang\[law=nune\]'; .*nune"),

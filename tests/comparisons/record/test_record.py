@@ -196,7 +196,7 @@ def test_rows_that_no_record_has_are_refused(two_records, column, value, words):
     mine, sent = two_records
     path = max(sent.rglob("*.parquet"))
     rewrite(path, **{column: value})
-    path = path.rename(path.with_name(f"document-1.2-{sha256(path.read_bytes())[:HASH]}.parquet"))
+    path = path.rename(path.with_name(f"wang-1.2-{sha256(path.read_bytes())[:HASH]}.parquet"))
     with pytest.raises(DropspinError, match=f"{re.escape(path.name)}: refused: .*{words}"):
         Record(mine).merge([str(path)])
     assert not (mine / OTHERS).exists()
@@ -325,7 +325,7 @@ def test_a_file_with_any_changed_byte_is_refused_or_read(two_records):
     for place in range(0, len(content), max(1, len(content) // 100)):
         changed = bytearray(content)
         changed[place] ^= 0x55
-        name = f"document-1.2-{sha256(changed)[:HASH]}.parquet"
+        name = f"wang-1.2-{sha256(changed)[:HASH]}.parquet"
         try:
             Stored(Path(name), "wang", "1.2", bytes(changed)).rows()
         except DropspinError as error:

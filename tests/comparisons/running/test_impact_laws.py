@@ -8,7 +8,7 @@ from support.sampled import Sampled
 from dropspin.comparisons.results.store import load_results
 from dropspin.comparisons.running.run import run
 from dropspin.reports.run_folder import write_report
-from dropspin.reports.terminal.summary import print_summary
+from dropspin.reports.terminal.run_table import print_table
 from dropspin.scenarios import load, truth_for
 from dropspin.scenarios.mechanics import kinetic_energy
 from dropspin.scenarios.trajectory import Trajectory
@@ -148,7 +148,7 @@ def test_distances_are_in_the_report_the_summary_and_a_stored_run(tmp_path, caps
     """Beside the error under the law of the scene; a run that is loaded again has the same rows."""
     found = run("drop-tetra-turning", following("integrated-newton"), 2e-3, quick=True)
     write_report(found, tmp_path / "run")
-    print_summary(found)
+    print_table(found)
     pages = [(tmp_path / "run" / name).read_text(encoding="utf-8") for name in ("report.md", "report.html")]
     for text in (capsys.readouterr().out, *pages):
         assert "integrated-poisson" in text

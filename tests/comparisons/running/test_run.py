@@ -72,8 +72,8 @@ def failures_of(results):
 def test_table_has_the_documented_columns_and_unique_keys(core):
     """Every measurement has its steps, its time per step and its time step."""
     assert list(core.table.columns) == list(COLUMNS)
-    assert not core.table.duplicated(["scene", "engine", "dt", "metric", "kind", "reason"]).any()
-    assert not core.table[core.table["metric"] != ""].duplicated(["scene", "engine", "dt", "metric", "kind"]).any()
+    assert not core.table.duplicated(["scene", "engine", "dt", "metric", "kind", "truth", "reason"]).any()
+    assert not core.table[core.table["metric"] != ""].duplicated(["scene", "engine", "dt", "metric", "kind", "truth"]).any()
     for others, kind in ((core.predictions, "prediction"), (core.agreements, "agreement")):
         assert list(others.columns) == list(COLUMNS)
         assert set(others["kind"]) == {kind}

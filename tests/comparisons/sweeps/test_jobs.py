@@ -109,7 +109,7 @@ def test_key_is_the_same_for_an_option_in_the_name_or_on_an_axis():
 
 def test_key_does_not_change_between_versions():
     """Users join tables by it; a change of this value must be in the changelog."""
-    assert hashes(SWEEP, 0, 1) == ["ba50fcdcaab169c74a74"]
+    assert hashes(SWEEP, 0, 1) == ["2c95f68bcc102f9ba48f"]
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(2, 50), st.sampled_from(["linear", "log"]))
@@ -164,7 +164,7 @@ BALL = {"scenes": ["drop-ball"], "engines": ["wang"], "dts": [4e-3]}
         ({"scenes": ["drop-bal"]}, "spec: scenes: scene 'drop-bal' is not in the catalogue .* Did you mean 'drop-ball'"),
         ({"scenes": ["drop-ball", "drop-ball"]}, "scenes: got .*; names one twice"),
         ({"scenes": []}, "scenes: got .*at least 1 item"),
-        ({"engines": ["documnt"]}, "Did you mean 'wang'"),
+        ({"engines": ["wnag"]}, "Did you mean 'wang'"),
         ({"engines": ["wang", "wang[law=note]"]}, "engines: the same engine is named twice, written in two ways"),
         ({"dts": []}, "the time step is missing"),
         ({"dts": [0.0]}, r"dts\[0\]: got 0.0; must be greater than 0"),

@@ -119,7 +119,7 @@ def test_expectations_for_other_steps_are_not_called_missing(tmp_path):
     [
         ('metric = "energy_eror"\nbelow = 1', "Did you mean 'energy_error'?"),
         ('metric = "horizontal_momentum_error"\nbelow = 1', "it needs a frictionless floor"),
-        ('metric = "penetration"\nbelow = 1\nengine = "documnt"', "no such engine. Did you mean 'wang'?"),
+        ('metric = "penetration"\nbelow = 1\nengine = "wnag"', "no such engine. Did you mean 'wang'?"),
         ('metric = "penetration"\nbelow = 1\nengine = "mujoco[integrator=euler]"', "write it as 'mujoco'"),
     ],
 )

@@ -160,7 +160,7 @@ def main() -> None:
 
 
 def _arrange_path() -> None:
-    home, here = os.path.dirname(os.path.abspath(__file__)), os.getcwd()
+    home, here = os.path.dirname(os.path.dirname(os.path.abspath(__file__))), os.getcwd()
     named = [os.path.abspath(place) for place in os.environ.get("PYTHONPATH", "").split(os.pathsep) if place]
     own = [place for place in sys.path if os.path.abspath(place) not in {*named, here} - {home}]
     sys.path[:] = own + [place for place in dict.fromkeys(named) if place not in {home, here}]

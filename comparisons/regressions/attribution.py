@@ -85,11 +85,14 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
     own, around = of_engine(old, new, engine), surroundings(old, new)
     listed, name = ", ".join([*own.values(), *around.values()]), engine.split("[", maxsplit=1)[0]
     if motions == "same" and around.keys() & OF_DROPSPIN:
-        return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {', '.join(around.values())}")
+        corrected = ", ".join(text for part, text in around.items() if part in OF_DROPSPIN)
+        return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {corrected}")
     if not own and not around:
         return Attribution("nothing", "nothing that is recorded differs, nor do the motions" if motions == "same" else NO_DIFFERENCE)
     if around and around.keys() <= OF_DROPSPIN and own.keys() <= ({"adapter"} if name in BUILT_IN else set()):
-        if motions == "different" and not own and name != OWN_ENGINE:
+        if motions == "different" and name == OWN_ENGINE:
+            return Attribution("dropspin", f"a change of dropspin, of which {name} is a part: {listed}")
+        if motions == "different" and not own:
             return Attribution("either", f"{listed}; the cause cannot be isolated, because the motions of {name} differ too")
         return Attribution("dropspin", f"{CORRECTION}{', as far as it is recorded' * (motions == 'unknown')}: {listed}")
     if not own:

@@ -8,6 +8,7 @@ import datetime
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -85,7 +86,7 @@ class _File(Table):
     accepted: dict[str, dict[str, Any]] = Field(default_factory=dict)
     engines: dict[Text, Text] = Field(default_factory=dict)
     scenes: dict[Text, Text] = Field(default_factory=dict)
-    motions: dict[Text, dict[Text, dict[str, Text]]] = Field(default_factory=dict)
+    motions: dict[str, dict[Text, dict[Text, dict[str, Text]]]] = Field(default_factory=dict)
     results: dict[Text, dict[Text, dict[str, dict[str, Any]]]] = Field(default_factory=dict)
 
 
@@ -104,7 +105,7 @@ class Baseline:
         acceptances: Acceptances by key.
         engines: The name by which an engine is run, if it differs from the label, such as `my_module:MyEngine`.
         scenes: The hash of what each scene simulates.
-        motions: By scene, engine and time step: the hash of the motions from which the results were measured.
+        motions: By the key of an acceptance: by scene, engine and time step, the hash of the motions from which its results were measured.
         results: The table that `comparable_results` returns, with two more columns: `by` is the key of the acceptance; if `known_failure`
             is true, a failed check of this result does not fail the run unless the result is worse than accepted.
     """
@@ -112,7 +113,7 @@ class Baseline:
     acceptances: Mapping[str, Acceptance] = field(default_factory=dict)
     engines: Mapping[str, str] = field(default_factory=dict)
     scenes: Mapping[str, str] = field(default_factory=dict)
-    motions: Digests = field(default_factory=dict)
+    motions: Mapping[str, Digests] = field(default_factory=dict)
     results: pd.DataFrame = field(default_factory=lambda: _table([]))
 
 
@@ -138,10 +139,14 @@ def load_baseline(path: str | Path) -> Baseline:
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
     lines = [_read_line(where, key, content, acceptances) for key, content in _listed(where, written)]
-    motions = flat(written.motions)
-    for scene, engine, step in motions:
+    motions = {
+        by: {(scene, current_label(engine), step): digest for (scene, engine, step), digest in flat(nested).items()}
+        for by, nested in written.motions.items()
+    }
+    for scene, engine, step in chain.from_iterable(motions.values()):
         assert_steps(f"{where}: motions of {scene}, {engine}", step)
-    return Baseline(acceptances, written.engines, written.scenes, motions, _table(lines))
+    engines = {current_label(label): name for label, name in written.engines.items()}
+    return Baseline(acceptances, engines, written.scenes, motions, _table(lines))
 
 
 def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, str], Any]]:
@@ -149,6 +154,8 @@ def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, s
     for scene, engines in written.results.items():
         if scene not in written.scenes:
             raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
+        if len({*map(current_label, engines)}) < len(engines):
+            raise DropspinError(f"{where}: results of {scene}: an engine is listed by two names; remove the lines of the earlier one.")
         for engine, steps in engines.items():
             for step, named in steps.items():
                 assert_steps(f"{where}: results of {scene}, {engine}", step)
@@ -223,8 +230,7 @@ def accept(
     used = set(everything["by"])
     acceptances = {key: one for key, one in {acceptance.key: acceptance, **earlier.acceptances}.items() if key in used}
     names = {label: name for label, name in stamp["names"].items() if name != label}
-    replaced = {(row["scene"], row["engine"], step) for row in moved.to_dict("records") for step in row["steps"].split(", ")}
-    motions = {**digests_of(stamp), **{key: digest for key, digest in earlier.motions.items() if key not in replaced}}
+    motions = {**earlier.motions, acceptance.key: {**earlier.motions.get(acceptance.key, {}), **digests_of(stamp)}}
     return Baseline(acceptances, {**earlier.engines, **names}, {**earlier.scenes, **scenes}, motions, everything), found[~lost]
 
 
@@ -255,8 +261,9 @@ def _text(baseline: Baseline) -> str:
     lines.append("")
     for table, named, used in (("engines", baseline.engines, engines), ("scenes", baseline.scenes, scenes)):
         lines += [_assigned([table, name], tomlkit.string(text)) for name, text in sorted(named.items()) if name in used]
-    pairs = set(zip(held["scene"], held["engine"], strict=True))
-    lines += [_assigned(["motions", *key], tomlkit.string(one)) for key, one in sorted(baseline.motions.items()) if key[:2] in pairs]
+    cases = {(row["by"], row["scene"], row["engine"], step) for row in held.to_dict("records") for step in row["steps"].split(", ")}
+    measured = {(by, *case): digest for by, digests in baseline.motions.items() for case, digest in digests.items()}
+    lines += [_assigned(["motions", *key], tomlkit.string(measured[key])) for key in sorted(cases & measured.keys())]
     for _, rows in held.groupby(["scene", "engine", "steps"], sort=False):
         lines.append("")
         for row in rows.to_dict("records"):

@@ -31,8 +31,6 @@ VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "
 ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic error", "ensemble": "accepted mean"}
 """The column `truth` of a row of kind `baseline`; `accepted` for all others."""
 
-"""The beginnings of the reasons for an engine whose scene changed, and for known failures."""
-
 
 class NothingAccepted(DropspinError):
     """A baseline has no result that the run covers."""
@@ -106,11 +104,11 @@ def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[i
     """By the number of its row, the cause to which each failing accepted result is attributed."""
     failing, stamp = regressed(found), results.provenance
     unmoved = [str(engine) for engine, changes in found.groupby("engine")["change"] if set(changes) == {"same"}]
-    motions = compared_digests(failing, baseline.motions, digests_of(stamp))
     known: dict[tuple[str, str, Motion], Attribution] = {}
     causes = {}
-    for number, row, of_row in zip(failing.index, failing.to_dict("records"), motions, strict=True):
+    for number, row in zip(failing.index, failing.to_dict("records"), strict=True):
         engine, by = row["engine"], row["by"]
+        of_row = compared_digests(row, baseline.motions.get(by, {}), digests_of(stamp))
         if (engine, by, of_row) not in known:
             earlier = baseline.acceptances[by].stamp_of(engine)
             known[engine, by, of_row] = attribute(earlier, stamp, engine, unmoved, of_row)

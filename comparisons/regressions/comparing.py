@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from dropspin.comparisons.regressions.attribution import Attribution, attribute, surroundings
-from dropspin.comparisons.regressions.motions import EqualMotions, compared_digests, digests_of, equal_motions, taken_together
+from dropspin.comparisons.regressions.motions import EqualMotions, digests_of, equal_motions, taken_together
 from dropspin.comparisons.regressions.speed import SpeedChange, speed_changes
 from dropspin.comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed, verify_comparable
 from dropspin.comparisons.results.results import Results
@@ -76,7 +76,7 @@ def compare(old: Results, new: Results) -> Changes:
     stamps = old.provenance, new.provenance
     digests = digests_of(old.provenance), digests_of(new.provenance)
     attributions = {
-        str(engine): attribute(*stamps, str(engine), unmoved, taken_together(compared_digests(rows, *digests)))
+        str(engine): attribute(*stamps, str(engine), unmoved, taken_together(rows, *digests))
         for engine, rows in found[found["change"] != "same"].groupby("engine")
     }
     in_one_only, speed, motions = _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from dropspin.comparisons.regressions.attribution import Attribution, attribute
-from dropspin.comparisons.regressions.motions import compared_digests, digests_of, taken_together
+from dropspin.comparisons.regressions.motions import digests_of, taken_together
 from dropspin.comparisons.regressions.values import KEY, changes, comparable_results, most_changed_first, verify_comparable
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
@@ -105,7 +105,7 @@ def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> li
         for engine, differing in moved.items():
             if len(differing):
                 stamps = results[last[engine]].provenance, one.provenance
-                motions = taken_together(compared_digests(differing, *map(digests_of, stamps)))
+                motions = taken_together(differing, *map(digests_of, stamps))
                 found.append(Move(engine, last[engine], run, differing, attribute(*stamps, engine, unmoved, motions)))
         last |= dict.fromkeys(measured, run)
     return found

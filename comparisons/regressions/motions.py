@@ -1,6 +1,6 @@
 """Whether two runs have the same motions, bit for bit: the test of determinism across runs, versions and machines."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -29,30 +29,26 @@ def flat(nested: Mapping[str, Mapping[str, Mapping[str, str]]]) -> Digests:
     }
 
 
-def compared_digests(rows: pd.DataFrame, old: Digests, new: Digests) -> list[Motion]:
-    """For each result, whether the motions that were measured for it are equal bit for bit in two runs.
+def compared_digests(row: Mapping[Any, Any], old: Digests, new: Digests) -> Motion:
+    """Whether the motions that were measured for a result are equal bit for bit in two runs.
 
     Args:
-        rows: Results, with the columns of `values.KEY`.
+        row: The result, with the columns of `values.KEY`.
         old: The hashes of the earlier motions.
         new: Those of the later motions.
 
     Returns:
         `unknown` where a hash is missing, and for means of ensembles and symmetries, which have other motions.
     """
-    return [_compared(row, old, new) for row in rows.to_dict("records")]
-
-
-def _compared(row: Mapping[Any, Any], old: Digests, new: Digests) -> Motion:
     pairs = [(old.get(key), new.get(key)) for key in ((row["scene"], row["engine"], step) for step in row["steps"].split(", "))]
     if row["kind"] not in ("truth", "invariant", "order", "asymptotic_error") or any(None in pair for pair in pairs):
         return "unknown"
     return "same" if all(one == other for one, other in pairs) else "different"
 
 
-def taken_together(found: Iterable[Motion]) -> Motion:
+def taken_together(rows: pd.DataFrame, old: Digests, new: Digests) -> Motion:
     """Whether the motions of several results are equal: `different` if those of one are."""
-    every = set(found)
+    every = {compared_digests(row, old, new) for row in rows.to_dict("records")}
     return "different" if "different" in every else "same" if every == {"same"} else "unknown"
 
 

@@ -70,3 +70,9 @@ def test_changed_code_of_a_built_in_adapter_is_a_correction_of_dropspin():
     found = attribute(stamp, stamp | {"code": "d", "adapters": {"pybullet": "b"}}, "pybullet", [])
     assert found.origin == "dropspin"
     assert found.message.endswith("as far as it is recorded: the code of pybullet's adapter, dropspin's own code")
+
+
+def test_changed_motions_of_wang_s_method_are_a_change_of_dropspin_not_a_correction():
+    stamp = STAMP | {"settings": {"wang": STAMP["settings"]["candidate"]}}
+    found = attribute(stamp, stamp | {"code": "d"}, "wang", [], "different")
+    assert (found.origin, found.message) == ("dropspin", "a change of dropspin, of which wang is a part: dropspin's own code")

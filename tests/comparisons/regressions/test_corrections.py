@@ -115,12 +115,15 @@ def test_compare_uses_the_same_motions(earlier, monkeypatch):
     assert "whose motions are the same bit for bit" in found.attributions["candidate"].message
 
 
-def test_hashes_of_unchanged_results_stay_in_the_baseline(accepted):
-    """Those of results that are replaced are replaced too, so that hash and value belong together."""
+def test_hashes_belong_to_the_acceptance_of_a_result(accepted, tmp_path):
+    """A result that is replaced has the hash of its new motions; one that stays has that of the motions from which it was measured."""
     lively = relabelled(run(BALL, TooLively(), STEPS), "too-lively", "candidate")
-    assert accept(lively, accepted, "livelier", TODAY)[0].motions == digests_of(lively.provenance)
-    rounded = stamped(run(BALL, Candidate(), STEPS), motions={BALL.name: {"candidate": dict.fromkeys(map(repr, STEPS), "00000000")}})
-    assert accept(rounded, accepted, "on another machine", TODAY)[0].motions == accepted.motions
+    later = accept(lively, accepted, "livelier", TODAY)[0]
+    [first], [second] = accepted.acceptances, later.acceptances.keys() - accepted.acceptances.keys()
+    assert set(later.results["by"]) == {first, second}
+    assert later.motions == {first: accepted.motions[first], second: digests_of(lively.provenance)}
+    write_baseline(later, tmp_path / "accepted.toml")
+    assert load_baseline(tmp_path / "accepted.toml").motions == later.motions
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,6 @@
 """The pytest plugin: comparisons of engines with exact solutions, as tests. docs/pytest.md documents its use.
 
-dropspin runs in separate processes. A user's repository may have packages named `scenarios`, `reports` or `comparisons`, which pytest
-imports in this process. Therefore this process never imports dropspin's packages of these names, and dropspin never imports the user's.
-
-The plugin is a single long file, because a second file would be another top-level module in every user's environment.
+dropspin runs in separate processes, and this file imports nothing of it, so that pytest starts fast.
 """
 
 import hashlib
@@ -73,12 +70,14 @@ class Result:
         Args:
             metric: Name of the metric, as `dropspin list metrics` prints it.
             dt: Time step [s]; the finest if None.
-            engine: Label of the engine in the rows; optional if only one engine ran.
+            engine: Label of the engine in the rows, or the name by which it was asked for; optional if only one engine ran.
 
         Raises:
             LookupError: The metric was not measured, or was measured for several engines.
         """
-        measured = [row for row in self.rows if row["kind"] in ("truth", "invariant", "ensemble") and engine in (None, row["engine"])]
+        labels = {engine, *(label for label, name in self.engines.items() if name == engine)}
+        of_engine = [row for row in self.rows if engine is None or row["engine"] in labels]
+        measured = [row for row in of_engine if row["kind"] in ("truth", "invariant", "ensemble")]
         found = [row for row in measured if row["metric"] == metric and (dt is None or math.isclose(row["dt"], dt, rel_tol=1e-9))]
         if not found:
             what = f"{metric} of {engine or self.scene} at {'any time step' if dt is None else f'{dt:g} s'}"

@@ -156,8 +156,9 @@ def test_value_of_a_metric():
     rows = [row | {"engine": "mine", "dt": 0.002, "value": None}, row | {"engine": "mine", "dt": 0.004, "value": 0.5}]
     rows += [row | {"engine": "other", "dt": 0.004, "value": 0.25}, {"engine": "shy", "kind": "", "metric": ""}]
     rows[-1] |= {"verdict": "declined", "reason": "I do not spin"}
-    result = pytest_plugin.Result("spin", rows, Path("out"), "spin", {}, ())
+    result = pytest_plugin.Result("spin", rows, Path("out"), "spin", {"mine": "my_module:Mine"}, ())
     assert result.value("energy_error", engine="mine", dt=0.004) == 0.5
+    assert result.value("energy_error", engine="my_module:Mine", dt=0.004) == 0.5
     assert result.value("energy_error", engine="other") == 0.25
     assert str(result.value("energy_error", engine="mine")) == "nan"
     with pytest.raises(LookupError, match=r"^energy_error was measured for several engines, mine, other; choose one with engine=$"):

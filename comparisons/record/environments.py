@@ -23,7 +23,6 @@ from dropspin.scenarios import DropspinError, UnknownName
 
 POLL = 0.5  # s
 LONGEST_REASON = 300
-"""The beginning of the reason why a release was not installed; another day it may be."""
 HOME = Path(__file__).parents[3]
 
 

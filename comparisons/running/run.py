@@ -63,7 +63,7 @@ def run(
             are timed before, while nothing else runs.
         quick: Whether to run few starts: 8 instead of 32 start phases, 16 members of an ensemble, and no perturbed starts in double
             precision. A check that the sampling noise may decide is `measured`, intervals are wider, and the results have no tolerances,
-            so that `check` with a baseline, `accept`, `compare` and `history` refuse them.
+            so that `check` with a baseline, `accept`, `compare` and `compare history` refuse them.
         on_forecast: Called once, when the steps are timed, with the time that the simulations will take.
 
     Returns:

@@ -17,8 +17,8 @@ from dropspin.reports.terminal.safe import echo
 def compare_command(old: str, new: str, summary: str | None, json_output: bool) -> int:
     """Show which results changed between two runs, and the cause: the engine, its settings, dropspin, or the machine.
 
-    OLD and NEW are folders that dropspin run -o wrote, on one machine or on two. Accuracy is judged. Speed, and whether motions are equal
-    bit for bit, are reported, not gated.
+    OLD and NEW are folders that dropspin run -o wrote, on one machine or on two; write ./history for a folder of that name. Accuracy is
+    judged. Speed, and whether motions are equal bit for bit, are reported, not gated.
 
     Exit code: 0 nothing is worse, 1 a result is worse, moved or gone, 2 bad input.
     """

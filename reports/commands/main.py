@@ -110,7 +110,8 @@ def _run() -> int:
         return 2
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
-        _say(error.format_message() + (f" To list what it takes: {context.command_path} --help" if context else ""))
+        hint = f" To list what it takes: {context.command_path} --help" if context else ""
+        _say(error.format_message().rstrip(".") + f".{hint}")
         return 2
     except click.Abort:  # an interrupt of a command, with its message
         raise
@@ -153,7 +154,7 @@ class _LazyGroup(click.Group):
         words = 2 if " ".join(args[:2]) in COMMANDS else 1
         name = " ".join(args[:words])
         if name in MOVED:
-            raise click.UsageError(f"{name} is now: dropspin {MOVED[name]}.", ctx)
+            raise click.UsageError(f"{name} is now: dropspin {MOVED[name]}.")
         if name not in COMMANDS and not name.startswith("-"):
             from dropspin.scenarios import UnknownName
 

@@ -186,7 +186,7 @@ def test_line_in_a_plot_is_at_the_time_of_the_replay(opened, results):
         """time => {
             const home = document.querySelector("[data-scene=drop-box-corner] [data-replay]");
             home.viewer.seek(time);
-            const plot = home.closest("section").querySelectorAll(".plot")[1], path = plot.querySelector("path[data-label=document]");
+            const plot = home.closest("section").querySelectorAll(".plot")[1], path = plot.querySelector("path[data-label=wang]");
             return [Number(plot.querySelector("line.now").getAttribute("x1")), path.getAttribute("d")];
         }""",
         impact.time,

@@ -28,6 +28,14 @@ def test_baseline(tmp_path):
     assert set(load_baseline(tmp_path / "accepted.toml").results["engine"]) == {"wang[rotation=rk4]"}
 
 
+def test_baseline_with_both_names_is_refused(tmp_path):
+    """As after a merge of two branches."""
+    lines = BASELINE.splitlines(keepends=True)
+    (tmp_path / "accepted.toml").write_text("".join([*lines, lines[-1].replace("document", "wang")]))
+    with pytest.raises(ds.DropspinError, match="results of drop-ball: an engine is listed by two names"):
+        load_baseline(tmp_path / "accepted.toml")
+
+
 def test_an_adapter_cannot_take_the_name(tmp_path, monkeypatch):
     (tmp_path / "takes_a_name.py").write_text("import dropspin as ds\n\n\nclass Mine(ds.Engine):\n    name = 'document'\n")
     monkeypatch.syspath_prepend(tmp_path)

@@ -32,10 +32,12 @@ class Attribution:
             adapter, its settings or its motions and the surroundings differ, so that the cause cannot be isolated; `nothing` if the whole
             provenance is the same.
         message: The cause in a sentence, without the engine's name.
+        is_correction: Whether it is a correction of dropspin, and no change of the engine.
     """
 
     origin: Origin
     message: str
+    is_correction: bool = False
 
 
 def surroundings(old: Stamp, new: Stamp) -> dict[str, str]:
@@ -86,7 +88,7 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
     listed, name = ", ".join([*own.values(), *around.values()]), engine.split("[", maxsplit=1)[0]
     if motions == "same" and around.keys() & OF_DROPSPIN:
         corrected = ", ".join(text for part, text in around.items() if part in OF_DROPSPIN)
-        return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {corrected}")
+        return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {corrected}", is_correction=True)
     if not own and not around:
         return Attribution("nothing", "nothing that is recorded differs, nor do the motions" if motions == "same" else NO_DIFFERENCE)
     if around and around.keys() <= OF_DROPSPIN and own.keys() <= ({"adapter"} if name in BUILT_IN else set()):
@@ -94,7 +96,8 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
             return Attribution("dropspin", f"a change of dropspin, of which {name} is a part: {listed}")
         if motions == "different" and not own:
             return Attribution("either", f"{listed}; the cause cannot be isolated, because the motions of {name} differ too")
-        return Attribution("dropspin", f"{CORRECTION}{', as far as it is recorded' * (motions == 'unknown')}: {listed}")
+        message = f"{CORRECTION}{', as far as it is recorded' * (motions == 'unknown')}: {listed}"
+        return Attribution("dropspin", message, is_correction=True)
     if not own:
         return Attribution("surroundings", f"attributed to the surroundings: {listed}")
     first = next(iter(own))

@@ -90,8 +90,8 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     found = changes(accepted[~another], comparable).merge(accepted[[*KEY, "by", "known_failure"]], on=KEY, how="left")
     found = most_changed_first(found)
     causes = _causes(found, baseline, results)
-    of_dropspin = {number for number, cause in causes.items() if cause.origin == "dropspin"}
-    found = found.assign(note=[f"; {CORRECTION}" if number in of_dropspin else "" for number in found.index])
+    corrections = {number for number, cause in causes.items() if cause.is_correction}
+    found = found.assign(note=[f"; {CORRECTION}" if number in corrections else "" for number in found.index])
     rows = [_scene_changed(scene, engine) for scene, engine in accepted.loc[another, ["scene", "engine"]].drop_duplicates().to_numpy()]
     rows += _lost_rows(results, found[found["change"] == "gone"])
     rows += [_judged(row, baseline) for row in found[~found["change"].isin(["new", "gone"])].to_dict("records")]
@@ -102,13 +102,13 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
 
 def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[int, Attribution]:
     """By the number of its row, the cause to which each failing accepted result is attributed."""
-    failing, stamp = regressed(found), results.provenance
+    failing, stamp, digests = regressed(found), results.provenance, digests_of(results.provenance)
     unmoved = [str(engine) for engine, changes in found.groupby("engine")["change"] if set(changes) == {"same"}]
     known: dict[tuple[str, str, Motion], Attribution] = {}
     causes = {}
     for number, row in zip(failing.index, failing.to_dict("records"), strict=True):
         engine, by = row["engine"], row["by"]
-        of_row = compared_digests(row, baseline.motions.get(by, {}), digests_of(stamp))
+        of_row = compared_digests(row, baseline.motions.get(by, {}), digests)
         if (engine, by, of_row) not in known:
             earlier = baseline.acceptances[by].stamp_of(engine)
             known[engine, by, of_row] = attribute(earlier, stamp, engine, unmoved, of_row)

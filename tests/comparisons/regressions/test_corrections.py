@@ -142,3 +142,10 @@ def test_motions_decide_what_a_change_of_dropspin_explains(engine, adapter, moti
     stamp |= {"adapters": {engine: "a"}, "settings": {engine: {"at": {"version": "1.0"}}}}
     later = stamp | {"versions": {"dropspin": "2"}, "code": "d", "adapters": {engine: adapter}}
     assert attribute(stamp, later, engine, [], motions).origin == origin
+
+
+def test_changed_motions_of_an_engine_that_is_part_of_dropspin_are_no_correction():
+    stamp = {"versions": {"dropspin": "1"}, "python": "3.11", "cpu": "A", "platform": "Linux", "code": "c", "adapters": {}}
+    stamp |= {"settings": {"wang": {"at": {"version": "1.0"}}}}
+    found = {motions: attribute(stamp, stamp | {"code": "d"}, "wang", [], motions).is_correction for motions in ("same", "different")}
+    assert found == {"same": True, "different": False}

@@ -21,7 +21,7 @@ REACH = 1.0 + 1e-9
 """Height of the centre of mass, relative to the size of the body, above which no point of it is below the floor."""
 
 
-class _States(NamedTuple):
+class _StatesOfMany(NamedTuple):
     """`StateQuantities` of many motions."""
 
     height: Array
@@ -57,7 +57,7 @@ def motions_side_by_side(
     _kernel()(
         height, kinetic, energy, lowest, touching, valid, rows, unit_tolerance, np.ascontiguousarray(last_row, dtype=np.int64), *given
     )
-    return Motions(setup, _States(height, states[..., 8], kinetic, energy, lowest, touching), dt, last_row), valid
+    return Motions(setup, _StatesOfMany(height, states[..., 8], kinetic, energy, lowest, touching), dt, last_row), valid
 
 
 def states_of(scenes: Sequence[Scenario], motions: Sequence[Trajectory]) -> list[States]:

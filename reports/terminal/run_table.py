@@ -1,7 +1,7 @@
 """The tables of a run on a terminal: for each scene, a table with a column for each engine."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -31,6 +31,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
         console: Rich's console to print to; None means standard output.
     """
     out = console or Console()
+    laws = law_rows(results)
     at_once = max(1, (out.width - NAME_WIDTH - NUMBER_WIDTH - GAP) // (NUMBER_WIDTH + 2 + GAP))
     for name, scene in results.scenes.items():
         out.print(styled(name, style="bold").append(f"  {scene.summary}" if scene.summary else "", style="not bold"))
@@ -38,7 +39,7 @@ def print_table(results: Results, console: Console | None = None) -> None:
             out.print(_scene_table(results, name, results.engines[first : first + at_once]))
         _print_trends(results, name, out)
         _print_ensemble(results, name, out)
-        _print_laws(results, name, out)
+        _print_laws([row for row in laws if row["scene"] == name], out)
         _print_remarks(results, name, out)
         out.print()
     print_summary(results, out)
@@ -102,13 +103,12 @@ def _print_ensemble(results: Results, name: str, out: Console) -> None:
         out.print(styled(f"over {starts} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
 
 
-def _print_laws(results: Results, name: str, out: Console) -> None:
-    """The distances of each engine to the exact solutions under other impact laws; that of the scene is marked."""
-    for row in law_rows(results):
-        scene, engine, distance, *laws = row.items()
-        if scene[1] == name:
-            listed = ", ".join(f"{law} {value}" for law, value in laws if value != "–")
-            out.print(styled(f"by impact law, {distance[1]}, {engine[1]}: {listed}", style="dim"))
+def _print_laws(rows: Sequence[Mapping[str, str]], out: Console) -> None:
+    """The distances of each engine to the exact solutions under the impact laws; that of the scene is marked."""
+    for row in rows:
+        _, engine, distance, *laws = row.items()
+        listed = ", ".join(f"{law} {value}" for law, value in laws if value != "–")
+        out.print(styled(f"by impact law, {distance[1]}, {engine[1]}: {listed}", style="dim"))
 
 
 def _print_remarks(results: Results, name: str, out: Console) -> None:

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from dropspin.comparisons.regressions.comparing import compare as compare
     from dropspin.comparisons.regressions.history import history as history
     from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS as ENSEMBLE_METRICS
-    from dropspin.comparisons.results.measurement import Measurement as Measurement
     from dropspin.comparisons.results.results import Results as Results
     from dropspin.comparisons.results.store import load_results as load_results
+    from dropspin.comparisons.results.table import Measurement as Measurement
     from dropspin.comparisons.robustness.study import RobustnessStudy as RobustnessStudy
     from dropspin.comparisons.robustness.study import find_limits as find_limits
     from dropspin.comparisons.running.processes import ResourceLimits as ResourceLimits
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     from dropspin.comparisons.running.run import DEFAULT_DTS as DEFAULT_DTS
     from dropspin.comparisons.running.run import measure as measure
     from dropspin.comparisons.running.run import run as run
-    from dropspin.comparisons.sweeps.running import read_sweep as read_sweep
-    from dropspin.comparisons.sweeps.running import read_sweep_parts as read_sweep_parts
+    from dropspin.comparisons.sweeps.folder import read_sweep as read_sweep
+    from dropspin.comparisons.sweeps.folder import read_sweep_parts as read_sweep_parts
     from dropspin.comparisons.sweeps.running import run_sweep as run_sweep
     from dropspin.comparisons.sweeps.spec import load_sweep as load_sweep
     from dropspin.comparisons.symmetries.study import symmetries as symmetries
@@ -99,14 +99,15 @@ _HOMES = {
     "dropspin.comparisons.regressions.comparing": ("compare",),
     "dropspin.comparisons.regressions.history": ("history",),
     "dropspin.comparisons.results.ensembles": ("ENSEMBLE_METRICS",),
-    "dropspin.comparisons.results.measurement": ("Measurement",),
+    "dropspin.comparisons.results.table": ("Measurement",),
     "dropspin.comparisons.results.results": ("Results",),
     "dropspin.comparisons.results.store": ("load_results",),
     "dropspin.comparisons.robustness.study": ("RobustnessStudy", "find_limits"),
     "dropspin.comparisons.running.processes": ("ResourceLimits",),
     "dropspin.comparisons.running.recording": ("simulate",),
     "dropspin.comparisons.running.run": ("DEFAULT_DTS", "measure", "run"),
-    "dropspin.comparisons.sweeps.running": ("read_sweep", "read_sweep_parts", "run_sweep"),
+    "dropspin.comparisons.sweeps.folder": ("read_sweep", "read_sweep_parts"),
+    "dropspin.comparisons.sweeps.running": ("run_sweep",),
     "dropspin.comparisons.sweeps.spec": ("load_sweep",),
     "dropspin.comparisons.symmetries.study": ("symmetries",),
     "dropspin.comparisons.symmetries.twins": ("twins",),

@@ -2,15 +2,14 @@
 
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Collection, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
-from dropspin.comparisons.results.output import OLD, unfinished_folder
+from dropspin.comparisons.results.folder import read_stored, replaced_folder
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.run_file import ARRAY_FILE, FILE, parsed
 from dropspin.comparisons.results.store import load_results, save
-from dropspin.comparisons.results.stored_files import read_stored
 from dropspin.reports.html.report import html_report
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.markdown import run_markdown
@@ -19,7 +18,6 @@ from dropspin.reports.plots.figures import CHARTS, report_charts
 from dropspin.reports.plots.svg import save_png, save_svg
 from dropspin.reports.sections import Section
 from dropspin.reports.views.run import overview
-from dropspin.scenarios import DropspinError
 
 OURS = frozenset(
     {"run.json", "results.parquet", "results.csv", "report.html", "report.md", "replay.html", "junit.xml", "plots"}
@@ -72,41 +70,6 @@ def run_folder(folder: str | Path) -> AbstractContextManager[Path]:
     return replaced_folder(folder, _files_of_run, "run")
 
 
-@contextmanager
-def replaced_folder(folder: str | Path, ours: Callable[[Path], set[str]], command: str) -> Iterator[Path]:
-    """An empty temporary folder, which replaces the requested folder if the block succeeds, and is deleted otherwise.
-
-    Args:
-        folder: The requested folder.
-        ours: The paths, within a folder, that the command wrote there.
-        command: The command.
-
-    Raises:
-        DropspinError: The requested folder holds files that are not of the command, or cannot be written; raised on entering the block.
-    """
-    target = Path(os.path.realpath(folder))
-    made = []
-    try:
-        _assert_replaceable(folder, target, ours, command)
-        made = [parent for parent in target.parents if not parent.exists()]
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with unfinished_folder(target.parent, target.name) as unfinished:
-            new = unfinished / "new"
-            new.mkdir()
-            if target.exists():
-                new.chmod(target.stat().st_mode)
-            yield new
-            _assert_replaceable(folder, target, ours, command)
-            _swap(new, target, unfinished / OLD)
-    except OSError as error:
-        unchanged = "the folder is unchanged" if target.is_dir() else "choose another folder"
-        raise DropspinError(f"{folder}: cannot be written: {error.strerror or error}; {unchanged}.") from error
-    finally:
-        for parent in made:
-            with suppress(OSError):  # it holds the output, or other files
-                parent.rmdir()
-
-
 PARTS = "[0-9]*"
 
 
@@ -123,12 +86,8 @@ class MeasuredScenes:
     def keep(self, part: Results) -> None:
         """Write the results of a scene, completely or not at all."""
         [scene] = part.scenes
-        self._path.mkdir(exist_ok=True)
-        with unfinished_folder(self._path) as folder:
-            new = folder / "new"
-            new.mkdir()
-            save(part, new)
-            new.rename(self._path / f"{len(self):03d}-{part.scenes[scene].digest}")
+        with run_folder(self._path / f"{len(self):03d}-{part.scenes[scene].digest}") as folder:
+            save(part, folder)
 
     def __len__(self) -> int:
         return len(list(self._path.glob(PARTS)))
@@ -140,35 +99,6 @@ class MeasuredScenes:
     def clear(self) -> None:
         """Remove the stored results."""
         shutil.rmtree(self._path, ignore_errors=True)
-
-
-def _swap(new: Path, target: Path, old: Path) -> None:
-    """Replace an old folder by the new one; if this fails, restore the old one."""
-    try:
-        if target.exists():
-            target.rename(old)
-        new.rename(target)
-    except BaseException:
-        if old.exists() and not target.exists():
-            old.rename(target)
-        raise
-
-
-def _assert_replaceable(given: str | Path, target: Path, ours: Callable[[Path], set[str]], command: str) -> None:
-    """Raise `DropspinError` if writing an output there would delete files that are not of the command."""
-    if not target.exists():
-        return
-    if not target.is_dir():
-        raise DropspinError(f"{given}: this is a file; choose a folder.")
-    if target == Path.cwd() or target in Path.cwd().parents or os.path.ismount(target):
-        raise DropspinError(f"{given}: the working directory and mount points cannot be replaced; choose a folder inside it.")
-    known = ours(target)
-    strangers = sorted(str(path.relative_to(target)) for path in target.rglob("*") if str(path.relative_to(target)) not in known)
-    if strangers:
-        raise DropspinError(
-            f"{given}: has files that dropspin {command} did not write, such as {strangers[0]!r}; "
-            "move them, or choose an empty or new folder."
-        )
 
 
 def _files_of_run(folder: Path) -> set[str]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError
 
-from dropspin.comparisons.results.stored_files import file_name, read_stored
+from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
 from dropspin.reports.plots.chart import Chart, figure_of
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.stored_chart import StoredChart, StoredData
@@ -16,8 +16,6 @@ from dropspin.reports.plots.svg import save_svg
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import first_problem
-
-FILE = "section.json"
 
 Part = dict[str, Any]
 
@@ -62,7 +60,7 @@ class Section:
 
     def write(self, folder: Path, stem: str) -> None:
         """Write the Markdown page, its pictures, and `section.json`, from which a report reads the section."""
-        (folder / FILE).write_text(json.dumps({"title": self.title, "parts": self.parts}, indent=1), encoding="utf-8")
+        (folder / SECTION).write_text(json.dumps({"title": self.title, "parts": self.parts}, indent=1), encoding="utf-8")
         for name, charts in self.pictures.items():
             save_svg(figure_of(charts), folder / f"{file_name(name)}.svg")
         page = "\n\n".join([f"# {self.title}", *map(_markdown, self.parts)])
@@ -108,11 +106,11 @@ def read_section(folder: str) -> Section:
         DropspinError: The folder has no section, or its section is damaged.
     """
     try:
-        found = _File.model_validate_json(read_stored(Path(folder), FILE))
+        found = _File.model_validate_json(read_stored(Path(folder), SECTION))
     except (OSError, ValueError) as error:
         detail = first_problem(_File, error) if isinstance(error, ValidationError) else getattr(error, "strerror", None) or str(error)
         raise DropspinError(
-            f"{folder}: has no study, or a damaged one ({FILE}: {detail.removesuffix('.')}); "
+            f"{folder}: has no study, or a damaged one ({SECTION}: {detail.removesuffix('.')}); "
             "give a folder that dropspin tradeoff, limits, symmetries or reproduce wrote."
         ) from None
     return Section(**found.model_dump(by_alias=True, exclude_unset=True))

@@ -8,7 +8,7 @@ import numpy as np
 from dropspin.comparisons.published.results import Result
 from dropspin.comparisons.published.sources import Source
 from dropspin.comparisons.regressions.history import History
-from dropspin.comparisons.results.stored_files import file_name
+from dropspin.comparisons.results.folder import file_name
 from dropspin.comparisons.robustness.study import RobustnessStudy
 from dropspin.comparisons.symmetries.findings import Finding
 from dropspin.comparisons.tradeoff.points import TradeOff

@@ -16,7 +16,7 @@ from support.cli import DROPSPIN
 
 from dropspin.comparisons.regressions.baseline import load_baseline
 from dropspin.comparisons.results.store import load_results
-from dropspin.comparisons.sweeps.running import read_sweep
+from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.reports.sections import read_section
 from dropspin.scenarios import DropspinError
 

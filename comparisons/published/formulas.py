@@ -56,20 +56,25 @@ def nesc_brick(source: Source) -> list[Result]:
         quantity = f"{RATES[rate]}, {times[worst]:.0f} s [deg/s]"
         here = f"{rates[worst, rate]:.{DECIMALS}f}"
         error = float(printed[worst, rate] - rates[worst, rate])
-        results.append(Result(source.name, name, quantity, text, here, EXACT, "error of the source", difference=error))
+        results.append(_beside_exact(source, name, quantity, text, here, "error of the source", error))
     return results
+
+
+def _beside_exact(source: Source, tool: str, quantity: str, published: str, here: str, status: Status, difference: float) -> Result:
+    return Result(source.name, tool, quantity, published, here, EXACT, status, difference=difference)
 
 
 def _count(source: Source, tool: str, quantity: str, published: int, here: int) -> Result:
     """How many of some values have equal digits."""
-    status = compared(published == here)
-    return Result(source.name, tool, quantity, f"{published} equal", f"{here} equal", EXACT, status, difference=float(here - published))
+    return _beside_exact(
+        source, tool, quantity, f"{published} equal", f"{here} equal", compared(published == here), float(here - published)
+    )
 
 
 def _digits(source: Source, tool: str, quantity: str, published: float, here: float) -> Result:
     """A value of a formula beside that of the exact solution, to `DECIMALS`."""
     found = agreement(f"{published:.{DECIMALS}f}", here)
-    return Result(source.name, tool, quantity, f"{published:.{DECIMALS}f}", found.here, EXACT, compared(found.agrees), "", found.difference)
+    return _beside_exact(source, tool, quantity, f"{published:.{DECIMALS}f}", found.here, compared(found.agrees), found.difference)
 
 
 def kane_free_body(source: Source) -> list[Result]:
@@ -132,7 +137,7 @@ def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rat
     bound = f"≤ {source.parameters['simple']['bound_in_epsilon'] * EPSILON:.2g}"
     found = agreement(bound, error)
     quantity = f"quaternion, axis {' '.join(f'{component:g}' for component in axis)}"
-    return Result(source.name, "simple rotation", quantity, bound, f"{error:.2g}", EXACT, compared(found.agrees))
+    return _beside_exact(source, "simple rotation", quantity, bound, f"{error:.2g}", compared(found.agrees), math.nan)
 
 
 def housner_block(source: Source) -> list[Result]:
@@ -153,7 +158,7 @@ def housner_block(source: Source) -> list[Result]:
         status: Status = compared(found.agrees) if is_slender else "error of the source"
         difference = found.difference if is_slender else published - exact
         quantity = f"T [s], α = {alpha:g}, θ₀ = {share:g} α"
-        results.append(Result(source.name, "period", quantity, f"{published:.{digits}g}", found.here, EXACT, status, "", difference))
+        results.append(_beside_exact(source, "period", quantity, f"{published:.{digits}g}", found.here, status, difference))
     return results
 
 
@@ -197,17 +202,11 @@ def bouncing_ball(source: Source) -> list[Result]:
         exact = float(truth.states(np.array([float(time)]))[0, POSITION][1]) - scene.body.rounding
         error = float(text) - exact
         here = f"{exact:.{DECIMALS}f}"
-        results.append(Result(source.name, "FMU", f"height at {time} s [m]", text, here, EXACT, "error of the source", "", error))
+        results.append(_beside_exact(source, "FMU", f"height at {time} s [m]", text, here, "error of the source", error))
     text, exact = source.parameters["rests_from"], truth.events[-1].time
-    return [
-        *results,
-        Result(source.name, "FMU", "at rest from [s]", text, f"{exact:.6f}", EXACT, "error of the source", "", float(text) - exact),
-    ]
+    return [*results, _beside_exact(source, "FMU", "at rest from [s]", text, f"{exact:.6f}", "error of the source", float(text) - exact)]
 
 
 FORMULAS: Mapping[str, Callable[[Source], list[Result]]] = {
-    "nesc_brick": nesc_brick,
-    "kane_free_body": kane_free_body,
-    "housner_block": housner_block,
-    "bouncing_ball": bouncing_ball,
+    formula.__name__: formula for formula in (nesc_brick, kane_free_body, housner_block, bouncing_ball)
 }

@@ -1,6 +1,6 @@
 """The study of the command `dropspin reproduce`: run what a source describes, and compare the digits."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from dropspin.comparisons.engines.mujoco_versions import numbers_of
@@ -75,31 +75,19 @@ def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[st
     return divergence(recording.motion) or [quantity(name)(scene, recording.motion) for name in names]
 
 
-def _of_case(source: Source, group: Group, case: Case, measured: list[float] | Breakdown) -> list[Result]:
+def _of_case(source: Source, group: Group, case: Case, measured: list[float] | Breakdown) -> Iterator[Result]:
     """The results of one run."""
-    results = []
-    for number, (name, printed) in enumerate(zip(group.quantities, case.printed, strict=True)):
+    values: Sequence[float | Breakdown] = [measured] * len(case.printed) if isinstance(measured, Breakdown) else measured
+    for name, printed, value in zip(group.quantities, case.printed, values, strict=True):
         result = Result(source.name, group.tool, f"{case.case}: {name}" if case.case else name, printed, "", group.by, "not run")
-        if isinstance(measured, Breakdown):
-            results.append(_without_value(result, group, measured))
+        if isinstance(value, Breakdown):
+            if group.why_not or value.verdict == "declined":
+                yield replace(result, status="not reproducible", reason=group.why_not or value.reason)
+            else:
+                yield replace(result, reason=value.reason, verdict=value.verdict)
+        elif printed == ABSENT:
+            yield replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
         else:
-            results.append(_with_value(result, source, group, measured[number]))
-    return results
-
-
-def _without_value(result: Result, group: Group, broken: Breakdown) -> Result:
-    """A result whose engine gave no value."""
-    if group.why_not or broken.verdict == "declined":
-        return replace(result, status="not reproducible", reason=group.why_not or broken.reason)
-    return replace(result, reason=broken.reason, verdict=broken.verdict)
-
-
-def _with_value(result: Result, source: Source, group: Group, value: float) -> Result:
-    """A result whose engine gave a value."""
-    if result.published == ABSENT:
-        return replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
-    found = agreement(result.published, value, source.significant)
-    result = replace(result, here=found.here, difference=found.difference, status=compared(found.agrees))
-    if group.why_not and not found.agrees:
-        return replace(result, status="not reproducible", reason=group.why_not)
-    return result
+            found = agreement(printed, value, source.significant)
+            result = replace(result, here=found.here, difference=found.difference, status=compared(found.agrees))
+            yield replace(result, status="not reproducible", reason=group.why_not) if group.why_not and not found.agrees else result

@@ -17,6 +17,7 @@ from threading import Event
 from typing import Any
 
 from dropspin.comparisons.engines.npm_packages import is_npm
+from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.running.processes import Closed
 from dropspin.scenarios import DropspinError, UnknownName
@@ -29,9 +30,13 @@ HOME = Path(__file__).parents[3]
 class NotMeasured(Exception):
     """A release that has no results; the text says why."""
 
+    verdict: Verdict = "broken"
+
 
 class NotInstallable(NotMeasured):
     """A release that cannot be installed here, but may be another day."""
+
+    verdict = "missing"
 
 
 def releases(package: str, oldest: str) -> list[str]:

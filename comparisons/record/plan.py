@@ -8,7 +8,7 @@ from pydantic import Field
 
 from dropspin.comparisons.engines.mujoco_versions import numbers_of
 from dropspin.comparisons.engines.npm_packages import is_npm
-from dropspin.comparisons.results.stored_files import sha256
+from dropspin.comparisons.results.folder import sha256
 from dropspin.scenarios import load
 from dropspin.scenarios.body import Table
 from dropspin.scenarios.loading import read_toml

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib.metadata import packages_distributions
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +18,8 @@ from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.results.folder import sha256
 from dropspin.comparisons.results.provenance import STAMPED
-from dropspin.comparisons.results.stored_files import sha256
 from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
@@ -72,35 +72,27 @@ def _measured(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineP
     if isinstance(found, Breakdown):
         yield {"verdict": found.verdict, "reason": found.reason}
         return
-    motion = found.recording.motion
-    hashed = {"trajectory": sha256(motion.states.astype("<f8").tobytes())} | found.costs
+    (recording, band, timed), motion = found, found[0].motion
+    hashed = {"trajectory": sha256(motion.states.astype("<f8").tobytes())} | timed
     if (broken := divergence(motion)) is not None:
         yield hashed | {"verdict": broken.verdict, "reason": broken.reason}
         return
-    met = "; ".join(limitation.message for limitation in found.recording.limitations if not limitation.is_minor)
+    met = "; ".join(limitation.message for limitation in recording.limitations if not limitation.is_minor)
     for metric, value in measure(scene, motion).items():
-        band = found.band if metric == leading_metric(scene) else {}
-        yield hashed | band | {"metric": metric, "unit": METRICS[metric].unit, "value": value, "verdict": "measured", "reason": met}
+        of_metric = {"metric": metric, "unit": METRICS[metric].unit, "value": value, "verdict": "measured", "reason": met}
+        yield hashed | (band if metric == leading_metric(scene) else {}) | of_metric
 
 
-class Simulated(NamedTuple):
-    """A motion, the range of the leading error over start phases, and the cost of the steps; columns of the record."""
-
-    recording: Recording
-    band: Row
-    costs: Row
-
-
-def _simulated(entry: EngineEntry, scene: Scenario, dt: float) -> Simulated | Breakdown:
-    """Simulate a scene from its own start and from its start phases, and time its steps; runs in the engine's process."""
+def _simulated(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Recording, Row, Row] | Breakdown:
+    """A motion, the range of the leading error over start phases, and the cost of the steps; runs in the engine's process."""
     engine = entry.adapter
     recording = try_record(engine, scene, dt)
     if isinstance(recording, Breakdown):
         return recording
     if divergence(recording.motion) is not None:
-        return Simulated(recording, {}, {})
+        return recording, {}, {}
     try:
-        return Simulated(recording, range_over_phases(engine, scene, dt), costs(engine, scene, dt))
+        return recording, range_over_phases(engine, scene, dt), costs(engine, scene, dt)
     except Exception as error:  # whatever an engine raises costs its own row only
         return classify(error)
 

@@ -3,14 +3,16 @@
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Event
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
+from dropspin.comparisons.engines.registry import parsed
 from dropspin.comparisons.record.environments import NotMeasured, measured
 from dropspin.comparisons.record.findings import Case, Release, read, release_of
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import BLANK, MACHINE, machine
 from dropspin.scenarios import DropspinError, UnknownName
 
+Kind = TypeVar("Kind")
 NONE = Case("not measured", "", "", {})
 
 
@@ -45,7 +47,7 @@ def rerun(folder: str | Path, plan: Plan, label: str, release: str, scene: str, 
     Raises:
         DropspinError: The record has no such cell, or the release cannot be installed or run.
     """
-    engine = label.partition("[")[0]
+    engine, _ = parsed(label)
     recorded = _recorded(folder, engine, label, release, scene)
     try:
         found = measured(plan.only(engine, label, scene), engine, release, time_limit, Event())
@@ -65,22 +67,19 @@ def _recorded(folder: str | Path, engine: str, label: str, release: str, scene: 
     Raises:
         DropspinError: The record has no such cell.
     """
-    engines = read(folder)
-    if engine not in engines:
-        raise UnknownName("engine of the record", engine, engines)
-    releases = {one.name: one for one in engines[engine]}
-    if release not in releases:
-        raise UnknownName(f"release of {engine} in the record", release, releases)
-    cases = releases[release].cases
-    if not cases:
-        raise DropspinError(f"{engine} {release} has no results in the record: {releases[release].reason}.")
-    for what, given, known in (
-        ("engine with options in the record", label, {of for of, _, _ in cases}),
-        (f"scene of {label} in the record", scene, {name for of, name, _ in cases if of == label}),
-    ):
-        if given not in known:
-            raise UnknownName(what, given, sorted(known))
-    return releases[release]
+    releases = {one.name: one for one in _known("engine of the record", engine, read(folder))}
+    found = _known(f"release of {engine} in the record", release, releases)
+    if not found.cases:
+        raise DropspinError(f"{engine} {release} has no results in the record: {found.reason}.")
+    _known("engine with options in the record", label, {of: found for of, _, _ in found.cases})
+    _known(f"scene of {label} in the record", scene, {name: found for of, name, _ in found.cases if of == label})
+    return found
+
+
+def _known(what: str, name: str, known: Mapping[str, Kind]) -> Kind:
+    if name not in known:
+        raise UnknownName(what, name, known)
+    return known[name]
 
 
 def _surroundings(release: Release) -> dict[str, str]:

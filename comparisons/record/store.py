@@ -19,12 +19,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dropspin.comparisons.engines.base import calibrated_label
-from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.engines.registry import parsed
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.environments import without_paths
-from dropspin.comparisons.results.output import written_whole
+from dropspin.comparisons.results.folder import read_stored, sha256, written_whole
 from dropspin.comparisons.results.provenance import processor
-from dropspin.comparisons.results.stored_files import read_stored, sha256
+from dropspin.comparisons.results.table import schema_of, stored_table
 from dropspin.scenarios import DropspinError
 
 Row = Mapping[str, Any]
@@ -37,8 +37,10 @@ TEXTS = (
     *("adapter", "plan", "versions", "processor", "system", "python", "measured"),
 )
 NUMBERS = ("dt", "value", "low", "high", "cost", "median_cost", "relative_cost")
-SCHEMA = pa.schema([*((name, pa.string()) for name in TEXTS), *((name, pa.float64()) for name in NUMBERS)])
+SCHEMA = schema_of(TEXTS, NUMBERS)
 BLANK: Row = dict.fromkeys(TEXTS, "") | dict.fromkeys(NUMBERS, math.nan)
+KEY = ("label", "scene", "dt", "metric")
+"""The columns in which the rows of a file differ."""
 CONSTANT = ("engine", "release", "plan", "versions", "processor", "system", "python", "measured")
 MACHINE = ("processor", "system", "python")
 SAME = ("plan", "adapter", *MACHINE)
@@ -68,11 +70,8 @@ class Stored:
             DropspinError: It is not.
         """
         try:
-            found = pq.ParquetFile(io.BytesIO(self.content)).read(use_threads=False).replace_schema_metadata(None)
-            if found.schema != SCHEMA:
-                raise ValueError("has other columns or types than the record")
-            rows: list[dict[str, Any]] = found.to_pylist()
-            _verify(rows, {"engine": self.engine, "release": self.release})
+            rows = stored_table(self.content, SCHEMA).to_pylist()
+            _verify(rows, self.engine, self.release)
         except Exception as error:  # whatever pyarrow raises for a file that is none
             raise DropspinError(f"{self.path.name}: refused: {' '.join(str(error).split())}.") from None
         return rows
@@ -183,23 +182,22 @@ def _files(place: Path) -> list[Path]:
     return found
 
 
-def _verify(rows: Sequence[Row], named: Mapping[str, str]) -> None:
-    """Raise `ValueError` if a file has rows that no record has."""
-    keys = [tuple(row[name] for name in ("label", "scene", "dt", "metric")) for row in rows]
+def _verify(rows: Sequence[Row], engine: str, release: str) -> None:
+    """Raise an error if a file has rows that no record has."""
+    keys, units = ({tuple(row[name] for name in names) for row in rows} for names in (KEY, ("metric", "unit")))
     texts = {row[name] for row in rows for name in TEXTS}  # of thousands of rows, a few hundred
     problems = {
         "no rows": not rows,
-        "gaps": any(row[name] is None for row in rows for name in SCHEMA.names),
-        "another engine or release than its name": any(row[name] != given for row in rows for name, given in named.items()),
-        "rows of several machines, dates or plans": any(len({row[name] for row in rows}) > 1 for name in CONSTANT),
-        "two rows of one result": len(set(keys)) < len(keys),
-        "a verdict that dropspin does not have": not {row["verdict"] for row in rows} <= set(VERDICTS),
-        "a metric that dropspin does not have": not {row["metric"] for row in rows} <= {"", *METRICS},
-        "another unit than its metric": any(row["unit"] != METRICS[row["metric"]].unit for row in rows if row["metric"] in METRICS),
-        "a time step that is not above 0": any(not (row["dt"] > 0.0) and row["scene"] for row in rows),
-        "a label of another engine": any(row["label"].partition("[")[0] not in {"", row["engine"]} for row in rows),
+        "gaps": any(row[name] is None for row in rows for name in NUMBERS),
+        "another engine or release than its name": {(row["engine"], row["release"]) for row in rows} != {(engine, release)},
+        "rows of several machines, dates or plans": len({tuple(row[name] for name in CONSTANT) for row in rows}) > 1,
+        "two rows of one result": len(keys) < len(rows),
+        "a metric that dropspin does not have": not {metric for metric, _ in units} <= {"", *METRICS},
+        "another unit than its metric": any(unit != METRICS[metric].unit for metric, unit in units if metric in METRICS),
+        "a time step that is not above 0": any(row["scene"] and not row["dt"] > 0.0 for row in rows),
+        "a label of another engine": any(parsed(label)[0] != engine for label in {row["label"] for row in rows} - {""}),
         "a trajectory that is no SHA-256": not all(SHA256.fullmatch(row["trajectory"]) for row in rows),
-        "text with control characters, or a path": any(not text.isprintable() or without_paths(text) != text for text in texts),
+        "a path": any(without_paths(text) != text for text in texts),
     }
     if found := [problem for problem, is_one in problems.items() if is_one]:
         raise ValueError(f"it has {found[0]}")

@@ -1,30 +1,22 @@
 """Record releases: those that the record does not have yet, several at a time."""
 
 from collections.abc import Callable, Collection, Iterator
-from concurrent.futures import CancelledError, Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Event
-from typing import Any, NamedTuple
+from typing import Any
 
 from dropspin.comparisons.engines.adapter_code import built_in_code
 from dropspin.comparisons.engines.registry import BUILT_IN
-from dropspin.comparisons.record.environments import POLL, NotInstallable, NotMeasured, measured, releases
+from dropspin.comparisons.record.environments import NotMeasured, measured, releases
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import Record, machine
-from dropspin.comparisons.results.interrupts import finished
 from dropspin.comparisons.running.cluster import connected
-from dropspin.scenarios import DropspinError, UnknownName
-
-
-class Release(NamedTuple):
-    """A release of an engine, and what became of it: the number of its results, or why there are none."""
-
-    engine: str
-    release: str
-    results: int = 0
-    reason: str = ""
+from dropspin.comparisons.running.parallel import as_done
+from dropspin.scenarios import UnknownName
 
 
 def record(
@@ -36,7 +28,7 @@ def record(
     jobs: int,
     scheduler: str | None = None,
     time_limit: float,
-    on_done: Callable[[Release, int], None],
+    on_done: Callable[[str, int], None],
 ) -> None:
     """Measure releases that the record does not have, and write each into it when it is measured.
 
@@ -48,7 +40,7 @@ def record(
         jobs: How many to measure at a time on this machine.
         scheduler: The address of a Dask scheduler, on whose workers to measure instead.
         time_limit: Processor time that an engine may use for one simulation [s].
-        on_done: Called after each release with what became of it, and with the number that is left.
+        on_done: Called after each release with its name and what became of it, and with the number that is left.
 
     Raises:
         DropspinError: There is no such engine or release, an index cannot be asked, the record cannot be written, or the scheduler does
@@ -70,25 +62,18 @@ def record(
             for release in names
             if (not chosen or release in chosen) and not any(record.has(engine, release, common[engine] | one) for one in machines)
         ]
-        stopping = None if scheduler else Event()
-        running = {workers.submit(_measured, plan, *one, time_limit, stopping): one for one in pending}
+        stopping, left = None if scheduler else Event(), len(pending)
         try:
-            while running:
-                for future in finished(running, POLL):
-                    engine, release = running.pop(future)
-                    found = future.result()
-                    record.write(engine, release, found.rows, common[engine] | found.machine | {"versions": found.versions})
-                    results = sum(bool(row.get("metric")) for row in found.rows)
-                    on_done(Release(engine, release, results, "" if results else found.rows[0]["reason"]), len(running))
-        except CancelledError:
-            raise DropspinError(
-                f"--scheduler {scheduler}: the connection was lost; finished releases are kept, and the same command continues."
-            ) from None
+            for done in as_done(workers, partial(_measured, plan, time_limit, stopping), iter(pending), lambda: len(pending)):
+                if done is not None:
+                    (engine, release), (rows, measured_on) = done
+                    record.write(engine, release, rows, common[engine] | measured_on)
+                    left -= 1
+                    results = sum(bool(row.get("metric")) for row in rows)
+                    on_done(f"{engine} {release}: {f'{results} results' if results else rows[0]['reason']}", left)
         finally:
             if stopping is not None:
                 stopping.set()
-            for future in running:
-                future.cancel()
 
 
 @contextmanager
@@ -102,20 +87,13 @@ def _workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, list[
         yield client.get_executor(pure=False), list(client.run(machine).values())
 
 
-class _Measured(NamedTuple):
-    rows: list[dict[str, Any]]
-    versions: str
-    machine: dict[str, str]
-
-
-def _measured(plan: Plan, engine: str, release: str, time_limit: float, stopping: Event | None) -> _Measured:
-    """Measure a release, on a worker; a release that has no results has one row, with the reason."""
+def _measured(plan: Plan, time_limit: float, stopping: Event | None, asked: tuple[str, str]) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Measure a release, on a worker: its rows, or one with the reason why it has no results; the machine, and the versions of packages."""
     try:
-        found = measured(plan, engine, release, time_limit, stopping or Event())
+        found = measured(plan, *asked, time_limit, stopping or Event())
     except NotMeasured as failure:
-        verdict = "missing" if isinstance(failure, NotInstallable) else "broken"
-        return _Measured([{"verdict": verdict, "reason": str(failure)}], "", machine())
-    return _Measured(found["rows"], found["versions"], machine())
+        return [{"verdict": failure.verdict, "reason": str(failure)}], machine()
+    return found["rows"], machine() | {"versions": found["versions"]}
 
 
 def _code(engine: str) -> str:

@@ -22,10 +22,10 @@ from dropspin.comparisons.regressions.motions import Digests, digests_of, flat
 from dropspin.comparisons.regressions.result_names import assert_steps, metric_and_kind, name_of
 from dropspin.comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results, verify_comparable
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
-from dropspin.comparisons.results.output import written_whole
+from dropspin.comparisons.results.folder import written_whole
 from dropspin.comparisons.results.provenance import digest, versions_behind
 from dropspin.comparisons.results.results import Results
-from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
+from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.body import Table
 from dropspin.scenarios.loading import read_toml

@@ -23,8 +23,8 @@ from dropspin.comparisons.regressions.values import (
     step_names,
     verify_comparable,
 )
-from dropspin.comparisons.results.measurement import Measurement, as_table
 from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.scenarios import DropspinError
 
 VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed", "gone": "failed"}

@@ -9,7 +9,7 @@ import pandas as pd
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING, STUDIES
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.results.results import Results
-from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
+from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
 
 KEY = ["scene", "engine", "steps", "metric", "kind"]

@@ -7,6 +7,7 @@ import platform
 import subprocess
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
+from email import message_from_string
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import version
+from dropspin.comparisons.engines.registry import parsed
 from dropspin.scenarios import Trajectory
 from dropspin.scenarios.text import printable
 
@@ -50,7 +52,7 @@ def versions() -> dict[str, str | None]:
 
 def versions_behind(stamp: Mapping[str, Any]) -> dict[str, str]:
     """The versions that a run's results depend on: of the packages that measured them, and of the engines as they report it."""
-    engines = {label.split("[")[0]: settings.get("version") for label, settings in first_settings(stamp).items()}
+    engines = {parsed(label)[0]: settings.get("version") for label, settings in first_settings(stamp).items()}
     engines.pop("wang", None)  # part of dropspin
     packages = {package: stamp["versions"][package] for package in MEASURING}
     return {name: printable(str(found)) for name, found in (packages | engines | {"python": stamp["python"]}).items() if found}
@@ -84,8 +86,7 @@ def _wheel(package: str) -> str | None:
         wheel = distribution(package).read_text("WHEEL") or ""
     except PackageNotFoundError:
         return None
-    tags = [line.removeprefix("Tag: ") for line in wheel.splitlines() if line.startswith("Tag: ")]
-    return ", ".join(tags) or None
+    return ", ".join(message_from_string(wheel).get_all("Tag", [])) or None
 
 
 def code(*places: Path) -> str:

@@ -14,8 +14,8 @@ from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, S
 from dropspin.comparisons.measuring.metrics import leading_metric
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import EnsembleOutcome
-from dropspin.comparisons.results.measurement import empty_table
 from dropspin.comparisons.results.provenance import digest
+from dropspin.comparisons.results.table import empty_table
 from dropspin.scenarios import Scenario, Trajectory, UnknownName, truth_for
 
 TrajectoryKey = tuple[str, str, float]

@@ -10,13 +10,13 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import from_json
 
+from dropspin.comparisons.results.folder import sha256
 from dropspin.comparisons.results.provenance import MEASURING
-from dropspin.comparisons.results.stored_files import sha256
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated
 
 FORMAT = 6
-"""Of the folder; 1 had no tolerances, 2 no time limit, 3 tolerances in a file of their own, 4 no checksums; 5 is read by `earlier`."""
+"""Of the folder; folders of earlier formats are refused."""
 FILE, TABLE = "run.json", "results.parquet"
 ARRAY_FILE = re.compile(r"(trajectories|ensembles)/[A-Za-z0-9][A-Za-z0-9.=_-]*\.npz")
 

@@ -3,6 +3,8 @@
 A folder may be damaged, or somebody else's: all of it is verified on loading, and nothing in it is executed.
 """
 
+import io
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from functools import partial
@@ -11,34 +13,32 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from dropspin.comparisons.results import earlier
-from dropspin.comparisons.results.arrays import loaded_arrays, stored_arrays
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, SAMPLES, EnsembleOutcome
+from dropspin.comparisons.results.folder import file_name, read_stored, sha256
 from dropspin.comparisons.results.results import Results, TrajectoryKey
 from dropspin.comparisons.results.run_file import FILE, FORMAT, TABLE, Case, RunFile, parsed, signed, verified, verify_checksum
-from dropspin.comparisons.results.stored_files import file_name, read_stored, sha256
-from dropspin.comparisons.results.stored_table import loaded_table
+from dropspin.comparisons.results.table import results_table
 from dropspin.scenarios import DropspinError, Scenario, SceneError, Trajectory
 from dropspin.scenarios.loading import from_mapping
 from dropspin.scenarios.rotations import length
 
-TRAJECTORY = tuple(field.name for field in fields(Trajectory))
-OUTCOME = tuple(field.name for field in fields(EnsembleOutcome))
 FEWEST_ROWS = 2
 """Of a trajectory: metrics take the time step from them."""
 SAME_TIME = 1e-6
 """Largest relative difference of a stored time from its multiple of the time step."""
 SAME_LENGTH = 1e-4
 """Largest difference of a stored quaternion's length from 1."""
+LARGEST_HEADER = 1000  # bytes, of an array in a file
 Kept = TypeVar("Kept")
 
 
 def save(results: Results, folder: Path) -> None:
     """Write a run's data into a folder that exists."""
     checksums: dict[str, str] = {}
-    trajectories = _save_arrays(folder, "trajectories", results.trajectories, TRAJECTORY, checksums)
-    ensembles = _save_arrays(folder, "ensembles", results.ensembles, OUTCOME, checksums)
+    trajectories = _save_arrays(folder, "trajectories", results.trajectories, checksums)
+    ensembles = _save_arrays(folder, "ensembles", results.ensembles, checksums)
     pd.concat([results.table, results.predictions, results.agreements]).to_parquet(folder / TABLE, index=False)
     checksums[TABLE] = sha256((folder / TABLE).read_bytes())
     content = {
@@ -70,12 +70,8 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
     """
     try:
         content = parsed(read_stored(Path(folder), FILE))
-        if isinstance(content, dict) and content.get("format") in (FORMAT, earlier.FORMAT):
-            file = verified(content)
-            if file.format == earlier.FORMAT:
-                content = earlier.with_current_labels(content)
-                file = RunFile.model_validate(content)
-            return _loaded(Path(folder), file, content, arrays)
+        if isinstance(content, dict) and content.get("format") == FORMAT:
+            return _loaded(Path(folder), verified(content), content["provenance"], arrays)
     except (OSError, ValueError, DropspinError) as error:
         detail = " ".join((f"{error.filename}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)).split())
         raise DropspinError(
@@ -84,16 +80,16 @@ def load_results(folder: str | Path, *, arrays: bool = True) -> Results:
     raise DropspinError(f"{folder}: has a format of {_writer(content)}, which this version cannot read; run it again.")
 
 
-def _loaded(folder: Path, file: RunFile, content: Mapping[str, Any], arrays: bool) -> Results:
+def _loaded(folder: Path, file: RunFile, provenance: Mapping[str, Any], arrays: bool) -> Results:
     scenes = {name: _scene(file, name) for name in file.scenes}
-    known = scenes, file.engines, file.provenance.asked.dts
-    rows = _from_file(folder, TABLE, file, lambda content: loaded_table(content, *known, is_earlier=file.format == earlier.FORMAT))
+    read_table = partial(results_table, scenes=scenes, engines=file.engines, dts=file.provenance.asked.dts)
+    rows = _from_file(folder, TABLE, file, read_table)
+    read_outcome = partial(_outcome, most=QUICK_MEMBERS if file.provenance.asked.quick else None)
     trajectories = dict(_arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory))
-    of_ensemble = partial(_outcome, most=QUICK_MEMBERS if file.provenance.asked.quick else None)
-    ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, of_ensemble))
+    ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, read_outcome))
     is_prediction, is_agreement = (rows["kind"] == kind for kind in ("prediction", "agreement"))
     table, *others = (rows[kept].reset_index(drop=True) for kept in (~(is_prediction | is_agreement), is_prediction, is_agreement))
-    return Results(table, scenes, tuple(file.engines), trajectories, ensembles, content["provenance"], *others)
+    return Results(table, scenes, tuple(file.engines), trajectories, ensembles, provenance, *others)
 
 
 def _scene(file: RunFile, name: str) -> Scenario:
@@ -106,10 +102,18 @@ def _scene(file: RunFile, name: str) -> Scenario:
     return scene
 
 
+def _arrays(
+    folder: Path, file: RunFile, files: Mapping[str, Case], scenes: Mapping[str, Scenario], read: Callable[..., Kept]
+) -> Iterator[tuple[TrajectoryKey, Kept]]:
+    for path, case in files.items():
+        found = _from_file(folder, path, file, partial(read, scene=scenes[case.scene], dt=case.dt))
+        yield (case.scene, case.engine, case.dt), found
+
+
 def _trajectory(content: bytes, scene: Scenario, dt: float) -> Trajectory:
     rows = scene.steps(dt) + 1
     vectors = dict.fromkeys(("position", "velocity", "angular_velocity"), (rows, 3))
-    found = loaded_arrays(content, {"t": (rows,), **vectors, "orientation": (rows, 4), "velocity_lag": ()})
+    found = _loaded_arrays(content, {"t": (rows,), **vectors, "orientation": (rows, 4), "velocity_lag": ()})
     velocity_lag = float(found.pop("velocity_lag"))
     if rows < FEWEST_ROWS or not np.allclose(found["t"], dt * np.arange(rows), rtol=SAME_TIME, atol=0.0) or not np.isfinite(velocity_lag):
         raise ValueError("its times are not those of its time steps")
@@ -124,15 +128,7 @@ def _outcome(content: bytes, scene: Scenario, dt: float, most: int | None) -> En
         raise ValueError("its scene has no ensemble")
     size = min(scene.ensemble.size, most or scene.ensemble.size)
     shapes = {"t": (SAMPLES,), "energy": (size, SAMPLES), "rebound": (size,), "rest_time": (size,), "angular_momentum": (size, SAMPLES)}
-    return EnsembleOutcome(**loaded_arrays(content, shapes))
-
-
-def _arrays(
-    folder: Path, file: RunFile, files: Mapping[str, Case], scenes: Mapping[str, Scenario], read: Callable[[bytes, Scenario, float], Kept]
-) -> Iterator[tuple[TrajectoryKey, Kept]]:
-    for path, case in files.items():
-        found = _from_file(folder, path, file, lambda content, case=case: read(content, scenes[case.scene], case.dt))  # type: ignore[misc]
-        yield (case.scene, case.engine, case.dt), found
+    return EnsembleOutcome(**_loaded_arrays(content, shapes))
 
 
 def _from_file(folder: Path, path: str, file: RunFile, read: Callable[[bytes], Kept]) -> Kept:
@@ -157,16 +153,36 @@ def _writer(content: Any) -> str:
         return "another version of dropspin"
 
 
-def _save_arrays(
-    folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], names: tuple[str, ...], checksums: dict[str, str]
-) -> dict[str, dict[str, Any]]:
+def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], checksums: dict[str, str]) -> dict[str, dict[str, Any]]:
     """Write one file per item and add its checksum; the result maps each path to its scene, engine and time step."""
     (folder / kind).mkdir()
     files = {}
     for number, ((scene, engine, dt), item) in enumerate(items.items()):
         path = f"{kind}/{number:03d}-{file_name(scene)}-{file_name(engine)}-{dt:g}.npz"
-        content = stored_arrays({name: getattr(item, name) for name in names})
-        (folder / path).write_bytes(content)
-        checksums[path] = sha256(content)
+        content = io.BytesIO()
+        arrays = {field.name: np.asarray(getattr(item, field.name), dtype=np.float64) for field in fields(item)}
+        np.savez_compressed(content, allow_pickle=False, **arrays)
+        (folder / path).write_bytes(content.getvalue())
+        checksums[path] = sha256(content.getvalue())
         files[path] = {"scene": scene, "engine": engine, "dt": dt}
     return files
+
+
+def _loaded_arrays(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, NDArray[np.float64]]:
+    """The arrays in a .npz file, by name.
+
+    Raises:
+        ValueError: It has other arrays, types or shapes, or is damaged.
+    """
+    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+        sizes = {member.filename: member.file_size for member in archive.zip.infolist()}
+        if sorted(archive.zip.namelist()) != sorted(f"{name}.npy" for name in shapes):
+            raise ValueError(f"has other arrays than {', '.join(shapes)}")
+        for name, shape in shapes.items():  # before they are read, which takes as much memory as their sizes
+            if sizes[f"{name}.npy"] > 8 * math.prod(shape) + LARGEST_HEADER:
+                raise ValueError(f"{name}: has more numbers than its shape {shape}")
+        found = {name: archive[name] for name in shapes}
+    for name, array in found.items():
+        if array.dtype != np.dtype("<f8") or array.shape != shapes[name]:
+            raise ValueError(f"{name}: has type {array.dtype} and shape {array.shape}; must have float64 and {shapes[name]}")
+    return found

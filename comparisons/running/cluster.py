@@ -3,6 +3,7 @@
 import re
 import time
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
@@ -21,7 +22,7 @@ def connected(scheduler: str) -> Iterator[Any]:
 
     Raises:
         EngineMissing: Dask is not installed.
-        DropspinError: The address is not valid, or the scheduler does not answer.
+        DropspinError: The address is not valid, or the scheduler does not answer, is lost or loses its workers during the work.
     """
     if not re.fullmatch(r"[a-z]+://[^\s:]+:\d+", scheduler):
         raise DropspinError(
@@ -29,7 +30,7 @@ def connected(scheduler: str) -> Iterator[Any]:
         )
     if find_spec("distributed") is None:
         raise EngineMissing("--scheduler needs Dask, which is not installed: pip install 'dropspin[cluster]'.")
-    from distributed import Client, Security
+    from distributed import Client, KilledWorker, Security
     from distributed.comm.core import connect
     from distributed.utils import LoopRunner
 
@@ -52,4 +53,12 @@ def connected(scheduler: str) -> Iterator[Any]:
                 reason = f"no worker has connected for {WORKER_TIMEOUT:g} s; start one with: dask worker {scheduler}"
                 raise DropspinError(f"--scheduler {scheduler}: {reason}.")
             time.sleep(POLL)
-        yield client
+        try:
+            yield client
+        except CancelledError:
+            raise DropspinError(
+                f"--scheduler {scheduler}: the connection was lost; what is finished is kept, and the same command continues"
+                ", that of a sweep with --resume."
+            ) from None
+        except KilledWorker as error:
+            raise DropspinError(f"--scheduler {scheduler}: workers were lost again and again at the same work ({error}).") from None

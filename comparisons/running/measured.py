@@ -15,7 +15,7 @@ from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.motions import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
-from dropspin.comparisons.results.measurement import Case, Measurement
+from dropspin.comparisons.results.table import Case, Measurement
 from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.comparisons.running.recording import Breakdown, divergence
 from dropspin.comparisons.running.start_phases import StartPhase, exact_motions, start_phases

@@ -1,7 +1,7 @@
 """Pieces of work on all processors: one at a time on each, with engine processes of its own."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from threading import Event, Lock
 from typing import TypeVar
@@ -30,6 +30,34 @@ def as_jobs(jobs: int | None) -> int:
     return jobs
 
 
+def as_done(
+    workers: Executor, work: Callable[[Piece], Result], pieces: Iterator[Piece], at_a_time: Callable[[], int]
+) -> Iterator[tuple[Piece, Result] | None]:
+    """Do pieces of work, several at a time, and yield each with its result when it is done; at least twice a second, yield None.
+
+    Args:
+        workers: What runs them.
+        work: The work.
+        pieces: The pieces; the next one is requested when it can be submitted.
+        at_a_time: How many may be submitted and not done.
+    """
+    running: dict[Future[Result], Piece] = {}
+    try:
+        while True:
+            while len(running) < at_a_time() and (piece := next(pieces, None)) is not None:
+                with interrupts_deferred():
+                    running[workers.submit(work, piece)] = piece
+            if not running:
+                return
+            done = finished(running, POLL_INTERVAL)
+            yield None
+            for future in done:
+                yield running.pop(future), future.result()
+    finally:
+        for future in running:
+            future.cancel()
+
+
 def work_in_parallel(
     pieces: Iterator[Piece],
     work: Callable[[Piece, EngineProcesses, Callable[[], None]], Result],
@@ -47,29 +75,25 @@ def work_in_parallel(
         on_done: Called with each piece and its result, in the order in which they are done; may raise to stop.
         on_wait: Called at least twice a second; may raise to stop.
     """
-    stopping = Event()
+    stopping, idle = Event(), list(crews)
 
     def raise_if_stopping() -> None:
         if stopping.is_set():
             raise Closed
 
-    idle = list(crews)
-    running: dict[Future[Result], tuple[Piece, EngineProcesses]] = {}
+    def work_with_processes(piece: Piece) -> Result:
+        processes = idle.pop()
+        found = work(piece, processes, raise_if_stopping)
+        idle.append(processes)
+        return found
+
     with ThreadPoolExecutor(len(crews)) as threads:
         try:
-            while True:
-                while idle and (piece := next(pieces, None)) is not None:
-                    processes = idle.pop()
-                    with interrupts_deferred():
-                        running[threads.submit(work, piece, processes, raise_if_stopping)] = piece, processes
-                if not running:
-                    return
-                done = finished(running, POLL_INTERVAL)
-                on_wait()
-                for future in done:
-                    piece, processes = running.pop(future)
-                    on_done(piece, future.result())
-                    idle.append(processes)
+            for done in as_done(threads, work_with_processes, pieces, lambda: len(crews)):
+                if done is None:
+                    on_wait()
+                else:
+                    on_done(*done)
         except BaseException:
             # The engine processes end first, then the threads that wait for them; such an end is no failure of an engine.
             stopping.set()

@@ -14,9 +14,9 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.measuring.motions import States
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
-from dropspin.comparisons.results.measurement import Case, Measurement, as_table
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.results import Results, TrajectoryKey
+from dropspin.comparisons.results.table import Case, Measurement, as_table
 from dropspin.comparisons.running.engine_run import EngineRun, Timing
 from dropspin.comparisons.running.ensembles import judge_differences, judge_means
 from dropspin.comparisons.running.inputs import EngineEntry

@@ -1,13 +1,13 @@
 """Jobs of the reference implementation side by side: arrays of parameters go to its kernels, without building a scene for each job.
 
-Some jobs are left to `any_engine.run_single`: those that are not ordinary (a body below the floor, a time step that does not fit, a
+Some jobs are left to `outcomes.run_scenes`: those that are not ordinary (a body below the floor, a time step that does not fit, a
 friction that the impact law does not support) and those that the kernels refuse. The result of a job has the same bits as when it is run
 by itself.
 """
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,8 @@ from dropspin.comparisons.measuring.batch import BATCH_BYTES, motions_side_by_si
 from dropspin.comparisons.measuring.motions import Setup
 from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
-from dropspin.comparisons.sweeps.any_engine import scene_of
-from dropspin.comparisons.sweeps.fields import Path, path_of, set_field, with_fields
-from dropspin.comparisons.sweeps.jobs import OPTION, Jobs
+from dropspin.comparisons.sweeps.axes import Path, path_of, set_field, with_fields
+from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
 from dropspin.comparisons.sweeps.outcomes import Outcomes, requested_metrics
 from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.body import Body
@@ -36,15 +35,18 @@ Indices = NDArray[np.intp]
 ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}
 
 
-def run_batch(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
+def run_side_by_side(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
     """Run the jobs that can be run side by side; the verdicts of all others stay empty."""
     for indices in _groups(jobs):
         group = jobs[indices]
-        engine = group.engine_at(0)
-        scene = _representative_scene(group)
+        engine, scene = group.engine_at(0), _representative_scene(group)
         # The steps that a sequential contact leaves unsolved are reported for each job, and are counted only for a job by itself.
         if isinstance(engine, Wang) and engine.option("contact") == "mean" and scene is not None:
-            _run_group(group, indices, engine, scene, outcomes, metrics)
+            steps = np.where(_is_accepted(group, engine, scene), _steps(group, scene), 0)
+            order = np.argsort(steps, kind="stable")[np.count_nonzero(steps == 0) :]
+            for batch in _batches(steps[order]):
+                chosen = order[batch]
+                _run_batch(group[chosen], indices[chosen], steps[chosen], engine, scene, outcomes, metrics)
 
 
 def _is_array_field(name: str, column: NDArray[Any]) -> bool:
@@ -77,83 +79,41 @@ def _representative_scene(jobs: Jobs) -> Scenario | None:
     return None
 
 
-@dataclass(frozen=True)
-class _Parameters:
-    """Jobs of one group as arrays; a leading axis of 1 stands for values that all share.
-
-    Attributes:
-        body: The bodies for the kernels.
-        world: The worlds for the kernels.
-        starts: Shape (B, 13).
-        dts: Time steps [s], shape (B,).
-        steps: Shape (B,).
-        setup: What moves, for the metrics.
-    """
-
-    body: reference_impl.Body
-    world: reference_impl.World
-    starts: Array
-    dts: Array
-    steps: NDArray[np.int64]
-    setup: Setup
-
-    def __getitem__(self, indices: Indices) -> "_Parameters":
-        return _Parameters(*(_selected(getattr(self, field.name), indices) for field in fields(self)))
+def _steps(jobs: Jobs, scene: Scenario) -> NDArray[np.int64]:
+    """The number of steps of each job; 0 for one that has too few or too many."""
+    with np.errstate(all="ignore"):  # of values that are not ordinary
+        ratio = jobs.fields.get("duration", scene.duration) / jobs.dts + 1e-9
+        is_ordinary = (ratio >= FEWEST_STEPS) & (ratio < MOST_STEPS + 1)
+    return np.floor(np.where(is_ordinary, ratio, 0.0)).astype(np.int64)
 
 
-def _selected(given: Any, indices: Indices) -> Any:
-    """A selection of rows of every array that has one row for each job."""
-    if isinstance(given, np.ndarray):
-        return given if len(given) == 1 else given[indices]
-    if isinstance(given, Setup):
-        return given[indices]
-    if isinstance(given, reference_impl.Body | reference_impl.World):
-        return type(given)(*(_selected(getattr(given, field.name), indices) for field in fields(given)))
-    if isinstance(given, reference_impl.Floor):
-        return reference_impl.Floor(*(_selected(part, indices) for part in given))
-    return None if given is None else tuple(_selected(part, indices) for part in given)
-
-
-def _run_group(jobs: Jobs, indices: Indices, engine: Wang, scene: Scenario, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
-    """Run the jobs of a group in order of their number of steps, as many at a time as `BATCH_BYTES` allow."""
-    parameters, is_ordinary = _parameters(jobs, scene)
-    is_ordinary &= _is_accepted(jobs, engine, scene)
-    order = np.flatnonzero(is_ordinary)[np.argsort(parameters.steps[is_ordinary], kind="stable")]
-    for selected in _batches(parameters.steps[order]):
-        chosen = order[selected]
-        batch = parameters[chosen]
-        try:
-            simulator = reference_impl.Simulator(batch.body, batch.world, batch.dts, engine.methods())
-            start = time.perf_counter()
-            recorded = simulator.run(batch.starts, int(batch.steps[-1]), threads=1)
-            seconds = time.perf_counter() - start
-        except ValueError:
-            continue  # a value that the kernels refuse: run by itself, each of these jobs gets a row of its own
-        outcomes.time_per_step[indices[chosen]] = seconds / (int(batch.steps[-1]) * len(chosen))
-        _measure(batch.setup, recorded, batch.dts, batch.steps, indices[chosen], outcomes)
-        if metrics:
-            _measure_requested(jobs, indices, chosen, recorded, outcomes, metrics)
-
-
-def _measure_requested(
-    jobs: Jobs, indices: Indices, chosen: Indices, recorded: Array, outcomes: Outcomes, metrics: tuple[str, ...]
+def _run_batch(
+    jobs: Jobs, indices: Indices, steps: NDArray[np.int64], engine: Wang, scene: Scenario, outcomes: Outcomes, metrics: tuple[str, ...]
 ) -> None:
-    """Record the metrics that the spec asks for, one motion after the other."""
-    for index, states in zip(chosen, recorded, strict=True):
-        row = indices[index]
-        if outcomes.verdict[row] == "measured":
-            dt, rows = float(jobs.dts[index]), int(outcomes.steps[row]) + 1
-            motion = Trajectory.from_states(dt * np.arange(rows, dtype=float), states[:rows], 0.5 * dt)
-            outcomes.metrics[row] = requested_metrics(scene_of(jobs, index), motion, metrics)
-
-
-def _measure(setup: Setup, states: Array, dts: Array, steps: NDArray[np.int64], indices: Indices, outcomes: Outcomes) -> None:
-    """Record the outcomes of motions; the verdict of one that is not valid stays empty, because a job by itself reports the reason."""
-    motions, valid = motions_side_by_side(setup, states, dts, 0.5 * dts, steps, UNIT_TOLERANCE)
-    if valid.all():
-        outcomes.set_measured(indices, states, motions)
-    elif valid.any():
-        _measure(setup[valid], states[valid], dts[valid], steps[valid], indices[valid], outcomes)
+    """Run jobs in one call of the kernels; the verdict of one that is not ordinary stays empty: a job by itself gives the reason."""
+    body, world, setup, starts, is_ordinary = _parameters(jobs, scene)
+    if not is_ordinary.all():
+        if is_ordinary.any():
+            _run_batch(jobs[is_ordinary], indices[is_ordinary], steps[is_ordinary], engine, scene, outcomes, metrics)
+        return
+    try:
+        simulator = reference_impl.Simulator(body, world, jobs.dts, engine.methods())
+        start = time.perf_counter()
+        states = simulator.run(starts, int(steps[-1]), threads=1)
+        outcomes.time_per_step[indices] = (time.perf_counter() - start) / (int(steps[-1]) * len(jobs))
+    except ValueError:
+        return  # a value that the kernels refuse
+    motions, valid = motions_side_by_side(setup, states, jobs.dts, 0.5 * jobs.dts, steps, UNIT_TOLERANCE)
+    if not valid.any():
+        return
+    if not valid.all():
+        jobs, indices, steps, setup, states = jobs[valid], indices[valid], steps[valid], setup[valid], states[valid]
+        motions, _ = motions_side_by_side(setup, states, jobs.dts, 0.5 * jobs.dts, steps, UNIT_TOLERANCE)
+    outcomes.set_measured(indices, states, motions)
+    for number, row in enumerate(indices if metrics else ()):
+        rows, dt = int(steps[number]) + 1, float(jobs.dts[number])
+        motion = Trajectory.from_states(dt * np.arange(rows, dtype=float), states[number, :rows], 0.5 * dt)
+        outcomes.metrics[row] = requested_metrics(scene_of(jobs, number), motion, metrics)
 
 
 def _batches(steps: NDArray[np.int64]) -> Iterator[slice]:
@@ -179,10 +139,13 @@ def _is_accepted(jobs: Jobs, engine: Wang, scene: Scenario) -> NDArray[np.bool_]
     return accepted
 
 
-def _parameters(jobs: Jobs, scene: Scenario) -> tuple[_Parameters, NDArray[np.bool_]]:
-    """The parameters of jobs, and which jobs are ordinary."""
+def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, reference_impl.World, Setup, Array, NDArray[np.bool_]]:
+    """Bodies, worlds and starts of jobs for the kernels, what moves for the metrics, and which jobs are ordinary.
+
+    A leading axis of 1 stands for values that all jobs share.
+    """
     columns = {path_of(name): column for name, column in jobs.fields.items() if _is_array_field(name, column)}
-    bodies, is_built = _bodies(scene, {path: column for path, column in columns.items() if path[0] == "body"})
+    bodies, is_ordinary = _bodies(scene, {path: column for path, column in columns.items() if path[0] == "body"})
     radius, vertices = (np.array([getattr(body, name) for body in bodies]) for name in ("rounding", "vertices"))
     starts = _starts(jobs, scene, columns, vertices, radius)
     world = _world(jobs, scene, columns)
@@ -198,13 +161,11 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[_Parameters, NDArray[np.bo
         damping=None if world.damping is None else np.asarray(world.damping[0]),
         floor=scene.floor is not None,
     )
-    with np.errstate(all="ignore"):  # of values that are not ordinary
-        ratio = columns.get(("duration",), scene.duration) / jobs.dts
-        is_ordinary = is_built & (ratio + 1e-9 >= FEWEST_STEPS) & (ratio + 1e-9 < MOST_STEPS + 1)
     if scene.floor is not None:
-        is_ordinary &= setup.clearance >= -0.5 * TOUCHING * setup.size  # a start nearer to the limit is left to the scene's own check
-    steps = np.where(is_ordinary, np.floor(np.where(is_ordinary, ratio, 0.0) + 1e-9), 0).astype(np.int64)
-    return _Parameters(reference_bodies(bodies), world, starts, jobs.dts, steps, setup), is_ordinary
+        is_ordinary = is_ordinary & (
+            setup.clearance >= -0.5 * TOUCHING * setup.size
+        )  # a start nearer to the limit is left to the scene's own check
+    return reference_bodies(bodies), world, setup, starts, np.broadcast_to(is_ordinary, len(jobs))
 
 
 def _world(jobs: Jobs, scene: Scenario, columns: dict[Path, Array]) -> reference_impl.World:

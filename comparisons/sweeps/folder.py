@@ -7,31 +7,27 @@ import io
 import json
 import os
 import re
-from pathlib import Path
-from types import MappingProxyType
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import fsspec
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from dropspin.comparisons.judging.verdicts import VERDICTS
-from dropspin.comparisons.results.output import UNFINISHED, unfinished_folder
+from dropspin.comparisons.results.folder import is_unfinished, written_whole
+from dropspin.comparisons.results.table import schema_of, stored_table
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS
 from dropspin.scenarios import DropspinError
 
 DESCRIPTION = "sweep.json"
 PARTS_PER_FOLDER = 1000
-"""File systems are slow with many files in one folder, and so is listing it."""
-
-
-COLUMNS = MappingProxyType(
-    dict.fromkeys(("key", "scene", "engine", "verdict", "reason"), pa.string())
-    | dict.fromkeys(("job", "seed", "steps"), pa.int64())
-    | dict.fromkeys(("dt", "time_per_step", *STANDARD_METRICS, *STATE_COLUMNS), pa.float64())
-)
+"""File systems are slow with many files in one folder."""
+TEXTS = ("key", "scene", "engine", "verdict", "reason")
+NUMBERS = ("dt", "time_per_step", *STANDARD_METRICS, *STATE_COLUMNS)
+SCHEMA = schema_of((*TEXTS, "job", "seed", "steps"), NUMBERS)
 """The columns of every sweep; axes and requested metrics add others, of numbers or texts."""
 
 
@@ -57,23 +53,23 @@ class SweepFolder:
 
     Args:
         where: The path or URL.
-        identity: A hash of the sweep and of the versions it is run with; it is part of the file names.
+        identity: A hash of the sweep and of the versions it is run with, which is part of the file names; any by default.
     """
 
     def __init__(self, where: str, identity: str = "") -> None:
-        self.where, self._identity = where, identity
+        self.where = where
         try:
             self._files, self._root = fsspec.core.url_to_fs(where)
         except (ImportError, ValueError) as error:
             raise DropspinError(f"-o {where}: {error}; give a folder, or a URL of a file system that fsspec supports here.") from None
-        self._is_local = isinstance(self._files, LocalFileSystem)
+        self._identity = identity
 
     @property
     def address(self) -> str:
         """The location as a URL that is valid on other machines."""
         return str(self._files.unstrip_protocol(self._root))
 
-    def description(self) -> dict[str, Any] | None:
+    def description(self) -> Description | None:
         """The content of `sweep.json`; None if there is no such file.
 
         Raises:
@@ -82,24 +78,20 @@ class SweepFolder:
         file = f"{self._root}/{DESCRIPTION}"
         try:
             text = self._files.cat_file(file) if self._files.isfile(file) or not self._files.exists(file) else b""  # a pipe could block
+            return Description.model_validate_json(text)
         except FileNotFoundError:
-            if self._files.exists(self._root) and (not self._files.isdir(self._root) or self._holds_other_files()):
-                raise DropspinError(
-                    f"{self.where}: holds files that do not belong to a sweep; choose an empty or new folder with -o."
-                ) from None
-            return None
+            if not self._files.exists(self._root):
+                return None
+            if self._files.isdir(self._root):
+                names = map(os.path.basename, self._files.ls(self._root, detail=False))
+                if all(map(is_unfinished, names)):  # left by a sweep that was killed at its beginning
+                    return None
+            fault = "holds files that do not belong to a sweep; choose an empty or new folder"
         except NotADirectoryError:
-            raise DropspinError(f"{self.where}: is a file, or inside one; choose a folder with -o.") from None
-        try:
-            return Description.model_validate_json(text).model_dump()
+            fault = "is a file, or inside one; choose a folder"
         except ValidationError:
-            raise DropspinError(
-                f"{self.where}: its {DESCRIPTION} is not a valid description of a sweep; choose an empty or new folder with -o."
-            ) from None
-
-    def _holds_other_files(self) -> bool:
-        """Whether there is any file but those that a sweep leaves if it is killed at its beginning."""
-        return any(not os.path.basename(path).startswith(f".{UNFINISHED}") for path in self._files.ls(self._root, detail=False))
+            fault = f"its {DESCRIPTION} is not a valid description of a sweep; choose an empty or new folder"
+        raise DropspinError(f"{self.where}: {fault} with -o.")
 
     def begin(self, description: dict[str, Any]) -> None:
         """Write `sweep.json`."""
@@ -115,75 +107,100 @@ class SweepFolder:
         """Whether the folder has a part."""
         return bool(self._files.exists(f"{self._root}/{self._name(number, first, last)}"))
 
-    def groups(self) -> list[int]:
-        """The groups of which the folder has any part, in order."""
-        try:
-            found = self._files.ls(f"{self._root}/parts", detail=False, refresh=True)
-        except FileNotFoundError:
-            return []
-        return sorted(int(name) for name in map(os.path.basename, found) if name.isdecimal())
+    def parts(self) -> dict[range, str]:
+        """The paths of the parts, by the numbers of their jobs, in order."""
+        self._files.invalidate_cache()
+        pattern = re.compile(rf"(\d{{16}})-(\d{{16}})-{self._identity or '[0-9a-f]{12}'}\.parquet")
+        matches = {path: pattern.fullmatch(os.path.basename(path)) for path in self._files.find(f"{self._root}/parts")}
+        found = {range(int(match[1]), int(match[2])): path for path, match in matches.items() if match}
+        return dict(sorted(found.items(), key=lambda part: part[0].start))
 
-    def parts(self, group: int) -> dict[int, str]:
-        """The paths of the parts of a group, by the numbers of their first jobs, in order; group k holds the parts from 1000 k on."""
-        try:
-            found = self._files.ls(f"{self._root}/{self._group(group)}", detail=False, refresh=True)
-        except FileNotFoundError:
-            return {}
-        pattern = re.compile(rf"(\d{{16}})-\d{{16}}-{self._identity}\.parquet")
-        paths = {int(match[1]): path for path in found if (match := pattern.fullmatch(os.path.basename(path)))}
-        return dict(sorted(paths.items()))
-
-    def read(self, path: str, columns: list[str] | None = None) -> pa.Table:
+    def read(self, jobs: range, path: str, columns: list[str] | None = None) -> pa.Table:
         """Read a part.
 
         Raises:
             DropspinError: It is damaged, or not a part of a sweep.
         """
-        first, last = map(int, os.path.basename(path).split("-")[:2])
         try:
             if not self._files.isfile(path):  # reading a pipe could last for ever
                 raise ValueError("is not a regular file")
-            return _read_part(self._files.cat_file(path), range(first, last), columns)
+            needed = None if columns is None else {"job", "verdict", *columns}
+            table = stored_table(self._files.cat_file(path), SCHEMA, with_others=True, only=needed)
+            if len(table) != len(jobs) or table["job"].to_pylist() != list(jobs):
+                raise ValueError("has other jobs than its name")
+            return table if columns is None else table.select(columns)
         except Exception:  # whatever pyarrow raises for a file that is none
             raise DropspinError(f"{path}: is damaged; delete it, and run its jobs again with --resume.") from None
 
     def _name(self, number: int, first: int, last: int) -> str:
-        return f"{self._group(number // PARTS_PER_FOLDER)}/{first:016d}-{last:016d}-{self._identity}.parquet"
-
-    @staticmethod
-    def _group(group: int) -> str:
-        return f"parts/{group:06d}"
+        return f"parts/{number // PARTS_PER_FOLDER:06d}/{first:016d}-{last:016d}-{self._identity}.parquet"
 
     def _put(self, name: str, content: bytes) -> None:
-        path = f"{self._root}/{name}"
+        path, remedy = f"{self._root}/{name}", "the parts written so far are complete: --resume continues the sweep"
+        if isinstance(self._files, LocalFileSystem):
+            with written_whole(path, remedy) as unfinished:
+                unfinished.write_bytes(content)
+            return
         try:
-            if not self._is_local:
-                self._files.pipe_file(path, content)
-                return
-            target = Path(path)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with unfinished_folder(Path(self._root)) as folder:
-                unfinished = folder / "new"
-                with unfinished.open("wb") as file:
-                    file.write(content)
-                    file.flush()
-                    os.fsync(file.fileno())  # so that a part with its name is complete even after a power cut
-                unfinished.replace(target)
+            self._files.pipe_file(path, content)
         except OSError as error:
-            raise DropspinError(
-                f"{self.where}: is not writable: {error.strerror or error}; "
-                "the parts written so far are complete: --resume continues the sweep."
-            ) from None
+            raise DropspinError(f"{path}: cannot be written: {error.strerror or error}; {remedy}.") from None
 
 
-def _read_part(content: bytes, jobs: range, columns: list[str] | None) -> pa.Table:
-    """A part, or some of its columns, if it has those of a sweep, and these jobs."""
-    # Without threads of pyarrow: engine processes are forked in the meantime, and parts are read one at a time.
-    file = pq.ParquetFile(io.BytesIO(content), page_checksum_verification=True)
-    types = dict(zip(file.schema_arrow.names, file.schema_arrow.types, strict=True))
-    if not COLUMNS.items() <= types.items() or not {*types.values()} <= {*COLUMNS.values()}:
-        raise ValueError("has other columns or types than a sweep")
-    known = file.read(columns=["job", "verdict"], use_threads=False)
-    if known["job"].to_pylist() != list(jobs) or not set(known["verdict"].unique().to_pylist()) <= set(VERDICTS):
-        raise ValueError("has other jobs or verdicts than a sweep")
-    return file.read(columns=columns, use_threads=False).replace_schema_metadata(None)
+def written_parts(where: str) -> tuple[SweepFolder, dict[range, str]]:
+    """The folder of a sweep, and its parts by the numbers of their jobs.
+
+    Raises:
+        DropspinError: It does not hold a sweep.
+    """
+    about = SweepFolder(where).description()
+    if about is None:
+        raise DropspinError(f"{where}: does not hold a sweep; give the folder that dropspin sweep -o wrote.")
+    folder = SweepFolder(where, about.identity)
+    return folder, folder.parts()
+
+
+def count(where: str) -> int:
+    """The number of jobs that a folder has; 0 if it holds no sweep."""
+    return sum(map(len, written_parts(where)[1])) if SweepFolder(where).description() is not None else 0
+
+
+def read_sweep(where: str) -> pd.DataFrame:
+    """The table of a sweep, in the order of its jobs; of an unfinished sweep, the jobs that have been run.
+
+    Args:
+        where: The folder, or a URL that fsspec supports.
+
+    Returns:
+        One row a job.
+
+    Raises:
+        DropspinError: The folder does not hold a sweep, none of its jobs has been run, or a part is damaged.
+    """
+    tables = list(read_sweep_parts(where))
+    if not tables:
+        raise DropspinError(f"{where}: no job has been run yet; run the sweep with --resume.")
+    return pa.concat_tables(tables).to_pandas()
+
+
+def read_sweep_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
+    """The table of a sweep part by part, for tables that are larger than memory.
+
+    Args:
+        where: The folder, or a URL that fsspec supports.
+        columns: Names of the columns to read; None: all.
+
+    Returns:
+        An iterator over the parts, in the order of the jobs, each a PyArrow table.
+
+    Raises:
+        DropspinError: The folder does not hold a sweep, or a part is damaged.
+    """
+    folder, parts = written_parts(where)
+    schema = None
+    for jobs, path in parts.items():
+        table = folder.read(jobs, path, columns)
+        schema = schema or table.schema
+        if table.schema != schema:
+            raise DropspinError(f"{path}: has other columns than the parts before it; delete it, and run its jobs again with --resume.")
+        yield table

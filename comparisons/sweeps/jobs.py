@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pydantic_core import to_json
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis
-from dropspin.comparisons.sweeps.fields import content_of, path_of, set_field
+from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis, content_of, path_of, set_field, with_fields
 from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.ensemble import spread_start
 from dropspin.scenarios.validation import shown
 
 OPTION = "engine."
@@ -165,3 +165,13 @@ def _as_json(column: NDArray[Any]) -> list[bytes]:
     if column.dtype == object:
         return [to_json(value) for value in column]
     return to_json(column.tolist())[1:-1].split(b",")
+
+
+def scene_of(jobs: Jobs, index: int) -> Scenario:
+    """The scene of a job, with its fields set and from its start.
+
+    Raises:
+        SceneError: The fields do not make a valid scene.
+    """
+    scene = with_fields(jobs.scene, [(name, column[index]) for name, column in jobs.fields.items()])
+    return scene if jobs.seeds is None else scene.starting_at(spread_start(scene, int(jobs.seeds[index])))

@@ -1,17 +1,23 @@
-"""The outcomes of some jobs, as arrays: verdicts, final states and metrics."""
+"""The outcomes of jobs, as arrays: verdicts, final states and metrics; and those of jobs whose scenes are built, by any engine."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.measuring.batch import motions_side_by_side
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS, energy_drift, energy_gain, penetration
-from dropspin.comparisons.measuring.motions import Motions
-from dropspin.comparisons.running.recording import Breakdown
-from dropspin.scenarios import Scenario, Trajectory, truth_for
+from dropspin.comparisons.measuring.motions import Motions, Setup
+from dropspin.comparisons.running.inputs import verify_time_step
+from dropspin.comparisons.running.recording import Breakdown, Recording, divergence, record_batch, try_record
+from dropspin.comparisons.running.verification import UNIT_TOLERANCE, verified_refusal
+from dropspin.comparisons.sweeps.jobs import Jobs, scene_of
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 
 Array = NDArray[np.float64]
 
@@ -55,9 +61,10 @@ class Outcomes:
         state, standard, others = (np.full((size, width), np.nan) for width in (len(STATE_COLUMNS), len(STANDARD_METRICS), metrics))
         return cls(verdict, reason, state, standard, others, np.zeros(size, dtype=np.int64), np.full(size, np.nan))
 
-    def __getitem__(self, indices: slice) -> "Outcomes":
-        """The outcomes of some of the jobs."""
-        return Outcomes(*(column[indices] for column in vars(self).values()))
+    def __setitem__(self, index: int, outcome: "Outcomes") -> None:
+        """Replace the outcome of a job by that of one job."""
+        for column, value in zip(vars(self).values(), vars(outcome).values(), strict=True):
+            column[index] = value[0]
 
     def set_breakdown(self, index: int, breakdown: Breakdown) -> None:
         """Record why a job has no motion."""
@@ -110,3 +117,74 @@ def _value(measure: Callable[[Comparison], float | Array], case: Comparison) -> 
     except Unresolved:
         return np.nan
     return float(values[np.argmax(np.abs(values))])
+
+
+class _Built(NamedTuple):
+    """A job whose scene and engine are built."""
+
+    row: int
+    scene: Scenario
+    engine: Engine
+    dt: float
+
+
+def run_scenes(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...], *, in_batches: bool) -> None:
+    """Run the jobs that have no verdict, together in the engine's batches or each by itself; a failure is recorded in its row."""
+    groups: dict[Hashable, list[_Built]] = {}
+    for index in np.flatnonzero(outcomes.verdict == "").tolist():
+        dt = float(jobs.dts[index])
+        try:
+            job = _Built(index, scene_of(jobs, index), jobs.engine_at(index), dt)
+            verify_time_step(job.scene, dt)
+        except DropspinError as error:
+            outcomes.set_breakdown(index, Breakdown("declined", str(error)))
+        else:
+            groups.setdefault((_alike(job) if in_batches else None) or index, []).append(job)
+    for group in groups.values():
+        for job, recording in zip(group, _recorded(group), strict=True):
+            _set_recorded(outcomes, job, recording, metrics)
+
+
+def _alike(job: _Built) -> Hashable:
+    """What jobs have in common that an engine may simulate together; None for a job that it declines."""
+    scene, engine = job.scene, job.engine
+    try:
+        if verified_refusal(engine.refusal(scene)) is not None:
+            return None
+    except Exception:  # reported when the job runs by itself
+        return None
+    return (
+        engine.label,
+        job.dt,
+        scene.steps(job.dt),
+        scene.structure if engine.mixes_scenes else (scene.body, scene.gravity, scene.floor, scene.damping),
+    )
+
+
+def _recorded(group: list[_Built]) -> Sequence[Recording | Breakdown]:
+    """The motions of jobs that an engine may simulate together."""
+    engine, dt = group[0].engine, group[0].dt
+    if len(group) > 1:
+        with suppress(Exception):  # each then runs by itself, which gives the reason
+            return record_batch(engine, [job.scene for job in group], dt, limitations=True)
+    return [try_record(engine, job.scene, dt) for job in group]
+
+
+def _set_recorded(outcomes: Outcomes, job: _Built, recording: Recording | Breakdown, metrics: tuple[str, ...]) -> None:
+    """Record the outcome of a job that was simulated."""
+    index, steps = job.row, job.scene.steps(job.dt)
+    if isinstance(recording, Breakdown):
+        outcomes.steps[index] = 0 if recording.verdict == "declined" else steps
+        outcomes.set_breakdown(index, recording)
+        return
+    motion = recording.motion
+    outcomes.steps[index], outcomes.time_per_step[index] = steps, recording.seconds / steps
+    if (diverged := divergence(motion)) is not None:
+        outcomes.set_breakdown(index, diverged)
+        return
+    setup, states, lag = Setup.of(job.scene).as_batch(), motion.states[np.newaxis], np.array([motion.velocity_lag])
+    motions, _ = motions_side_by_side(setup, states, np.array([job.dt]), lag, np.array([steps]), UNIT_TOLERANCE)
+    outcomes.set_measured(np.array([index]), states, motions)
+    outcomes.reason[index] = "; ".join(limitation.message for limitation in recording.limitations if not limitation.is_minor)
+    if metrics:
+        outcomes.metrics[index] = requested_metrics(job.scene, motion, metrics)

@@ -1,20 +1,27 @@
-"""Run a sweep, and read its table."""
+"""Run a sweep: one part at a time on each processor of this machine, or one task for each part on a Dask cluster.
 
+On a cluster, the worker that runs a part writes it to a folder that all machines share. Each worker runs engines in processes of their own,
+as a sweep on one machine does. If a worker is lost, another one repeats its current part; the parts that it had written are kept.
+"""
+
+import multiprocessing
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import partial
 from typing import Any
-
-import pandas as pd
-import pyarrow as pa
 
 from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.inputs import ignore
-from dropspin.comparisons.running.processes import ResourceLimits
-from dropspin.comparisons.sweeps.cluster import run_on_cluster
-from dropspin.comparisons.sweeps.folder import SweepFolder
+from dropspin.comparisons.running.parallel import as_done, work_in_parallel
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.sweeps.folder import Description, SweepFolder, count
 from dropspin.comparisons.sweeps.jobs import Sweep
-from dropspin.comparisons.sweeps.local import run_locally
-from dropspin.comparisons.sweeps.work import Work
+from dropspin.comparisons.sweeps.work import Part, Work, installed_versions
+from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError
+
+PARTS_PER_THREAD = 2
+"""Parts submitted for each thread of a worker, so that the next one is there when one is finished."""
 
 
 def run_sweep(
@@ -44,7 +51,7 @@ def run_sweep(
     folder = SweepFolder(where, work.identity)
     earlier = folder.description()
     kept = 0
-    if earlier is not None and folder.groups():  # a sweep that was refused or interrupted before its first job may be given again
+    if earlier is not None and SweepFolder(where).parts():  # without a part, the sweep may be given again
         _verify_same_sweep(where, earlier, work)
         kept = count(where)
         if not resume:
@@ -53,77 +60,104 @@ def run_sweep(
             )
     report = on_progress or ignore
     report(kept)
-    parts = work.missing(folder)
+    present = {jobs.start for jobs in folder.parts()}
+    missing = (part for part in work.parts if part.first not in present)
     if scheduler is None:
         folder.begin(work.description)
-        run_locally(work, parts, folder, report)
+        _run_here(work, missing, folder, report)
         return
     with connected(scheduler) as client:
         folder.begin(work.description)
-        run_on_cluster(client, work, parts, folder, report)
+        _run_on_cluster(client, work, missing, folder, report)
 
 
-def count(where: str) -> int:
-    """The number of jobs that a folder has; 0 if it holds no sweep."""
-    return sum(jobs for jobs, _ in _parts(where)) if SweepFolder(where).description() is not None else 0
-
-
-def read_sweep(where: str) -> pd.DataFrame:
-    """The table of a sweep, in the order of its jobs; of an unfinished sweep, the jobs that have been run.
-
-    Args:
-        where: The folder, or a URL that fsspec supports.
-
-    Returns:
-        One row a job.
-
-    Raises:
-        DropspinError: The folder does not hold a sweep, none of its jobs has been run, or a part is damaged.
-    """
-    tables = list(read_sweep_parts(where))
-    if not tables:
-        raise DropspinError(f"{where}: no job has been run yet; run the sweep with --resume.")
-    return pa.concat_tables(tables).to_pandas()
-
-
-def read_sweep_parts(where: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
-    """The table of a sweep part by part, for tables that are larger than memory.
-
-    Args:
-        where: The folder, or a URL that fsspec supports.
-        columns: Names of the columns to read; None: all.
-
-    Returns:
-        An iterator over the parts, in the order of the jobs, each a PyArrow table.
-
-    Raises:
-        DropspinError: The folder does not hold a sweep, or a part is damaged.
-    """
-    folder, schema = SweepFolder(where), None
-    for _, path in _parts(where):
-        table = folder.read(path, columns)
-        schema = schema or table.schema
-        if table.schema != schema:
-            raise DropspinError(f"{path}: has other columns than the parts before it; delete it, and run its jobs again with --resume.")
-        yield table
-
-
-def _parts(where: str) -> Iterator[tuple[int, str]]:
-    """The number of jobs of each part in a folder, and its path."""
-    about = SweepFolder(where).description()
-    if about is None:
-        raise DropspinError(f"{where}: does not hold a sweep; give the folder that dropspin sweep -o wrote.")
-    folder, size = SweepFolder(where, about["identity"]), about["part_size"]
-    for group in folder.groups():
-        for first, path in folder.parts(group).items():
-            yield min(size, about["jobs"] - first), path
-
-
-def _verify_same_sweep(where: str, earlier: dict[str, Any], work: Work) -> None:
+def _verify_same_sweep(where: str, earlier: Description, work: Work) -> None:
     """Raise `DropspinError` unless a folder holds this sweep, run with the installed versions."""
-    if earlier["identity"] == work.identity:
+    if earlier.identity == work.identity:
         return
-    then, now = earlier["provenance"]["versions"], work.versions
+    then, now = earlier.provenance.versions, work.versions
     changed = [f"{name} {then.get(name)}, now {now[name]}" for name in now if then.get(name) != now[name]]
     difference = f"a sweep that was run with {', '.join(changed)}" if changed else "another sweep: the specs differ"
     raise DropspinError(f"{where}: holds {difference}; choose another folder with -o.")
+
+
+def _run_here(work: Work, parts: Iterator[Part], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
+    def run_part(part: Part, processes: EngineProcesses, raise_if_stopping: Callable[[], None]) -> None:
+        folder.write(*part, work.table(part, processes, raise_if_stopping))
+
+    with ExitStack() as stack:
+        crews = [stack.enter_context(EngineProcesses(work.resources)) for _ in range(usable_cores())]
+        work_in_parallel(parts, run_part, crews, lambda part, _: on_progress(part.last - part.first), lambda: on_progress(0))
+
+
+def _run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
+    """Run parts on the workers of a client's scheduler, and end the engine processes of the workers.
+
+    Raises:
+        DropspinError: A worker cannot run its part. The text gives the reason and the remedy.
+    """
+    run_part = partial(_run_on_worker, work, folder.address)
+    workers = client.get_executor(pure=False)
+    try:
+        for done in as_done(workers, run_part, parts, lambda: PARTS_PER_THREAD * max(1, sum(client.nthreads().values()))):
+            if done is None:
+                on_progress(0)
+                continue
+            part, _ = done
+            on_progress(part.last - part.first)
+            if not folder.has(*part):
+                raise DropspinError(
+                    f"{folder.where}: a part that a worker wrote is not visible from here; give a folder that all machines share."
+                )
+    finally:
+        client.run(_close_idle_processes, on_error="ignore")
+
+
+_Owner = tuple[str, ResourceLimits]
+_idle: dict[_Owner, list[EngineProcesses]] = {}
+"""On a worker: the engine processes that are not in use, by the sweep they belong to; at most one set for each thread of the worker."""
+
+
+def _run_on_worker(work: Work, where: str, part: Part) -> None:
+    """On a worker: run a part, unless another worker has written it."""
+    folder = SweepFolder(where, work.identity)
+    if folder.has(*part):
+        return
+    if multiprocessing.current_process().daemon:
+        raise DropspinError(
+            "a worker may not start processes, in which engines are isolated; "
+            "set DASK_DISTRIBUTED__WORKER__DAEMON=False where workers are started, or start them with --no-nanny."
+        )
+    for package, version in installed_versions().items():
+        if version != work.versions[package]:
+            raise DropspinError(f"a worker has {package} {version}, this machine has {work.versions[package]}; install the same on both.")
+    owner = (work.identity, work.resources)
+    _close_idle_processes(except_for=owner)  # those of a client that was killed
+    idle = _idle.setdefault(owner, [])
+    processes = idle.pop() if idle else EngineProcesses(work.resources, start_method="spawn")
+    try:
+        folder.write(*part, work.table(part, processes, _reschedule_if_closing))
+    finally:
+        idle.append(processes)
+        if _idle.get(owner) is not idle:  # the sweep has been left in the meantime, and nothing else will close them
+            _close(idle)
+
+
+def _reschedule_if_closing() -> None:
+    """On a worker that is closing, engine processes may have been ended already, which is not a failure of their engines."""
+    from distributed import Reschedule, Status, get_worker
+
+    if get_worker().status != Status.running:
+        raise Reschedule  # on another worker
+
+
+def _close_idle_processes(except_for: _Owner | None = None) -> None:
+    """On a worker: end the engine processes that are not in use, of all sweeps but one; those in use end with their parts."""
+    for owner in [owner for owner in _idle if owner != except_for]:
+        _close(_idle.pop(owner))
+
+
+def _close(idle: list[EngineProcesses]) -> None:
+    while idle:
+        with idle.pop():
+            pass

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import verify_time_step
-from dropspin.comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
-from dropspin.comparisons.sweeps.fields import NoSuchField, verify_field, with_fields
+from dropspin.comparisons.sweeps.axes import Drawn, Listed, NoSuchField, Spaced, Spacing, SweepAxis, verify_field, with_fields
 from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
@@ -60,7 +59,9 @@ class CountedRange(Range):
 
 
 class Draws(Table):
-    """The number of random draws, and their seed."""
+    """The number of random draws, their seed, and by further keys the ranges of fields."""
+
+    model_config = ConfigDict(extra="allow")
 
     count: Count
     seed: Seed
@@ -95,26 +96,24 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
     else:
         where, content, folder = str(spec), read_toml(Path(spec), str(spec), "spec"), Path(spec).parent
     written = validated(Spec, where, content)
-    grid, random = _grid_axes(where, written.grid), _random_axes(where, written.random)
-    names = [axis.name for axis in (*grid, *random)]
-    _verify_names(where, names)
-    if ("dt" in names) == bool(written.dts):
-        fault = "is given twice" if written.dts else "is missing"
-        raise DropspinError(f"{where}: the time step {fault}; give dts = [...], or dt in [grid] or [random] [s].")
-    for metric in written.metrics:
-        if metric not in METRICS:
-            raise UnknownName(f"{where}: metric", metric, METRICS)
-        if metric in STANDARD_METRICS:
-            raise DropspinError(f"{where}: metrics: {metric!r} is measured in every sweep; leave it out.")
+    draws = validated(Draws, f"{where}: random", written.random) if written.random else None
+    axes = _axes(where, written.grid)
+    if draws is not None:
+        if not draws.model_extra:
+            raise DropspinError(
+                f"{where}: random: no field is given; add one with its range, such as body.mass = {{from = 1.0, to = 2.0}}."
+            )
+        axes += _axes(where, draws.model_extra, draws)
     sweep = Sweep(
         scenes=tuple(_scene(where, name, folder) for name in written.scenes),
         engines=tuple(present_entry(name).adapter for name in written.engines),
         dts=written.dts,
         seeds=range(written.seeds) if isinstance(written.seeds, int) else written.seeds,
-        axes=(*grid, *random),
-        draws=len(random[0]) if random else 1,
+        axes=tuple(axes),
+        draws=1 if draws is None else draws.count,
         metrics=written.metrics,
     )
+    _verify_names(where, sweep)
     _verify_sweep(where, sweep)
     return sweep
 
@@ -138,20 +137,23 @@ def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return found
 
 
-def _grid_axes(where: str, table: Mapping[str, Any]) -> list[SweepAxis]:
+def _axes(where: str, table: Mapping[str, Any], draws: Draws | None = None) -> list[SweepAxis]:
+    """The axes of the table [grid], or of [random] with its draws."""
     axes: list[SweepAxis] = []
     for name, given in _flattened(table).items():
-        here = f"{where}: grid: {name}"
-        if isinstance(given, Mapping):
-            span = validated(CountedRange, here, given)
-            axes.append(Spaced(name, span.first, span.last, span.count, span.spacing))
-        elif isinstance(given, list) and given:
+        here = f"{where}: {'grid' if draws is None else 'random'}: {name}"
+        if isinstance(given, Mapping) and draws is None:
+            axes.append(Spaced(name, **validated(CountedRange, here, given).model_dump()))
+        elif isinstance(given, Mapping) and draws is not None:
+            axes.append(Drawn(name, **validated(Range, here, given).model_dump(), count=draws.count, seed=draws.seed))
+        elif isinstance(given, list) and given and draws is None:
             values = tuple(_canonical(here, name, value) for value in given)
-            axes.append(Listed(name, values))
             if len({repr(value) for value in values}) < len(values):
                 raise DropspinError(f"{here}: names a value twice; name each once.")
+            axes.append(Listed(name, values))
         else:
-            raise DropspinError(f"{here}: got {shown(given)}; must be a list of values, or {{from, to, count}}.")
+            allowed = "a list of values, or {from, to, count}" if draws is None else "a range to draw from, {from, to}"
+            raise DropspinError(f"{here}: got {shown(given)}; must be {allowed}.")
     return axes
 
 
@@ -172,38 +174,31 @@ def _canonical(here: str, name: str, value: Any) -> Any:
     return value
 
 
-def _random_axes(where: str, table: Mapping[str, Any]) -> list[SweepAxis]:
-    if not table:
-        return []
-    draws = validated(Draws, f"{where}: random", {key: table[key] for key in ("count", "seed") if key in table})
-    axes: list[SweepAxis] = []
-    for name, given in _flattened({key: value for key, value in table.items() if key not in ("count", "seed")}).items():
-        here = f"{where}: random: {name}"
-        if not isinstance(given, Mapping):
-            raise DropspinError(f"{here}: got {shown(given)}; must be a range to draw from, {{from, to}}.")
-        span = validated(Range, here, given)
-        axes.append(Drawn(name, span.first, span.last, draws.count, span.spacing, draws.seed))
-    if not axes:
-        raise DropspinError(f"{where}: random: no field is given; add one with its range, such as body.mass = {{from = 1.0, to = 2.0}}.")
-    return axes
-
-
-def _verify_names(where: str, names: list[str]) -> None:
-    """Raise `DropspinError` if two axes set the same field, or one sets a part of the field that another sets."""
+def _verify_names(where: str, sweep: Sweep) -> None:
+    """Raise `DropspinError` if a scene, an engine, a field or a metric is named twice or the time step is not named once."""
+    names = [axis.name for axis in sweep.axes]
     for name in names:
         if names.count(name) > 1:
             raise DropspinError(f"{where}: {name}: is in both [grid] and [random]; remove it from one of them.")
         for part in names:
             if part.startswith((f"{name}.", f"{name}[")):
                 raise DropspinError(f"{where}: {part}: is a part of {name}, which is swept as well; leave one of them out.")
-
-
-def _verify_sweep(where: str, sweep: Sweep) -> None:
-    """Raise `DropspinError` for a fault that does not depend on the combination of values."""
+    if ("dt" in names) == bool(sweep.dts):
+        fault = "is given twice" if sweep.dts else "is missing"
+        raise DropspinError(f"{where}: the time step {fault}; give dts = [...], or dt in [grid] or [random] [s].")
+    for metric in sweep.metrics:
+        if metric not in METRICS:
+            raise UnknownName(f"{where}: metric", metric, METRICS)
+        if metric in STANDARD_METRICS:
+            raise DropspinError(f"{where}: metrics: {metric!r} is measured in every sweep; leave it out.")
     if len({scene.name for scene in sweep.scenes}) < len(sweep.scenes):
         raise DropspinError(f"{where}: scenes: two have the same name, which is that of the file; rename one.")
     if len({engine.label for engine in sweep.engines}) < len(sweep.engines):
         raise DropspinError(f"{where}: engines: the same engine is named twice, written in two ways; name each once.")
+
+
+def _verify_sweep(where: str, sweep: Sweep) -> None:
+    """Raise `DropspinError` for a fault that does not depend on the combination of values."""
     if sweep.size > MOST_JOBS:
         raise DropspinError(f"{where}: the sweep has {sweep.size:.3g} jobs; at most {MOST_JOBS:g} are allowed.")
     for scene in sweep.scenes:
@@ -211,7 +206,7 @@ def _verify_sweep(where: str, sweep: Sweep) -> None:
             raise DropspinError(f"{where}: seeds: scene {scene.name!r} has no [ensemble], which defines the spread of starts.")
     for axis in sweep.axes:
         try:
-            for value in axis.representative_values:
+            for value in axis.values:
                 _verify_value(sweep, axis, value)
         except DropspinError as error:
             table = "random" if isinstance(axis, Drawn) else "grid"
@@ -245,7 +240,7 @@ def _verify_some_scene(sweep: Sweep, scene: Scenario, axis: SweepAxis, value: An
     others = [other for other in sweep.axes if other.name not in (axis.name, "dt") and not other.name.startswith(OPTION)]
     errors = []
     for index in (None, 0, -1):
-        company = [] if index is None else [(other.name, other.representative_values[index]) for other in others]
+        company = [] if index is None else [(other.name, other.values[index]) for other in others]
         try:
             with_fields(scene, [*company, (axis.name, value)])
         except SceneError as error:

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 
 from dropspin.comparisons.engines.stand_in import code_of
@@ -17,10 +18,9 @@ from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.comparisons.sweeps.dispatch import run_jobs
-from dropspin.comparisons.sweeps.folder import PARTS_PER_FOLDER, SweepFolder
+from dropspin.comparisons.sweeps.arrays import run_side_by_side
 from dropspin.comparisons.sweeps.jobs import Jobs, Sweep
-from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS, Outcomes, concatenated
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS, Outcomes, concatenated, run_scenes
 from dropspin.reference_impl import sources
 
 LARGEST_PART = 4000  # jobs
@@ -90,7 +90,7 @@ class Work:
     def part_size(self) -> int:
         """The number of jobs of a part: as many as take about `PART_TIME`, by the estimated cost of the most expensive job."""
         axes = [axis for axis in self.sweep.axes if axis.name in ("dt", "duration")]
-        swept = {axis.name: [float(value) for value in axis.representative_values] for axis in axes}
+        swept = {axis.name: [float(value) for value in axis.values] for axis in axes}
         longest = max(swept.get("duration", [scene.duration for scene in self.sweep.scenes]))
         steps = longest / min([*self.sweep.dts, *swept.get("dt", [])])
         slow = any(not isinstance(engine, Wang) for engine in self.sweep.engines) or bool(self.sweep.metrics)
@@ -99,17 +99,8 @@ class Work:
     @property
     def parts(self) -> Iterator[Part]:
         """All parts, in order."""
-        for number, first in enumerate(range(0, self.sweep.size, self.part_size)):
-            yield Part(number, first, min(first + self.part_size, self.sweep.size))
-
-    def missing(self, folder: SweepFolder) -> Iterator[Part]:
-        """The parts that a folder does not have."""
-        present: dict[int, str] = {}
-        for part in self.parts:
-            if part.number % PARTS_PER_FOLDER == 0:
-                present = folder.parts(part.number // PARTS_PER_FOLDER)
-            if part.first not in present:
-                yield part
+        size = self.part_size
+        return (Part(number, first, min(first + size, self.sweep.size)) for number, first in enumerate(range(0, self.sweep.size, size)))
 
     def table(self, part: Part, processes: EngineProcesses, verify_running: Callable[[], None] = lambda: None) -> pa.Table:
         """Run a part.
@@ -120,39 +111,33 @@ class Work:
             verify_running: Called before each job or group of jobs, and after one that failed; raises if the sweep has ended.
         """
         groups = self.sweep.jobs(part.first, part.last)
-        return _as_table(self.sweep, groups, concatenated([self._outcomes(jobs, processes, verify_running) for jobs in groups]))
+        return pa.concat_tables([_as_table(self.sweep, jobs, self._outcomes(jobs, processes, verify_running)) for jobs in groups])
 
     def _outcomes(self, jobs: Jobs, processes: EngineProcesses, verify_running: Callable[[], None]) -> Outcomes:
         """Run jobs of one engine in its process; if they break it, repeat them one by one, to find the job that does."""
         entry = EngineEntry(jobs.engine.label, jobs.engine)
         first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
+
+        def outcome(number: int) -> Outcomes:
+            verify_running()
+            try:
+                return processes.call(entry, _run_in_process, self.sweep, number, number + 1)
+            except Failed as failure:
+                verify_running()  # a process that ended with the sweep has not failed
+                broken = Outcomes.empty(1, len(self.sweep.metrics))
+                broken.set_breakdown(0, Breakdown(failure.verdict, failure.reason))
+                return broken
+
         verify_running()
         try:
             found = processes.call(entry, _run_in_process, self.sweep, first, last)
         except Failed:
-            return concatenated([self._outcome(entry, number, processes, verify_running) for number in range(first, last)])
-        if not (found.verdict == "crashed").any():
-            return found
+            return concatenated([outcome(number) for number in range(first, last)])
         # An exception may be due to earlier jobs, for example to a leak. It counts if the job raises it in a new process as well.
-        repeated = []
-        for index, number in enumerate(range(first, last)):
-            if found.verdict[index] == "crashed":
-                processes.renew(entry)
-                repeated.append(self._outcome(entry, number, processes, verify_running))
-            else:
-                repeated.append(found[index : index + 1])
-        return concatenated(repeated)
-
-    def _outcome(self, entry: EngineEntry, number: int, processes: EngineProcesses, verify_running: Callable[[], None]) -> Outcomes:
-        """Run one job; if it breaks its engine, record that."""
-        verify_running()
-        try:
-            return processes.call(entry, _run_in_process, self.sweep, number, number + 1)
-        except Failed as failure:
-            verify_running()  # a process that ended with the sweep has not failed
-            outcomes = Outcomes.empty(1, len(self.sweep.metrics))
-            outcomes.set_breakdown(0, Breakdown(failure.verdict, failure.reason))
-            return outcomes
+        for index in np.flatnonzero(found.verdict == "crashed").tolist():
+            processes.renew(entry)
+            found[index] = outcome(first + index)
+        return found
 
 
 def installed_versions() -> dict[str, str | None]:
@@ -166,28 +151,30 @@ def _run_in_process(entry: EngineEntry, sweep: Sweep, first: int, last: int) -> 
     return run_jobs(replace(sweep, engines=engines), first, last)
 
 
-def _as_table(sweep: Sweep, groups: list[Jobs], found: Outcomes) -> pa.Table:
+def run_jobs(sweep: Sweep, first: int, last: int) -> Outcomes:
+    """Run the jobs from number `first` up to, not including, `last`; the result of each is independent of the others.
+
+    If an engine compiles, rounding may depend on how many of the jobs it simulates in a batch.
+    """
+    found = []
+    for jobs in sweep.jobs(first, last):
+        outcomes, is_reference = Outcomes.empty(len(jobs), len(sweep.metrics)), isinstance(jobs.engine, Wang)
+        if is_reference:
+            run_side_by_side(jobs, outcomes, sweep.metrics)
+        run_scenes(jobs, outcomes, sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
+        found.append(outcomes)
+    return concatenated(found)
+
+
+def _as_table(sweep: Sweep, jobs: Jobs, found: Outcomes) -> pa.Table:
     """One row for each job."""
-    columns: dict[str, Any] = {
-        "job": pa.array([number for jobs in groups for number in jobs.numbers.tolist()], pa.int64()),
-        "key": pa.array([key for jobs in groups for key in jobs.hashes()], pa.string()),
-        "scene": pa.array([jobs.scene.name for jobs in groups for _ in range(len(jobs))], pa.string()),
-        "engine": pa.array([label for jobs in groups for label in jobs.labels()], pa.string()),
-        "dt": pa.array([dt for jobs in groups for dt in jobs.dts.tolist()], pa.float64()),
-        "seed": pa.array([seed for jobs in groups for seed in jobs.starts()], pa.int64()),
-    }
+    identified = {"job": jobs.numbers, "key": jobs.hashes(), "scene": [jobs.scene.name] * len(jobs), "engine": jobs.labels()}
+    columns: dict[str, Any] = identified | {"dt": jobs.dts, "seed": pa.array(jobs.starts(), pa.int64())}
     for axis in sweep.axes:
         if axis.name != "dt":
-            values = [value for jobs in groups for value in jobs.values[axis.name].tolist()]
-            columns[axis.name] = pa.array(values, pa.float64()) if axis.is_numeric else pa.array(map(_as_text, values), pa.string())
-    columns["verdict"], columns["reason"] = (pa.array(texts, pa.string()) for texts in (found.verdict, found.reason))
-    numbers = ((STATE_COLUMNS, found.state), (STANDARD_METRICS, found.standard_metrics), (sweep.metrics, found.metrics))
-    for names, array in numbers:
-        columns.update({name: pa.array(column, pa.float64()) for name, column in zip(names, array.T, strict=True)})
-    columns["steps"] = pa.array(found.steps, pa.int64())
-    columns["time_per_step"] = pa.array(found.time_per_step, pa.float64())
-    return pa.table(columns)
-
-
-def _as_text(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
+            values = jobs.values[axis.name]
+            columns[axis.name] = values if axis.is_numeric else [one if isinstance(one, str) else json.dumps(one) for one in values]
+    columns |= {"verdict": found.verdict, "reason": found.reason}
+    for names, array in ((STATE_COLUMNS, found.state), (STANDARD_METRICS, found.standard_metrics), (sweep.metrics, found.metrics)):
+        columns |= dict(zip(names, array.T, strict=True))
+    return pa.table(columns | {"steps": found.steps, "time_per_step": found.time_per_step})

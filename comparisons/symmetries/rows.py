@@ -8,8 +8,8 @@ import pandas as pd
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
 from dropspin.comparisons.measuring.symmetries import BITWISE, kind_of
 from dropspin.comparisons.measuring.tolerances import MATTERS
-from dropspin.comparisons.results.measurement import Measurement, as_table
 from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.comparisons.symmetries.findings import BY_CHANCE, Finding
 
 

@@ -22,12 +22,12 @@ def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> No
     RUN is a folder that dropspin run -o wrote, or a folder of such folders. Runs are sorted by start time.
     """
     from dropspin.comparisons.regressions.history import history
-    from dropspin.reports.output import folder_made
+    from dropspin.comparisons.results.folder import study_folder
     from dropspin.reports.study_files import write_history
     from dropspin.reports.terminal.progress import status
     from dropspin.reports.views import history as view
 
-    with folder_made(output) as folder:
+    with study_folder(output) as folder:
         with status("reading the runs"):
             found = history(_load_runs(_find_runs(runs)))
         with status("drawing"):

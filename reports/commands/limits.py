@@ -49,10 +49,10 @@ def limits_command(
     The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them; this
     takes some minutes.
     """
+    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.robustness.axes import AXES
     from dropspin.comparisons.robustness.study import SCENES, find_limits
     from dropspin.comparisons.running.processes import ResourceLimits
-    from dropspin.reports.output import folder_made
     from dropspin.reports.study_files import write_limits
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_rows, print_sentences
@@ -64,7 +64,7 @@ def limits_command(
         raise click.UsageError("two scenes have the same name, which is that of the file; rename one of the files.")
     having = [scene for scene in loaded if all(AXES[name].applies(scene) for name in {*axes} & AXES.keys())]
     found = []
-    with folder_made(output) as folder:
+    with study_folder(output) as folder:
         for scene in having or loaded[:1]:  # the error of find_limits lists the axes of a scene
             with share_bar(scene.name) as progress:
 

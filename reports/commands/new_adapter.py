@@ -22,13 +22,13 @@ def new_adapter_command(name: str, output: str) -> None:
 
     NAME is the name of a Python module, such as my_engine. The class in it is then MyEngine, and results have the name my-engine.
     """
-    from dropspin.reports.output import folder_made
+    from dropspin.comparisons.results.folder import study_folder
     from dropspin.scenarios import DropspinError
 
     adapter = _class_name(name)
     names = {"my_engine": name, "MyEngine": adapter, "my-engine": name.replace("_", "-")}
     targets = {"my_engine.py": f"{name}.py", "test_my_engine.py": f"test_{name}.py"}
-    with folder_made(output) as unfinished:
+    with study_folder(output) as unfinished:
         for path in (Path(output, target) for target in (name, *targets.values())):  # a package would hide the module
             if path.exists():
                 raise DropspinError(f"{path}: exists already; choose another name, or another folder with -o.")

@@ -23,7 +23,7 @@ def write_text(path: str, text: str, *, append: bool = False) -> None:
     Raises:
         DropspinError: The file cannot be written.
     """
-    from dropspin.comparisons.results.output import written_whole
+    from dropspin.comparisons.results.folder import written_whole
     from dropspin.scenarios import DropspinError
 
     target = Path(path)

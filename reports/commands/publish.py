@@ -18,8 +18,8 @@ def publish_command(record: str, output: str) -> None:
     links to the documentation.
     """
     from dropspin.comparisons.record.findings import others, read
+    from dropspin.comparisons.results.folder import replaced_folder
     from dropspin.reports.html.record import INDEX, Site, files_of_site
-    from dropspin.reports.run_folder import replaced_folder
 
     found = read(record)
     docs = "../" if (Path(output).resolve().parent / "problems.html").is_file() else ""

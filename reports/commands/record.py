@@ -31,7 +31,7 @@ def record_command(
     """
     from dropspin.comparisons.record.plan import load_plan
     from dropspin.comparisons.record.store import Record
-    from dropspin.comparisons.record.study import Release, record
+    from dropspin.comparisons.record.study import record
     from dropspin.comparisons.running.parallel import as_jobs
     from dropspin.scenarios.text import counted
 
@@ -42,9 +42,9 @@ def record_command(
         echo(f"{counted(len(folder.merge(sent)), 'file')} added to {output}, as unsigned")
         return
 
-    def on_done(one: Release, left: int) -> None:
+    def on_done(release: str, left: int) -> None:
         stop_if_interrupted()
-        echo(f"{one.engine} {one.release}: {one.reason or f'{one.results} results'} ({left} left)", err=True)
+        echo(f"{release} ({left} left)", err=True)
 
     try:
         record(folder, load_plan(), engines, releases, jobs=as_jobs(jobs), scheduler=scheduler, time_limit=time_limit, on_done=on_done)

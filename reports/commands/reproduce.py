@@ -25,15 +25,15 @@ def reproduce_command(names: tuple[str, ...], time_limit: float, output: str, js
     """
     from dropspin.comparisons.published.sources import sources
     from dropspin.comparisons.published.study import reproduce
+    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.running.processes import ResourceLimits
-    from dropspin.reports.output import folder_made
     from dropspin.reports.study_files import write_reproduced
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_rows, print_sentences
     from dropspin.reports.views import reproduce as view
 
     chosen = sources(names)
-    with folder_made(output) as folder:
+    with study_folder(output) as folder:
         with share_bar("reproduce") as progress:
 
             def on_progress(what: str, share: float) -> None:

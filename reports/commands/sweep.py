@@ -26,7 +26,8 @@ def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, t
     Exit code: 0 all jobs were run, 2 bad input, 3 an engine broke down in a job or is missing.
     """
     from dropspin.comparisons.running.processes import ResourceLimits
-    from dropspin.comparisons.sweeps.running import count, run_sweep
+    from dropspin.comparisons.sweeps.folder import count
+    from dropspin.comparisons.sweeps.running import run_sweep
     from dropspin.comparisons.sweeps.spec import load_sweep
     from dropspin.reports.terminal.progress import jobs_bar
     from dropspin.reports.terminal.rows import print_rows

@@ -37,15 +37,15 @@ def symmetries_command(
 
     Exit code: 0 whatever is found, 2 bad input; `dropspin run --symmetries` judges.
     """
+    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.running.processes import ResourceLimits
     from dropspin.comparisons.symmetries.study import SCENES
-    from dropspin.reports.output import folder_made
     from dropspin.reports.study_files import write_symmetries
     from dropspin.reports.terminal.rows import print_rows, print_sentences
     from dropspin.reports.views import symmetries as view
     from dropspin.scenarios import load
 
-    with folder_made(output) as folder:
+    with study_folder(output) as folder:
         loaded = [load(name) for name in scenes or SCENES]
         found = with_progress(loaded, engines, dt, ResourceLimits(processor_time=time_limit), jobs)
         write_symmetries(found, {scene.name: scene for scene in loaded}, dt, folder)

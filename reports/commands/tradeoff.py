@@ -52,8 +52,8 @@ def tradeoff_command(
 
     The default is the scene spin-asymmetric, with engines and methods that give different results for it.
     """
+    from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.tradeoff.study import tradeoff
-    from dropspin.reports.output import folder_made
     from dropspin.reports.study_files import write_tradeoff
     from dropspin.reports.terminal.progress import share_bar
     from dropspin.reports.terminal.rows import print_rows, print_sentences
@@ -61,7 +61,7 @@ def tradeoff_command(
     from dropspin.scenarios import load
 
     loaded, found = [load(name) for name in scenes or ("spin-asymmetric",)], []
-    with folder_made(output) as folder:
+    with study_folder(output) as folder:
         for scene in loaded:
             with share_bar(scene.name) as progress:
 

@@ -12,7 +12,7 @@ from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.provenance import first_settings
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results
-from dropspin.comparisons.results.stored_table import OF_SYMMETRIES
+from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
 from dropspin.reports.pages import page
 from dropspin.reports.plots.chart import Chart

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.results.output import written_whole
+from dropspin.comparisons.results.folder import written_whole
 from dropspin.reports.replay.bodies import Outline, outline
 from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios import DropspinError

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS
-from dropspin.comparisons.sweeps.running import read_sweep_parts
+from dropspin.comparisons.sweeps.folder import read_sweep_parts
 from dropspin.reports.views.numbers import formatted, word
 
 WORST_OF = ("energy_drift", "energy_gain", "penetration")

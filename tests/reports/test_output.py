@@ -6,8 +6,8 @@ import json
 import pytest
 from support.cli import dropspin
 
-from dropspin.comparisons.results.output import written_whole
-from dropspin.reports.output import folder_made, write_table
+from dropspin.comparisons.results.folder import study_folder, written_whole
+from dropspin.reports.output import write_table
 
 
 @pytest.mark.parametrize("verb", ["limits", "tradeoff"])
@@ -25,12 +25,12 @@ def test_an_output_folder_that_cannot_be_written_fails_before_the_work(verb, fol
 def test_an_output_folder_that_stays_empty_is_removed(tmp_path):
     """With the parents that were created for it; a folder that holds a file stays, and so does one that existed before."""
     (tmp_path / "before").mkdir()
-    with folder_made(str(tmp_path / "before/new/inside")) as folder:
+    with study_folder(str(tmp_path / "before/new/inside")) as folder:
         assert folder.is_dir()
     assert list(tmp_path.rglob("*")) == [tmp_path / "before"]
-    with folder_made(str(tmp_path / "before")):
+    with study_folder(str(tmp_path / "before")):
         pass
-    with folder_made(str(tmp_path / "filled/inside")) as folder:
+    with study_folder(str(tmp_path / "filled/inside")) as folder:
         (folder / "table.csv").touch()
     assert (tmp_path / "before").is_dir()
     assert (tmp_path / "filled/inside/table.csv").exists()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from dropspin.comparisons.results.measurement import as_table
 from dropspin.comparisons.results.store import save
+from dropspin.comparisons.results.table import as_table
 from dropspin.reports import plots
 from dropspin.reports.plots.colours import EXACT, engine_styles
 from dropspin.reports.plots.figures import ensemble_charts

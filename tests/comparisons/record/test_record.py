@@ -21,7 +21,7 @@ from dropspin.comparisons.record import environments, release, study
 from dropspin.comparisons.record.environments import NotInstallable, NotMeasured, measured, without_paths
 from dropspin.comparisons.record.plan import Plan, load_plan
 from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, Stored, machine
-from dropspin.comparisons.results.stored_files import sha256
+from dropspin.comparisons.results.folder import sha256
 from dropspin.comparisons.running.recording import TimedSteps
 from dropspin.scenarios import DropspinError, load
 

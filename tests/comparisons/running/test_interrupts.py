@@ -7,8 +7,8 @@ import sys
 import pytest
 from filelock import FileLock
 
+from dropspin.comparisons.results.folder import unfinished_folder
 from dropspin.comparisons.results.interrupts import interrupts_deferred
-from dropspin.comparisons.results.output import unfinished_folder
 
 PLANTED = """
 import os, signal, time

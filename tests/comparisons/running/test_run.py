@@ -11,7 +11,7 @@ from support.scenes import standing
 import dropspin as ds
 from dropspin import scenarios
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
-from dropspin.comparisons.results.measurement import COLUMNS
+from dropspin.comparisons.results.table import COLUMNS
 from dropspin.scenarios import DropspinError, SceneError
 
 BALL = ds.load("drop-ball")

@@ -19,8 +19,9 @@ import pytest
 from dropspin.comparisons.engines.base import EngineMissing
 from dropspin.comparisons.running import cluster as connection
 from dropspin.comparisons.running.processes import ResourceLimits
-from dropspin.comparisons.sweeps import cluster
-from dropspin.comparisons.sweeps.running import read_sweep, run_sweep
+from dropspin.comparisons.sweeps import running
+from dropspin.comparisons.sweeps.folder import read_sweep
+from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.comparisons.sweeps.work import Work
 from dropspin.scenarios import DropspinError
@@ -98,7 +99,7 @@ def test_worker_that_may_not_start_processes_is_reported(tmp_path, monkeypatch):
     work = Work.of(load_sweep(SPEC), ResourceLimits())
     monkeypatch.setattr(multiprocessing, "current_process", lambda: SimpleNamespace(daemon=True))
     with pytest.raises(DropspinError, match="set DASK_DISTRIBUTED__WORKER__DAEMON=False where workers are started"):
-        cluster._run_part(work, next(work.parts), str(tmp_path))
+        running._run_on_worker(work, str(tmp_path), next(work.parts))
 
 
 def test_missing_scheduler_and_missing_dask_are_reported(tmp_path, monkeypatch):
@@ -133,7 +134,7 @@ def test_sweep_that_was_refused_before_its_first_job_can_be_given_again(tmp_path
     """With another spec too, and without --resume: the folder holds no row."""
     monkeypatch.setattr("dropspin.comparisons.sweeps.running.connected", lambda scheduler: nullcontext())
     refuse = mock.Mock(side_effect=DropspinError("a worker has mujoco 3.1, this machine has 4.0; install the same on both."))
-    monkeypatch.setattr("dropspin.comparisons.sweeps.running.run_on_cluster", refuse)
+    monkeypatch.setattr("dropspin.comparisons.sweeps.running._run_on_cluster", refuse)
     for spec in (SPEC, SPEC | {"dts": [8e-3]}):
         with pytest.raises(DropspinError, match="install the same on both"):
             run_sweep(load_sweep(spec), str(tmp_path / "out"), scheduler="tcp://host:8786")
@@ -148,7 +149,7 @@ def test_worker_with_other_versions_refuses_its_part(tmp_path):
     work = Work.of(load_sweep(SPEC), ResourceLimits())
     other = replace(work, versions=work.versions | {"mujoco": "3.1"})
     with pytest.raises(DropspinError, match=r"a worker has mujoco \d.*, this machine has 3.1; install the same on both"):
-        cluster._run_part(other, next(other.parts), str(tmp_path))
+        running._run_on_worker(other, str(tmp_path), next(other.parts))
 
 
 class ProcessesHere:
@@ -169,17 +170,17 @@ class ProcessesHere:
 
 def test_engine_processes_of_another_sweep_are_closed(tmp_path, monkeypatch):
     """A worker that has served another sweep, or other resource limits, ends the engines of that one first."""
-    monkeypatch.setattr(cluster, "_reschedule_if_closing", lambda: None)
-    monkeypatch.setattr(cluster, "EngineProcesses", ProcessesHere)
+    monkeypatch.setattr(running, "_reschedule_if_closing", lambda: None)
+    monkeypatch.setattr(running, "EngineProcesses", ProcessesHere)
     used = []
     for seconds in (5.0, 6.0):
         work = Work.of(load_sweep(SPEC | {"engines": ["wang"]}), ResourceLimits(processor_time=seconds))
-        cluster._run_part(work, next(work.parts), str(tmp_path / str(seconds)))
-        [(owner, [processes])] = cluster._idle.items()
+        running._run_on_worker(work, str(tmp_path / str(seconds)), next(work.parts))
+        [(owner, [processes])] = running._idle.items()
         used.append(processes)
         assert owner == (work.identity, work.resources)
     assert used[0] is not used[1]
     assert (used[0].closed, used[1].closed) == (True, False)
-    cluster._close_idle_processes()
+    running._close_idle_processes()
     assert used[1].closed
-    assert not cluster._idle
+    assert not running._idle

@@ -16,10 +16,9 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, last_time_in_motion
 from dropspin.comparisons.measuring.motions import Setup
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
-from dropspin.comparisons.sweeps.any_engine import run_single
-from dropspin.comparisons.sweeps.dispatch import run_jobs
-from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, standard_metrics
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, run_scenes, standard_metrics
 from dropspin.comparisons.sweeps.spec import load_sweep
+from dropspin.comparisons.sweeps.work import run_jobs
 from dropspin.scenarios import load, names
 
 SCENES = [name for name in names() if "slow" not in load(name).tags]
@@ -94,8 +93,7 @@ def run_one_by_one(sweep):
     found = []
     for jobs in sweep.jobs(0, sweep.size):
         outcomes = Outcomes.empty(len(jobs), len(sweep.metrics))
-        for index in range(len(jobs)):
-            run_single(jobs, index, outcomes, sweep.metrics)
+        run_scenes(jobs, outcomes, sweep.metrics, in_batches=False)
         found.append(outcomes)
     return concatenated(found)
 

@@ -21,7 +21,8 @@ from support import engines as test_engines
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.processes import Closed, ResourceLimits
-from dropspin.comparisons.sweeps.running import read_sweep, run_sweep
+from dropspin.comparisons.sweeps.folder import read_sweep
+from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.comparisons.sweeps.work import Work
 from dropspin.scenarios import DropspinError
@@ -176,7 +177,7 @@ def test_resuming_runs_only_the_missing_parts(tmp_path):
     shutil.copytree(tmp_path / "whole", tmp_path / "out")
     parts = sorted((tmp_path / "out").rglob("*.parquet"))
     assert len(parts) > 1
-    left = tmp_path / "out" / ".unfinished-killed00"
+    left = parts[0].with_name(f".{parts[0].name}-unfinished-killed00")
     left.mkdir()
     parts[0].rename(left / "new")
     stamps = [part.stat().st_mtime_ns for part in parts[1:]]
@@ -261,7 +262,7 @@ def test_killed_sweep_is_resumed_to_the_same_table(tmp_path):
     assert killed_and_resumed(spec, tmp_path / "killed", kills=3, seed=1) == 3
     assert_same(tmp_path / "killed", tmp_path / "whole")
     assert len(table(tmp_path / "whole")) == 240
-    assert not list((tmp_path / "killed").rglob(".unfinished*"))
+    assert not list((tmp_path / "killed").rglob(".*"))
     assert processes_of(tmp_path / "killed") == []
 
 

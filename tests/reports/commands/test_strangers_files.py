@@ -13,7 +13,8 @@ from support.cli import assert_refused, dropspin
 from support.run_folders import change_json, change_table, contents
 
 from dropspin.comparisons.running.run import run
-from dropspin.comparisons.sweeps.running import read_sweep, run_sweep
+from dropspin.comparisons.sweeps.folder import read_sweep
+from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.reports.run_folder import write_report
 from dropspin.scenarios import DropspinError, load

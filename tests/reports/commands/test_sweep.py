@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from support.cli import DROPSPIN, dropspin
 
-from dropspin.comparisons.sweeps.running import read_sweep
+from dropspin.comparisons.sweeps.folder import read_sweep
 
 SPEC = """
 scenes  = ["drop-ball"]

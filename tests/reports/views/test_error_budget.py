@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pandas as pd
 import pytest
 
-from dropspin.comparisons.results.measurement import Measurement, as_table
+from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.reports.views.error_budget import error_budgets
 
 

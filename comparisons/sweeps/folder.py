@@ -111,7 +111,7 @@ class SweepFolder:
         """The paths of the parts, by the numbers of their jobs, in order."""
         self._files.invalidate_cache()
         pattern = re.compile(rf"(\d{{16}})-(\d{{16}})-{self._identity or '[0-9a-f]{12}'}\.parquet")
-        matches = {path: pattern.fullmatch(os.path.basename(path)) for path in self._files.find(f"{self._root}/parts")}
+        matches = {path: pattern.fullmatch(os.path.basename(path)) for path in self._files.find(f"{self._root}/parts", withdirs=True)}
         found = {range(int(match[1]), int(match[2])): path for path, match in matches.items() if match}
         return dict(sorted(found.items(), key=lambda part: part[0].start))
 

@@ -97,7 +97,7 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
     tables: dict[str, list[list[dict[str, Any]]]] = {}
     for path in sorted((Path(folder) / OWN).glob("*.parquet")):
         one = stored(path)
-        tables.setdefault(one.engine, []).append(one.rows())
+        tables.setdefault(one.engine, []).append(one.rows)
     if not tables:
         raise DropspinError(f"{folder}: has no release that was measured here; give a folder that dropspin record wrote.")
     found = {engine: _of_one_machine(own) for engine, own in tables.items()}
@@ -131,7 +131,7 @@ def others(folder: str | Path, own: Mapping[str, Sequence[Release]]) -> dict[str
     found: dict[str, list[Other]] = {}
     for path in sorted((Path(folder) / OTHERS).glob("*.parquet")):
         one = stored(path)
-        sent = release_of(one.rows())
+        sent = release_of(one.rows)
         here = next((release.cases for release in own.get(one.engine, ()) if release.name == sent.name), {})
         pairs = [(case, here[key]) for key, case in sent.cases.items() if key in here]
         same = sum((case.verdict, case.trajectory) == (mine.verdict, mine.trajectory) for case, mine in pairs)

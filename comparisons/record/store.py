@@ -10,10 +10,9 @@ import math
 import platform
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -54,27 +53,13 @@ def machine() -> dict[str, str]:
     return {"processor": processor(), "system": system, "python": platform.python_version()}
 
 
-@dataclass(frozen=True)
-class Stored:
-    """A file of the record: its path, the engine and release that its name has, and its content."""
+class Stored(NamedTuple):
+    """A file of the record: its path, its engine, its content, and its rows."""
 
     path: Path
     engine: str
-    release: str
     content: bytes
-
-    def rows(self) -> list[dict[str, Any]]:
-        """The rows, if the file is what `write` wrote.
-
-        Raises:
-            DropspinError: It is not.
-        """
-        try:
-            rows = stored_table(self.content, SCHEMA).to_pylist()
-            _verify(rows, self.engine, self.release)
-        except Exception as error:  # whatever pyarrow raises for a file that is none
-            raise DropspinError(f"{self.path.name}: refused: {' '.join(str(error).split())}.") from None
-        return rows
+    rows: list[dict[str, Any]]
 
 
 class Record:
@@ -98,7 +83,7 @@ class Record:
     def own(self, engine: str, release: str) -> Iterator[tuple[Path, list[dict[str, Any]]]]:
         """The files that were measured here of a release, and their rows."""
         for path in sorted((self.folder / OWN).glob(f"{engine}-{release}-*.parquet")):
-            yield path, stored(path).rows()
+            yield path, stored(path).rows
 
     def has(self, engine: str, release: str, same: Row) -> bool:
         """Whether a release is measured, with this plan, adapter and machine; one that was not installable may be another day."""
@@ -147,8 +132,6 @@ class Record:
         """
         sent = [stored(path) for place in places for path in _files(Path(place))]
         known = {path.name for path in self.folder.rglob("*.parquet")}
-        for one in sent:
-            one.rows()
         new = {one.path.name: one for one in sent if one.path.name not in known}
         for name, one in new.items():
             with written_whole(self.folder / OTHERS / name) as unfinished:
@@ -157,7 +140,7 @@ class Record:
 
 
 def stored(path: Path) -> Stored:
-    """A file of the record whose content has the hash in its name.
+    """A file of the record: what `Record.write` wrote, with the hash of the content in its name.
 
     Raises:
         DropspinError: It is not such a file, or it was changed.
@@ -171,7 +154,12 @@ def stored(path: Path) -> Stored:
         raise DropspinError(f"{path.name}: cannot be read: {error}.") from None
     if sha256(content)[:HASH] != named[3]:
         raise DropspinError(f"{path.name}: refused: it was changed or damaged; its content does not have the hash in its name.")
-    return Stored(path, named[1], named[2], content)
+    try:
+        rows = stored_table(content, SCHEMA).to_pylist()
+        _verify(rows, named[1], named[2])
+    except Exception as error:  # whatever pyarrow raises for a file that is none
+        raise DropspinError(f"{path.name}: refused: {' '.join(str(error).split())}.") from None
+    return Stored(path, named[1], content, rows)
 
 
 def _files(place: Path) -> list[Path]:

@@ -27,11 +27,12 @@ from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.body import Body
 from dropspin.scenarios.ensemble import clearances, spread_starts
 from dropspin.scenarios.model import TOUCHING, unit
-from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION
+from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+FRICTION = "floor.friction"
 ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}
 
 
@@ -41,8 +42,8 @@ def run_side_by_side(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...]) -
         group = jobs[indices]
         engine, scene = group.engine_at(0), _representative_scene(group)
         # The steps that a sequential contact leaves unsolved are reported for each job, and are counted only for a job by itself.
-        if isinstance(engine, Wang) and engine.option("contact") == "mean" and scene is not None:
-            steps = np.where(_is_accepted(group, engine, scene), _steps(group, scene), 0)
+        if isinstance(engine, Wang) and engine.option("contact") == "mean" and scene is not None and engine.declines(scene) is None:
+            steps = _steps(group, scene)
             order = np.argsort(steps, kind="stable")[np.count_nonzero(steps == 0) :]
             for batch in _batches(steps[order]):
                 chosen = order[batch]
@@ -57,8 +58,9 @@ def _is_array_field(name: str, column: NDArray[Any]) -> bool:
 
 
 def _groups(jobs: Jobs) -> Iterator[Indices]:
-    """The indices of jobs that differ only in fields that the kernels take as arrays."""
+    """The indices of jobs that differ only in fields that the kernels take as arrays, and that all have friction or none, as laws need."""
     columns = [column for name, column in jobs.values.items() if name.startswith(OPTION) or not _is_array_field(name, column)]
+    columns += [column > 0.0 for name, column in jobs.values.items() if name == FRICTION and column.dtype == float]
     if not columns:
         yield np.arange(len(jobs))
         return
@@ -70,8 +72,9 @@ def _groups(jobs: Jobs) -> Iterator[Indices]:
 
 def _representative_scene(jobs: Jobs) -> Scenario | None:
     """A scene with the structure of all jobs of a group; the fields that differ are passed as arrays. None if no such scene is valid."""
-    shared = [(name, column[0]) for name, column in jobs.fields.items() if not _is_array_field(name, column)]
-    for others in ((), jobs.fields.items()):
+    fields = jobs.fields.items()
+    shared = [(name, column[0]) for name, column in fields if name == FRICTION or not _is_array_field(name, column)]
+    for others in ((), fields):
         try:
             return with_fields(jobs.scene, [*shared, *((name, column[0]) for name, column in others)])
         except SceneError:
@@ -127,18 +130,6 @@ def _batches(steps: NDArray[np.int64]) -> Iterator[slice]:
         first = last
 
 
-def _is_accepted(jobs: Jobs, engine: Wang, scene: Scenario) -> NDArray[np.bool_]:
-    """Which jobs have a friction that the engine's impact law supports; that depends only on whether there is friction."""
-    friction = jobs.fields.get("floor.friction")
-    if friction is None or friction.dtype == object:
-        return np.full(len(jobs), engine.declines(scene) is None)
-    accepted = np.zeros(len(jobs), dtype=bool)
-    for selected in (friction > 0.0, friction == 0.0):
-        if selected.any():
-            accepted[selected] = engine.declines(with_fields(scene, [("floor.friction", float(friction[selected][0]))])) is None
-    return accepted
-
-
 def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, reference_impl.World, Setup, Array, NDArray[np.bool_]]:
     """Bodies, worlds and starts of jobs for the kernels, what moves for the metrics, and which jobs are ordinary.
 
@@ -155,7 +146,7 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
         vertices=vertices,
         rounding=radius,
         size=np.array([body.size for body in bodies]),
-        origin=_origins(scene, starts, np.array([body.resting_height for body in bodies])),
+        origin=starts[:, POSITION] if scene.floor is None else np.outer([body.resting_height for body in bodies], UP),
         clearance=clearances(starts, vertices, radius),
         gravity=np.zeros((1, 3)) if world.gravity is None else world.gravity,
         damping=None if world.damping is None else np.asarray(world.damping[0]),
@@ -220,10 +211,3 @@ def _starts(jobs: Jobs, scene: Scenario, columns: dict[Path, Array], vertices: A
         return starts
     assert scene.ensemble is not None
     return spread_starts(starts, scene.ensemble, jobs.seeds, vertices, radius, scene.floor is not None)
-
-
-def _origins(scene: Scenario, starts: Array, resting_heights: Array) -> Array:
-    """Where the potential energy of each job is 0 [m], shape (B, 3): as `dropspin.scenarios.mechanics.energy_origin`."""
-    if scene.floor is None:
-        return starts[:, POSITION]
-    return np.outer(resting_heights, [0.0, 1.0, 0.0])

@@ -1,6 +1,6 @@
 """The outcomes of jobs, as arrays: verdicts, final states and metrics; and those of jobs whose scenes are built, by any engine."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.batch import motions_side_by_side
-from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, energy_drift, energy_gain, penetration
 from dropspin.comparisons.measuring.motions import Motions, Setup
 from dropspin.comparisons.running.inputs import verify_time_step
@@ -107,16 +107,7 @@ def requested_metrics(scene: Scenario, motion: Trajectory, names: Sequence[str])
     """Metrics of one motion; NaN where one does not apply to the scene, or the time step is too coarse for it."""
     truth = truth_for(scene)
     case = Comparison.with_truth(scene, motion, truth)
-    return [_value(METRICS[name].measure, case) if METRICS[name].applies(scene, truth) else np.nan for name in names]
-
-
-def _value(measure: Callable[[Comparison], float | Array], case: Comparison) -> float:
-    """The value of largest magnitude, with its sign."""
-    try:
-        values = np.atleast_1d(measure(case)).ravel()
-    except Unresolved:
-        return np.nan
-    return float(values[np.argmax(np.abs(values))])
+    return [METRICS[name].value_or_nan([case]) if METRICS[name].applies(scene, truth) else np.nan for name in names]
 
 
 class _Built(NamedTuple):

@@ -6,7 +6,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dropspin.comparisons.record.store import stored
+from dropspin.comparisons.record.store import HASH, stored
+from dropspin.comparisons.results.folder import sha256
 
 RECORD = Path(__file__).parents[3] / "record"
 
@@ -16,9 +17,10 @@ def numbers(release):
 
 
 def test_no_file_was_changed():
-    files = [stored(path) for path in sorted(RECORD.rglob("*.parquet"))]
-    assert len({(one.engine, one.release) for one in files}) >= 40
-    assert all(one.rows() for one in files[::20])
+    paths = sorted(RECORD.rglob("*.parquet"))
+    assert len({path.name.rpartition("-")[0] for path in paths}) >= 40
+    assert all(path.stem.endswith(f"-{sha256(path.read_bytes())[:HASH]}") for path in paths)
+    assert all(stored(path).rows for path in paths[::20])
 
 
 @pytest.mark.parametrize(

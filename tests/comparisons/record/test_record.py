@@ -20,7 +20,7 @@ from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.record import environments, release, study
 from dropspin.comparisons.record.environments import NotInstallable, NotMeasured, measured, without_paths
 from dropspin.comparisons.record.plan import Plan, load_plan
-from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, Stored, machine
+from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, machine, stored
 from dropspin.comparisons.results.folder import sha256
 from dropspin.comparisons.running.recording import TimedSteps
 from dropspin.scenarios import DropspinError, load
@@ -325,10 +325,11 @@ def test_a_file_with_any_changed_byte_is_refused_or_read(two_records):
     for place in range(0, len(content), max(1, len(content) // 100)):
         changed = bytearray(content)
         changed[place] ^= 0x55
-        name = f"wang-1.2-{sha256(changed)[:HASH]}.parquet"
+        changed_file = path.with_name(f"wang-1.2-{sha256(changed)[:HASH]}.parquet")
+        changed_file.write_bytes(changed)
         try:
-            Stored(Path(name), "wang", "1.2", bytes(changed)).rows()
+            stored(changed_file)
         except DropspinError as error:
-            refused.append(str(error).startswith(f"{name}: refused: "))
+            refused.append(str(error).startswith(f"{changed_file.name}: refused: "))
     assert len(refused) > 50
     assert all(refused)

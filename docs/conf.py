@@ -31,7 +31,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def write_catalogue(_: Any) -> None:
     """Write the page with the lists of `dropspin list`."""
-    from dropspin.reports.views import listings
+    from dropspin.reports.stories import listings
 
     listed = {"Scenes": listings.scene_rows(), "Engines": listings.engine_rows(), "Metrics": listings.metric_rows()}
     parts = ["# Scenes, engines, metrics", *(f"## {title}\n\n{table(rows)}" for title, rows in listed.items())]

@@ -10,8 +10,8 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
-from dropspin.reports.views.failures import reproduce, what_fails
-from dropspin.reports.views.numbers import step, subject, word
+from dropspin.reports.stories.failures import reproduce, what_fails
+from dropspin.reports.stories.numbers import step, subject, word
 
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "known", "limited", "declined", "missing"}
 

@@ -1,53 +1,43 @@
-"""Markdown pages: a short report of a run, summaries of checks and comparisons for pull requests, and histories."""
+"""A document as Markdown."""
 
-from collections.abc import Mapping, Sequence
+import re
 
-from dropspin.comparisons.regressions.checking import Checked
-from dropspin.comparisons.regressions.comparing import Changes
-from dropspin.comparisons.results.provenance import versions_behind
-from dropspin.comparisons.results.results import Results
-from dropspin.reports.pages import page
-from dropspin.reports.views import check, compare
-from dropspin.reports.views.failures import Failure, grouped
-from dropspin.reports.views.impact_laws import NOTE
-from dropspin.reports.views.run import Overview
-
-MOST_SENTENCES = 24
-"""Largest number of sentences on the failures of one engine in a summary; JUnit and JSON have all failures."""
+from dropspin.comparisons.results.folder import file_name
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 
 
-def run_markdown(results: Results, summary: Overview) -> str:
-    """A short report of a run."""
-    return page("report.md", **vars(summary), engines=results.engines, provenance=results.provenance, note_on_laws=NOTE)
+def markdown(document: Document, level: int = 1) -> str:
+    """The page, whose title is a heading of a level."""
+    parts = [_block(part, level + 1) for part in (*document.summary, *document.parts)]
+    return "\n\n".join(filter(None, [_block(Heading(document.title), level), *parts])) + "\n"
 
 
-def check_markdown(checked: Checked, file: check.BaselineFile | None, found: Sequence[Failure]) -> str:
-    """The outcome of a check."""
-    results = checked.results
-    return page(
-        "check.md",
-        sentences=[check.scope(file), *check.sentences(checked, file)],
-        groups=grouped(results, found, None if file is None else file.path),
-        most=MOST_SENTENCES,
-        engines=results.engines,
-        tallies={engine: _tally(results, engine) for engine in results.engines},
-        versions=versions_behind(results.provenance),
-        cpu=results.provenance["cpu"],
-    )
+def escaped(text: str) -> str:
+    """Text without markup, in one line."""
+    return re.sub(r"([\\|`*_\[\]<>#])", r"\\\1", " ".join(text.split()))
 
 
-def compare_markdown(changes: Changes) -> str:
-    """The changes between two runs."""
-    return page("compare.md", held=not len(changes.regressions), tables=compare.tables(changes), sentences=compare.sentences(changes))
+def code(text: str) -> str:
+    """Text as code; the fence is longer than any sequence of backticks in the text."""
+    fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
+    room = " " if len(fence) > 1 else ""
+    return f"{fence}{room}{text}{room}{fence}"
 
 
-def history_markdown(runs: int, sentences: Sequence[str], pictures: Mapping[str, str]) -> str:
-    """A history of runs, with a picture for each scene: by name, its file."""
-    return page("history.md", runs=runs, sentences=sentences, pictures=pictures)
-
-
-def _tally(results: Results, engine: str) -> dict[str, int]:
-    """The number of checks of an engine with each verdict, and of those in which it broke down or is missing."""
-    mine = results.table["engine"] == engine
-    verdicts = results.table.loc[mine, "verdict"].value_counts()
-    return {str(verdict): int(count) for verdict, count in verdicts.items()} | {"broke down": int(results.breakdowns[mine].sum())}
+def _block(part: Part, level: int) -> str:
+    match part:
+        case Heading(text):
+            return f"{'#' * level} {escaped(text)}"
+        case Paragraph(text, command, style):
+            content = f"**{escaped(text)}**" if style == "bold" else escaped(text)
+            return f"{content} {code(command)}" if command else content
+        case Sentences(items, numbered, commands=commands):
+            below = [f"<br>{code(command)}" for command in commands] or [""] * len(items)
+            entries = map(str.__add__, map(escaped, items), below)
+            return "\n".join(f"{f'{number}.' if numbered else '-'} {entry}" for number, entry in enumerate(entries, 1))
+        case Charts(name):
+            return f"![{escaped(name)}]({file_name(name)}.svg)"
+        case Table(rows) if rows:
+            head, *lines = [f"| {' | '.join(map(escaped, cells))} |" for cells in (rows[0], *(row.values() for row in rows))]
+            return "\n".join([head, f"|{'---|' * len(rows[0])}", *lines])
+    return ""

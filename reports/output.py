@@ -1,4 +1,4 @@
-"""Tables of studies as CSV and JSON."""
+"""Tables of studies as CSV and JSON, and data as JSON."""
 
 import csv
 import json
@@ -6,11 +6,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import to_jsonable_python
 
-def write_table(folder: Path, stem: str, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
+
+def write_table(folder: Path, stem: str, rows: Sequence[Mapping[Any, Any]]) -> None:
     """Write rows as CSV, and as JSON, in which numbers stay numbers."""
     with (folder / f"{stem}.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, columns)
+        writer = csv.DictWriter(file, dict.fromkeys(column for row in rows for column in row))
         writer.writeheader()
-        writer.writerows(rows)
-    (folder / f"{stem}.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
+        writer.writerows(_plain(rows))
+    (folder / f"{stem}.json").write_text(json_text(rows), encoding="utf-8")
+
+
+def json_text(data: object) -> str:
+    """Data as JSON with all digits; numbers that are not finite are null."""
+    return json.dumps(_plain(data), indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(data: object) -> Any:
+    return to_jsonable_python(data, inf_nan_mode="null", fallback=lambda number: number.item())  # numbers of NumPy

@@ -10,14 +10,14 @@ from dropspin.comparisons.results.folder import read_stored, replaced_folder
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.run_file import ARRAY_FILE, FILE, parsed
 from dropspin.comparisons.results.store import load_results, save
+from dropspin.reports.document import Document
 from dropspin.reports.html.report import html_report
 from dropspin.reports.junit import junit_xml
-from dropspin.reports.markdown import run_markdown
+from dropspin.reports.markdown import markdown
 from dropspin.reports.plots.chart import figure_of
 from dropspin.reports.plots.figures import CHARTS, report_charts
 from dropspin.reports.plots.svg import save_png, save_svg
-from dropspin.reports.sections import Section
-from dropspin.reports.views.run import overview
+from dropspin.reports.stories.run import document, overview
 
 OURS = frozenset(
     {"run.json", "results.parquet", "results.csv", "report.html", "report.md", "replay.html", "junit.xml", "plots"}
@@ -25,13 +25,13 @@ OURS = frozenset(
 )
 
 
-def write_report(results: Results, folder: str | Path, sections: Sequence[Section] = ()) -> Path:
+def write_report(results: Results, folder: str | Path, sections: Sequence[Document] = ()) -> Path:
     """Write a run: its data and the reports. An earlier run in the same folder is replaced.
 
     Args:
         results: The run.
         folder: The folder; it is created if it does not exist.
-        sections: Sections of studies to include in the report.
+        sections: Studies to include in the report.
 
     Returns:
         The path of report.html.
@@ -44,13 +44,13 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Sectio
     return Path(folder) / "report.html"
 
 
-def fill(results: Results, folder: Path, sections: Sequence[Section] = (), plots: Collection[str] = ()) -> None:
+def fill(results: Results, folder: Path, sections: Sequence[Document] = (), plots: Collection[str] = ()) -> None:
     """Write the data and the reports of a run into an empty folder, and its plots as files of these kinds, `svg` or `png`."""
     summary = overview(results)
     save(results, folder)
     results.table.to_csv(folder / "results.csv", index=False)
     (folder / "report.html").write_text(html_report(results, summary, sections), encoding="utf-8")
-    (folder / "report.md").write_text(run_markdown(results, summary), encoding="utf-8")
+    (folder / "report.md").write_text(markdown(document(results, summary), level=2), encoding="utf-8")
     (folder / "junit.xml").write_bytes(junit_xml(results))
     if plots:
         _write_plots(results, folder / "plots", plots)

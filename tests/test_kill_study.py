@@ -17,7 +17,7 @@ from support.cli import DROPSPIN
 from dropspin.comparisons.regressions.baseline import load_baseline
 from dropspin.comparisons.results.store import load_results
 from dropspin.comparisons.sweeps.folder import read_sweep
-from dropspin.reports.sections import read_section
+from dropspin.reports.study_files import read_study
 from dropspin.scenarios import DropspinError
 
 SIGNALS = 30
@@ -61,12 +61,12 @@ def jobs_of(folder):
 
 
 def limits_of(folder):
-    read_section(str(folder))
+    read_study(str(folder))
     return pd.read_json(folder / "limits.json", dtype=False)
 
 
 def configurations_of(folder):
-    read_section(str(folder))
+    read_study(str(folder))
     return pd.read_json(folder / "tradeoff.json", dtype=False)[["engine"]].drop_duplicates()  # all else depends on measured times
 
 

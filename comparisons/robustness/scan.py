@@ -3,13 +3,15 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
+
+from pydantic import Field, PlainSerializer, PlainValidator
 
 from dropspin.comparisons.robustness.axes import AXES, Axis
 from dropspin.comparisons.robustness.failure_modes import Diagnosis, FailureMode
 from dropspin.comparisons.robustness.operating_point import OperatingPoint
 from dropspin.comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
 from dropspin.comparisons.running.inputs import MOST_STEPS
-from dropspin.scenarios import Scenario
 
 NEAR = 1.03
 """Largest ratio of the two values of a transition."""
@@ -27,7 +29,7 @@ FINAL = frozenset({"sound", "declined", "crashed", "timed_out"})
 class ScanPoint:
     """The diagnosis of an engine at one value of an axis."""
 
-    value: float
+    value: Annotated[float, Field(allow_inf_nan=False)]
     diagnosis: Diagnosis
 
     @property
@@ -48,8 +50,9 @@ class Transition:
 class AxisScan:
     """The scan of an engine along an axis: its diagnoses in the order of their values; `base` is the nominal value."""
 
-    scene: Scenario
-    axis: Axis
+    axis: Annotated[
+        Axis, PlainValidator(lambda axis: AXES[axis] if isinstance(axis, str) else axis), PlainSerializer(lambda axis: axis.name)
+    ]
     engine: str
     base: float
     points: tuple[ScanPoint, ...]
@@ -116,7 +119,7 @@ def scan_axis(
     first = [point(value) for value in sorted({*axis.values(nominal), base, *points})]
     for low, high in pairwise(first):
         _find_transitions(point, axis, near, low, high)
-    return AxisScan(nominal.scene, axis, runner.label, base, tuple(points[value] for value in sorted(points)))
+    return AxisScan(axis, runner.label, base, tuple(points[value] for value in sorted(points)))
 
 
 def _find_transitions(point: Callable[[float], ScanPoint], axis: Axis, near: float, low: ScanPoint, high: ScanPoint) -> None:

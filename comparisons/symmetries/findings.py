@@ -8,10 +8,11 @@ that of a contact that is missed at the start, explains no later difference. Rep
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PlainValidator
 
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.measuring.differences import differences
@@ -51,7 +52,8 @@ class Finding:
         time: The time of this step [s]; NaN if there is none.
         reason: Why there is no motion to compare; otherwise empty.
         verdict: The verdict on the run that gave no motion, such as `declined` or `crashed`; otherwise empty.
-        motions: If the symmetry is lost, the engine's motion and the one that should equal it, states of shape (n, 13).
+        motions: If the symmetry is lost, the engine's motion and the one that should equal it, states of shape (n, 13); a stored study does
+            not have them.
     """
 
     scene: str
@@ -63,7 +65,9 @@ class Finding:
     time: float = float("nan")
     reason: str = ""
     verdict: Verdict | Literal[""] = ""
-    motions: tuple[Array, Array] | None = field(default=None, repr=False, compare=False)
+    motions: Annotated[tuple[Array, Array] | None, PlainValidator(lambda motions: None), Field(exclude=True)] = field(
+        default=None, repr=False, compare=False
+    )
 
 
 def not_run(none: Finding, broken: Breakdown) -> Finding:

@@ -3,15 +3,28 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PlainSerializer, PlainValidator
 
 from dropspin.comparisons.tradeoff.costs import WORLDS
 from dropspin.comparisons.tradeoff.ladder import Ladder
 from dropspin.scenarios import Scenario
 
 Array = NDArray[np.float64]
+
+
+def _costs(values: Any) -> Array:
+    costs: Array = np.asarray(values, dtype=float)
+    if costs.ndim != 1 or not len(costs) or not (costs > 0.0).all():
+        raise ValueError("must be numbers above 0")
+    return costs
+
+
+Costs = Annotated[Array, PlainValidator(_costs), PlainSerializer(lambda costs: costs.tolist())]
+"""An array that a stored study has as a list of numbers."""
 
 LEVEL = 1.25
 """Two costs count as equal if their ratio is below this, or if their order differs between rounds."""
@@ -37,9 +50,9 @@ class CostPoint:
     """
 
     engine: str
-    dt: float
-    error: float
-    cost: Array
+    dt: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    error: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    cost: Costs
     costs_per_world: Mapping[int, float] = field(default_factory=dict)
     spreads_per_world: Mapping[int, float] = field(default_factory=dict)
 

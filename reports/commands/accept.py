@@ -3,7 +3,6 @@
 import click
 
 from dropspin.reports.commands.options import BASELINE, as_json
-from dropspin.reports.terminal.safe import echo
 
 
 @click.command("accept")
@@ -31,12 +30,11 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
     import os
     from pathlib import Path
 
-    import pandas as pd
-
     from dropspin.comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
     from dropspin.comparisons.results.store import load_results
-    from dropspin.reports.terminal.rows import json_rows
-    from dropspin.reports.views.check import accepted_sentences
+    from dropspin.reports.document import Document, Sentences
+    from dropspin.reports.stories.check import accepted_sentences
+    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import DropspinError
     from dropspin.scenarios.text import counted
 
@@ -46,15 +44,11 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
     changes, sentences = [], []
     for run in runs:
         results = load_results(Path(run), arrays=False)
-        new, found = accept(results, new, reason.strip(), datetime.date.today(), known_failures=known_failures)
-        changes.append(found)
-        sentences += accepted_sentences(results, found, known_failures)
+        new, accepted = accept(results, new, reason.strip(), datetime.date.today(), known_failures=known_failures)
+        changes += accepted.to_dict("records")
+        sentences += accepted_sentences(results, accepted, known_failures)
     if new.results.empty:
         raise DropspinError(f"{', '.join(runs)}: there is nothing to accept, because no engine was measured; {baseline} is not written.")
     write_baseline(new, baseline)
-    if json_output:
-        echo(json_rows(pd.concat(changes)))
-        return
-    for sentence in sentences:
-        echo(sentence)
-    echo(f"Written: {baseline}, {counted(len(new.results), 'accepted result')}. Review the difference and commit it.")
+    written = f"{baseline}, {counted(len(new.results), 'accepted result')}. Review the difference and commit it."
+    print_json_or(json_output, changes, Document("Accepted results", [Sentences(sentences)]), written)

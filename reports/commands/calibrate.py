@@ -1,12 +1,11 @@
 """`dropspin calibrate`."""
 
-import json
 from typing import Literal
 
 import click
 
-from dropspin.reports.commands.interrupts import stop_if_interrupted
 from dropspin.reports.commands.options import as_json
+from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
 
@@ -32,9 +31,9 @@ def calibrate_command(
     MuJoCo's contact is a damper over one time step or, with -e mujoco[spring_steps=20], a spring over 20.
     """
     from dropspin.comparisons.calibration import calibrate
+    from dropspin.reports.stories import calibrate as view
     from dropspin.reports.terminal.progress import status
-    from dropspin.reports.terminal.rows import print_rows
-    from dropspin.reports.views import calibrate as view
+    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import UnknownName
 
     if language is not None and json_output:
@@ -47,10 +46,6 @@ def calibrate_command(
             raise UnknownName(f"{found.engine}'s language", language, found.programs)
         echo(found.programs[language], nl=False)
         return
-    if json_output:
-        echo(json.dumps(view.as_data(found), indent=1, ensure_ascii=False))
-        return
-    print_rows(view.measured_rows(found), json_output=False)
-    print_rows(view.setting_rows(found), json_output=False)
-    for name, text in found.programs.items():
+    print_json_or(json_output, view.as_data(found), view.document(found))
+    for name, text in found.programs.items() if not json_output else ():
         echo(f"To paste, as {name}:\n\n{text}")

@@ -2,17 +2,10 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from dropspin.reports.commands.options import BASELINE, as_json, summary_option, write_text
-from dropspin.reports.terminal.safe import echo
-
-if TYPE_CHECKING:
-    from dropspin.comparisons.regressions.checking import Checked
-    from dropspin.reports.views.check import BaselineFile
-    from dropspin.reports.views.failures import Failure
 
 
 @click.command("check")
@@ -33,10 +26,10 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
     from dropspin.comparisons.regressions.checking import check
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.junit import junit_xml
-    from dropspin.reports.markdown import check_markdown
-    from dropspin.reports.terminal.rows import json_rows
-    from dropspin.reports.views import check as view
-    from dropspin.reports.views.failures import failures
+    from dropspin.reports.markdown import markdown
+    from dropspin.reports.stories import check as story
+    from dropspin.reports.stories.failures import failures
+    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import DropspinError
 
     if baseline is not None and no_baseline:
@@ -44,31 +37,15 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
     if baseline is None and not no_baseline and os.path.lexists(BASELINE):
         baseline = BASELINE
     results = load_results(Path(run), arrays=False)
-    file = None if baseline is None else view.BaselineFile(load_baseline(baseline), baseline, run)
+    file = None if baseline is None else story.BaselineFile(load_baseline(baseline), baseline, run)
     try:
         checked = check(results, None if file is None else file.baseline)
     except DropspinError as error:
         raise DropspinError(f"{baseline}: {error} With --no-baseline, only the expectations of the scenes are checked.") from None
-    found = failures(checked.results, baseline)
+    failed = failures(checked.results, baseline)
     if junit is not None:
         write_text(junit, junit_xml(checked.results, baseline).decode())
     if summary is not None:
-        write_text(summary, check_markdown(checked, file, found), append=True)
-    if json_output:
-        echo(json_rows(checked.results.table))
-    else:
-        print_checked(checked, file, found)
+        write_text(summary, markdown(story.page(checked, file, failed), level=2), append=True)
+    print_json_or(json_output, checked.results.table.to_dict("records"), story.output(checked, file, failed))
     return checked.results.exit_code()
-
-
-def print_checked(checked: "Checked", file: "BaselineFile | None", found: "list[Failure]") -> None:
-    """Print the failures, then the outcome of the check; on GitHub's runners, also print annotations."""
-    from dropspin.reports.terminal.rows import print_sentences
-    from dropspin.reports.terminal.summary import print_failures
-    from dropspin.reports.views import check as view
-    from dropspin.reports.views.failures import grouped
-
-    print_failures(grouped(checked.results, found, None if file is None else file.path))
-    print_sentences([view.scope(file), *view.sentences(checked, file)])
-    for command in view.annotations(found):
-        echo(command)

@@ -1,12 +1,10 @@
 """`dropspin compare`."""
 
-import json
 from pathlib import Path
 
 import click
 
 from dropspin.reports.commands.options import as_json, summary_option, write_text
-from dropspin.reports.terminal.safe import echo
 
 
 @click.command("compare")
@@ -24,16 +22,13 @@ def compare_command(old: str, new: str, summary: str | None, json_output: bool) 
     """
     from dropspin.comparisons.regressions.comparing import compare
     from dropspin.comparisons.results.store import load_results
-    from dropspin.reports.markdown import compare_markdown
-    from dropspin.reports.terminal.rows import print_sentences
-    from dropspin.reports.views import compare as view
+    from dropspin.reports.markdown import markdown
+    from dropspin.reports.stories.compare import as_data, output, page
+    from dropspin.reports.terminal.rows import print_json_or
 
     later = load_results(Path(new))
     changes = compare(load_results(Path(old)), later)
     if summary is not None:
-        write_text(summary, compare_markdown(changes), append=True)
-    if json_output:
-        echo(json.dumps(view.as_data(changes), indent=1, ensure_ascii=False, allow_nan=False))
-    else:
-        print_sentences([*view.listed(changes), *view.commands(changes, later), *view.sentences(changes)])
+        write_text(summary, markdown(page(changes), level=2), append=True)
+    print_json_or(json_output, as_data(changes), output(changes, later))
     return int(bool(len(changes.regressions)))

@@ -1,16 +1,16 @@
 """`dropspin conform`."""
 
-import json
 from typing import TYPE_CHECKING
 
 import click
 
-from dropspin.reports.commands.interrupts import stop_if_interrupted
 from dropspin.reports.commands.options import as_json, time_limit_option
+from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
 if TYPE_CHECKING:
     from dropspin.comparisons.conformance.outcomes import CheckResult
+    from dropspin.comparisons.running.processes import ResourceLimits
 
 
 @click.command("conform")
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option("--traceback", is_flag=True, help="Print the whole traceback of each exception of the adapter.")
 @time_limit_option(60.0, "each check may use")
 @as_json
-def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, time_limit: float, json_output: bool) -> int:
+def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, resources: "ResourceLimits", json_output: bool) -> int:
     """Check an engine adapter against the protocol and against reference motions.
 
     ENGINE is a name from `dropspin list engines`, or a class of your own, such as my_module:MyEngine.
@@ -32,9 +32,8 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
 
     from dropspin.comparisons.conformance.checks import CHECKS, conform
     from dropspin.comparisons.running.entries import present_entry
-    from dropspin.comparisons.running.processes import ResourceLimits
-    from dropspin.reports.terminal.rows import print_row, print_sentences
-    from dropspin.reports.views import conform as view
+    from dropspin.reports.stories import conform as view
+    from dropspin.reports.terminal.rows import print_json_or, print_row
 
     chosen, console = present_entry(engine_name).adapter, Console()
     found: list[CheckResult] = []
@@ -48,11 +47,8 @@ def conform_command(engine_name: str, checks: tuple[str, ...], traceback: bool, 
         found.append(result)
 
     echo(f"checking {chosen.label}", err=True)
-    conform(chosen, checks, resources=ResourceLimits(processor_time=time_limit), on_result=show)
-    if json_output:
-        keys = ("check", "outcome", "message", *(["traceback"] if traceback else []))
-        echo(json.dumps([{key: getattr(one, key) for key in keys} for one in found], indent=1, ensure_ascii=False))
-    else:
-        print_sentences(view.sentences(found))
-    outcomes = {one.outcome for one in found}
+    conform(chosen, checks, resources=resources, on_result=show)
+    keys = ("check", "outcome", "message", *(["traceback"] if traceback else []))
+    print_json_or(json_output, [{key: getattr(result, key) for key in keys} for result in found], view.document(found))
+    outcomes = {result.outcome for result in found}
     return 3 if outcomes & {"crashed", "timed_out"} else int("failed" in outcomes)

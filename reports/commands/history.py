@@ -1,6 +1,5 @@
 """`dropspin compare history`."""
 
-import json
 import os
 from collections import Counter
 from pathlib import Path
@@ -8,13 +7,12 @@ from typing import Any
 
 import click
 
-from dropspin.reports.commands.options import as_json
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.commands.options import as_json, output_option
 
 
 @click.command("history")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True)
-@click.option("-o", "--output", default="out/history", show_default=True, metavar="DIR", help="Folder for the table and the plots.")
+@output_option("out/history", "for the table and the plots")
 @as_json
 def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> None:
     """Follow each result over runs, commits and versions of engines, and find the runs in which results changed.
@@ -23,21 +21,17 @@ def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> No
     """
     from dropspin.comparisons.regressions.history import history
     from dropspin.comparisons.results.folder import study_folder
+    from dropspin.reports.stories.history import rows
     from dropspin.reports.study_files import write_history
     from dropspin.reports.terminal.progress import status
-    from dropspin.reports.views import history as view
+    from dropspin.reports.terminal.rows import print_json_or
 
     with study_folder(output) as folder:
         with status("reading the runs"):
             found = history(_load_runs(_find_runs(runs)))
         with status("drawing"):
-            write_history(found, folder)
-    if json_output:
-        echo(json.dumps(view.rows(found), indent=1, ensure_ascii=False))
-        return
-    for line in [*view.listed(found), *view.sentences(found)]:
-        echo(line)
-    echo(f"Written: {os.path.join(output, 'history.md')}")
+            document = write_history(found, folder)
+    print_json_or(json_output, rows(found), document, os.path.join(output, "history.md"))
 
 
 def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
@@ -56,7 +50,7 @@ def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
             raise DropspinError(
                 f"{place}: neither a run nor a folder of runs; give folders that dropspin run -o wrote, or a folder of them."
             )
-        found |= {str(one): one for one in here}
+        found |= {str(folder): folder for folder in here}
     return found
 
 

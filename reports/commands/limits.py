@@ -1,18 +1,16 @@
 """`dropspin limits`."""
 
-import json
 import os
+from typing import Any
 
 import click
 
-from dropspin.reports.commands.interrupts import stop_if_interrupted
-from dropspin.reports.commands.options import POSITIVE, as_json, jobs_option, time_limit_option
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.commands.options import POSITIVE, as_json, engines_option, jobs_option, output_option, time_limit_option
 
 
 @click.command("limits")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
-@click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more.")
+@engines_option
 @click.option(
     "--axis",
     "axes",
@@ -31,19 +29,9 @@ from dropspin.reports.terminal.safe import echo
 )
 @time_limit_option(60.0, "an engine may use for one tested value")
 @jobs_option("axes to scan")
-@click.option("-o", "--output", default="out/limits", show_default=True, metavar="DIR", help="Folder for the tables and the figures.")
+@output_option("out/limits", "for the tables and the figures")
 @as_json
-def limits_command(
-    scenes: tuple[str, ...],
-    engines: tuple[str, ...],
-    axes: tuple[str, ...],
-    dt: float,
-    within: float,
-    time_limit: float,
-    jobs: int | None,
-    output: str,
-    json_output: bool,
-) -> None:
+def limits_command(scenes: tuple[str, ...], axes: tuple[str, ...], output: str, json_output: bool, **options: Any) -> None:
     """Find where engines break down as time step, spin, height, inertia ratio, mass, restitution, duration, size or scale varies.
 
     The default is five scenes (two spins, a ball, a box, a block), with engines and methods that give different results for them; this
@@ -52,11 +40,10 @@ def limits_command(
     from dropspin.comparisons.results.folder import study_folder
     from dropspin.comparisons.robustness.axes import AXES
     from dropspin.comparisons.robustness.study import SCENES, find_limits
-    from dropspin.comparisons.running.processes import ResourceLimits
-    from dropspin.reports.study_files import write_limits
+    from dropspin.reports.stories.limits import Limits
+    from dropspin.reports.study_files import write_study
     from dropspin.reports.terminal.progress import share_bar
-    from dropspin.reports.terminal.rows import print_rows, print_sentences
-    from dropspin.reports.views import limits as view
+    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import load
 
     loaded = [load(name) for name in scenes or SCENES]
@@ -66,25 +53,8 @@ def limits_command(
     found = []
     with study_folder(output) as folder:
         for scene in having or loaded[:1]:  # the error of find_limits lists the axes of a scene
-            with share_bar(scene.name) as progress:
-
-                def on_progress(what: str, share: float) -> None:
-                    stop_if_interrupted()
-                    progress(what, share)
-
-                resources = ResourceLimits(processor_time=time_limit)
-                study = find_limits(scene, engines, axes, dt=dt, within=within, on_progress=on_progress, resources=resources, jobs=jobs)
-                found.append(study)
-        write_limits(found, folder)
-    if json_output:
-        echo(json.dumps([row for one in found for row in view.rows(one)], indent=1))
-        return
-    for one in found:
-        print_sentences([view.nominal(one)])
-        if rows := view.range_rows(one):
-            print_rows(rows, json_output=False)
-        print_sentences(view.sentences(one))
-    if rows := view.step_rows(found):
-        print_rows(rows, json_output=False)
-        print_sentences([view.ACCURATE_AND_STABLE])
-    echo(f"Written: {os.path.join(output, 'limits.md')}")
+            with share_bar(scene.name) as on_progress:
+                found.append(find_limits(scene, axes=axes, **options, on_progress=on_progress))
+        study = Limits(scenes=found)
+        document = write_study(study, folder)
+    print_json_or(json_output, study.rows(), document, os.path.join(output, "limits.md"))

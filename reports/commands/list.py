@@ -10,8 +10,9 @@ from dropspin.reports.commands.options import as_json
 @as_json
 def list_command(what: str, json_output: bool) -> None:
     """List the scenes, the engines or the metrics."""
-    from dropspin.reports.terminal.rows import print_rows
-    from dropspin.reports.views import listings
+    from dropspin.reports.document import Document, Table
+    from dropspin.reports.stories import listings
+    from dropspin.reports.terminal.rows import print_json_or
 
-    rows = {"scenes": listings.scene_rows, "engines": listings.engine_rows, "metrics": listings.metric_rows}[what]
-    print_rows(rows(), json_output, listings.LEFT_OUT_FIRST[what])
+    rows = {"scenes": listings.scene_rows, "engines": listings.engine_rows, "metrics": listings.metric_rows}[what]()
+    print_json_or(json_output, rows, Document(what, [Table(rows, listings.LEFT_OUT_FIRST[what])]))

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from dropspin.reports.commands import surroundings
-from dropspin.reports.commands.interrupts import handle_interrupts, stop_if_interrupted
+from dropspin.reports.terminal.interrupts import handle_interrupts, stop_if_interrupted
 from dropspin.reports.terminal.streams import error_of, unfailing
 
 GROUPS = {

@@ -4,12 +4,18 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+if TYPE_CHECKING:
+    from dropspin.comparisons.running.processes import ResourceLimits
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+engines_option = click.option(
+    "-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine, with options; repeat for more."
+)
 as_json = click.option("--json", "json_output", is_flag=True, help="Print JSON instead of a table.")
 BASELINE = "dropspin-baseline.toml"
 """The baseline that `accept` writes and `check` reads unless another one is named."""
@@ -73,16 +79,31 @@ class WholeNumbers(click.ParamType):  # type: ignore[type-arg]  # not generic at
         return tuple(map(int, parts))
 
 
-def seconds_option(name: str, default: float, of: str, least: float = 0.0) -> Callable[[Command], Command]:
+def seconds_option(*names: str, default: float, of: str, least: float = 0.0, callback: Any = None) -> Callable[[Command], Command]:
     """An option whose value is a processor time."""
-    return click.option(
-        name, type=_Positive(least, most=1e7), default=default, show_default=True, metavar="SECONDS", help=f"Processor time {of}"
-    )
+    kind, text = _Positive(least, most=1e7), f"Processor time {of}"
+    return click.option(*names, type=kind, default=default, show_default=True, metavar="SECONDS", help=text, callback=callback)
 
 
 def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
-    """The option `--time-limit` of an engine's process."""
-    return seconds_option("--time-limit", default, f"that {of}.", least=0.01)
+    """The option `--time-limit` of an engine's process, of which a command gets the `ResourceLimits`."""
+    return seconds_option("--time-limit", "resources", default=default, of=f"that {of}.", least=0.01, callback=_resources)
+
+
+def _resources(context: click.Context, parameter: click.Parameter, seconds: float) -> "ResourceLimits":
+    from dropspin.comparisons.running.processes import ResourceLimits
+
+    return ResourceLimits(processor_time=seconds)
+
+
+def output_option(default: str, of: str) -> Callable[[Command], Command]:
+    """The option `-o`: a folder."""
+    return click.option("-o", "--output", default=default, show_default=True, metavar="DIR", help=f"Folder {of}.")
+
+
+def step_option(of: str) -> Callable[[Command], Command]:
+    """The option `--dt` of a command with one time step."""
+    return click.option("--dt", default=1e-3, show_default=True, type=float, metavar="SECONDS", help=f"The time step{of}.")
 
 
 def jobs_option(pieces: str) -> Callable[[Command], Command]:

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import click
 
+from dropspin.reports.commands.options import output_option
 from dropspin.reports.terminal.safe import echo
 
 
 @click.command("publish")
 @click.argument("record", default="record")
-@click.option("-o", "--output", default="out/site-record", show_default=True, metavar="DIR", help="Folder of the site.")
+@output_option("out/site-record", "of the site")
 def publish_command(record: str, output: str) -> None:
     """Write a record as a site: which release of which engine changed what.
 

@@ -1,17 +1,22 @@
 """`dropspin record`."""
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from dropspin.reports.commands.interrupts import stop_if_interrupted
-from dropspin.reports.commands.options import jobs_option, time_limit_option
+from dropspin.reports.commands.options import jobs_option, output_option, time_limit_option
+from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
+
+if TYPE_CHECKING:
+    from dropspin.comparisons.running.processes import ResourceLimits
 
 
 @click.command("record")
 @click.option("-e", "--engine", "engines", multiple=True, metavar="ENGINE", help="An engine of the record; repeat for more.")
 @click.option("--release", "releases", multiple=True, metavar="VERSION", help="A release; repeat for more. [default: all on the index]")
 @click.option("--merge", "sent", multiple=True, metavar="PATH", help="Add a record that somebody sent, a folder or a file; run nothing.")
-@click.option("-o", "--output", default="record", show_default=True, metavar="DIR", help="Folder of the record.")
+@output_option("record", "of the record")
 @jobs_option("releases")
 @click.option("--scheduler", metavar="ADDRESS", help="Measure on the workers of a Dask cluster, such as tcp://host:8786.")
 @time_limit_option(60.0, "an engine may use for one simulation")
@@ -22,7 +27,7 @@ def record_command(
     output: str,
     jobs: int | None,
     scheduler: str | None,
-    time_limit: float,
+    resources: "ResourceLimits",
 ) -> None:
     """Measure every release of each engine, in an environment of its own, and keep the results.
 
@@ -46,8 +51,9 @@ def record_command(
         stop_if_interrupted()
         echo(f"{release} ({left} left)", err=True)
 
+    how: dict[str, Any] = {"jobs": as_jobs(jobs), "scheduler": scheduler, "time_limit": resources.processor_time}
     try:
-        record(folder, load_plan(), engines, releases, jobs=as_jobs(jobs), scheduler=scheduler, time_limit=time_limit, on_done=on_done)
+        record(folder, load_plan(), engines, releases, on_done=on_done, **how)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("finished releases are kept; the same command continues") from None
     echo(f"Record: {output}")

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
-from dropspin.reports.commands.interrupts import stop_if_interrupted
 from dropspin.reports.commands.options import POSITIVE
+from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo
 
 

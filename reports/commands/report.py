@@ -27,9 +27,9 @@ def report_command(run: str, studies: tuple[str, ...], plots: tuple[str, ...]) -
     """
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.run_folder import fill, run_folder
-    from dropspin.reports.sections import read_section
+    from dropspin.reports.study_files import read_study
 
-    sections = [read_section(folder) for folder in dict.fromkeys(studies)]
+    sections = [read_study(folder) for folder in dict.fromkeys(studies)]
     results = load_results(Path(run))
     with run_folder(run) as unfinished:
         fill(results, unfinished, sections, plots)

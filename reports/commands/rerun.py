@@ -1,11 +1,13 @@
 """`dropspin record rerun`."""
 
-import json
+from typing import TYPE_CHECKING
 
 import click
 
 from dropspin.reports.commands.options import as_json, time_limit_option
-from dropspin.reports.terminal.safe import echo
+
+if TYPE_CHECKING:
+    from dropspin.comparisons.running.processes import ResourceLimits
 
 
 @click.command("rerun")
@@ -15,7 +17,7 @@ from dropspin.reports.terminal.safe import echo
 @click.option("-r", "--record", "folder", default="record", show_default=True, metavar="DIR", help="Folder of the record.")
 @time_limit_option(60.0, "the engine may use for one simulation")
 @as_json
-def rerun_command(engine: str, release: str, scene: str, folder: str, time_limit: float, json_output: bool) -> int:
+def rerun_command(engine: str, release: str, scene: str, folder: str, resources: "ResourceLimits", json_output: bool) -> int:
     """Measure a cell of the record again, and compare it bit for bit.
 
     ENGINE is an engine with options, RELEASE a release of it and SCENE a scene, as in the record. pip installs the release into a
@@ -24,15 +26,11 @@ def rerun_command(engine: str, release: str, scene: str, folder: str, time_limit
     """
     from dropspin.comparisons.record.plan import load_plan
     from dropspin.comparisons.record.rerun import rerun
+    from dropspin.reports.stories import rerun as view
     from dropspin.reports.terminal.progress import status
-    from dropspin.reports.terminal.rows import print_rows, print_sentences
-    from dropspin.reports.views import rerun as view
+    from dropspin.reports.terminal.rows import print_json_or
 
     with status(f"installing {engine.partition('[')[0]} {release}, and simulating {scene}"):
-        found = rerun(folder, load_plan(), engine, release, scene, time_limit=time_limit)
-    if json_output:
-        echo(json.dumps(view.as_data(found), indent=1, ensure_ascii=False))
-    else:
-        print_rows(view.table(found, scene), json_output=False)
-        print_sentences(view.sentences(found))
+        found = rerun(folder, load_plan(), engine, release, scene, time_limit=resources.processor_time)
+    print_json_or(json_output, view.as_data(found), view.document(found, scene))
     return 1 if found.moved else 0

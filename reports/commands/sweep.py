@@ -1,12 +1,14 @@
 """`dropspin sweep`."""
 
-import json
+from typing import TYPE_CHECKING
 
 import click
 
-from dropspin.reports.commands.interrupts import stop_if_interrupted
 from dropspin.reports.commands.options import as_json, time_limit_option
-from dropspin.reports.terminal.safe import echo
+from dropspin.reports.terminal.interrupts import stop_if_interrupted
+
+if TYPE_CHECKING:
+    from dropspin.comparisons.running.processes import ResourceLimits
 
 
 @click.command("sweep")
@@ -18,39 +20,29 @@ from dropspin.reports.terminal.safe import echo
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://host:8786.")
 @time_limit_option(60.0, "an engine may use for one job")
 @as_json
-def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, time_limit: float, json_output: bool) -> int:
+def sweep_command(spec: str, output: str, resume: bool, scheduler: str | None, resources: "ResourceLimits", json_output: bool) -> int:
     """Run every job of a grid or random sample over scenes, engines, options, time steps and initial states.
 
     The result of each job is one row of a table in Parquet files. An interrupted sweep keeps the files that were written.
 
     Exit code: 0 all jobs were run, 2 bad input, 3 an engine broke down in a job or is missing.
     """
-    from dropspin.comparisons.running.processes import ResourceLimits
     from dropspin.comparisons.sweeps.folder import count
     from dropspin.comparisons.sweeps.running import run_sweep
     from dropspin.comparisons.sweeps.spec import load_sweep
+    from dropspin.reports.stories import sweep as view
     from dropspin.reports.terminal.progress import jobs_bar
-    from dropspin.reports.terminal.rows import print_rows
-    from dropspin.reports.views import sweep as view
+    from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios.text import counted
 
     asked = load_sweep(spec)
     try:
-        with jobs_bar(asked.size) as progress:
-
-            def on_progress(jobs: int) -> None:
-                stop_if_interrupted()
-                progress(jobs)
-
-            resources = ResourceLimits(processor_time=time_limit)
+        with jobs_bar(asked.size) as on_progress:
             run_sweep(asked, output, resume=resume, scheduler=scheduler, resources=resources, on_progress=on_progress)
         stop_if_interrupted()
         found = view.tallies(output)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{count(output):,} of {asked.size:,} jobs are kept; --resume continues the sweep") from None
-    if json_output:
-        echo(json.dumps(view.summary_rows(found), indent=1, ensure_ascii=False))
-    else:
-        print_rows(view.formatted_rows(found), json_output=False, left_out_first=view.LEFT_OUT_FIRST)
-        echo(f"Written: {output}, {counted(asked.size, 'job')}; from Python: dropspin.read_sweep({output!r})")
+    written = f"{output}, {counted(asked.size, 'job')}; from Python: dropspin.read_sweep({output!r})"
+    print_json_or(json_output, view.summary_rows(found), view.document(found), written)
     return view.exit_code(found)

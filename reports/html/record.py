@@ -16,9 +16,9 @@ from dropspin.reports.pages import page
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import engine_styles
-from dropspin.reports.views import numbers
-from dropspin.reports.views import record as view
-from dropspin.reports.views.scene import modelled
+from dropspin.reports.stories import numbers
+from dropspin.reports.stories import record as view
+from dropspin.reports.stories.scene import modelled
 from dropspin.scenarios import truth_for
 from dropspin.scenarios.problems import identifier
 

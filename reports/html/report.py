@@ -14,6 +14,7 @@ from dropspin.comparisons.results.provenance import first_settings
 from dropspin.comparisons.results.results import SMALLEST_STATED, Results
 from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
+from dropspin.reports.document import Document
 from dropspin.reports.pages import page
 from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
@@ -22,26 +23,25 @@ from dropspin.reports.plots.convergence import INTERVAL_WIDTH, PREDICTED
 from dropspin.reports.plots.figures import CHARTS, report_charts
 from dropspin.reports.plots.spins import wobbles_freely
 from dropspin.reports.replay import as_data, replay_of
-from dropspin.reports.sections import Section
-from dropspin.reports.views import numbers
-from dropspin.reports.views.contacts import worst_contacts
-from dropspin.reports.views.error_budget import error_budgets
-from dropspin.reports.views.impact_laws import NOTE
-from dropspin.reports.views.leading_errors import leading_errors, step_times
-from dropspin.reports.views.matrix import legend_of_marks
-from dropspin.reports.views.run import Overview
-from dropspin.reports.views.scene import left_out, modelled
+from dropspin.reports.stories import numbers
+from dropspin.reports.stories.contacts import worst_contacts
+from dropspin.reports.stories.error_budget import error_budgets
+from dropspin.reports.stories.impact_laws import NOTE
+from dropspin.reports.stories.leading_errors import leading_errors, step_times
+from dropspin.reports.stories.matrix import legend_of_marks
+from dropspin.reports.stories.run import Overview
+from dropspin.reports.stories.scene import left_out, modelled
 from dropspin.scenarios import truth_for
 from dropspin.scenarios.problems import identifier
 
 
-def html_report(results: Results, summary: Overview, sections: Sequence[Section] = ()) -> str:
+def html_report(results: Results, summary: Overview, sections: Sequence[Document] = ()) -> str:
     """The page.
 
     Args:
         results: The run.
         summary: Its overview.
-        sections: Sections of studies to include.
+        sections: Studies to include.
     """
     words = sorted({status.words for by_engine in summary.statuses.values() for status in by_engine.values()})
     return page("report.html", **vars(summary), **_details(results, summary), words=words, sections=sections)

@@ -1,18 +1,18 @@
-"""Progress and status on standard error: bars on a terminal, plain lines elsewhere."""
+"""Progress and status on standard error: bars on a terminal, plain lines elsewhere. Each update stops an interrupted command."""
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import NamedTuple
+from contextlib import contextmanager, nullcontext
+from typing import Any, NamedTuple
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
-from rich.text import Text
 
 from dropspin.comparisons.running.progress import OnProgress, Progress
+from dropspin.reports.stories.numbers import in_ms
+from dropspin.reports.terminal.interrupts import stop_if_interrupted
 from dropspin.reports.terminal.safe import echo, safe, styled
-from dropspin.reports.views.numbers import in_ms
 from dropspin.scenarios.text import counted
 
 
@@ -33,56 +33,49 @@ class RunProgress(NamedTuple):
 @contextmanager
 def progress_bar(scenes: int, pieces: int) -> Iterator[RunProgress]:
     """A progress bar of scenes on a terminal; elsewhere, a line when a scene starts and when it is finished, with the elapsed time."""
-    console, start = Console(stderr=True), time.monotonic()
+    start, done, has_timed = time.monotonic(), 0, False
     started: dict[str, None] = {}
     finished: set[str] = set()
+    shares: dict[str, float] = {}  # of the pieces of work that are not finished, by scene
 
-    def starts(progress: Progress) -> bool:
-        """Whether a scene starts; one of an interrupted run, of which only the end is reported, is finished."""
-        if progress.timing or progress.scene in started or progress.scene in finished:
-            return False
-        if progress.finished:
-            finished.add(progress.scene)
+    def of_all() -> str:
+        return f"{len(finished)} of {counted(scenes, 'scene')}"
+
+    def show_line(text: str) -> None:
+        if bar.disable:
+            echo(text, err=True)
         else:
-            started[progress.scene] = None
-        return not progress.finished
+            bar.console.print(styled(text), soft_wrap=True)
 
-    def of_all(number: int) -> str:
-        return f"{number} of {counted(scenes, 'scene')}"
-
-    if not console.is_terminal:
-        timed: list[str] = []
-
-        def line(progress: Progress) -> None:
-            if progress.timing and not timed:
-                timed.append("timing the steps of each engine")
-                echo(timed[0], err=True)
-            if starts(progress):
-                elapsed = _duration(time.monotonic() - start)
-                echo(f"running {progress.scene} ({of_all(len(finished))} finished, {elapsed} elapsed)", err=True)
-
-        def finish(scene: str) -> None:
-            finished.add(scene)
-            running = ", ".join(one for one in list(started) if one not in finished)
-            elapsed = _duration(time.monotonic() - start)
-            echo(f"finished {scene} ({of_all(len(finished))}, {elapsed} elapsed{running and f'; still running: {running}'})", err=True)
-
-        yield RunProgress(line, finish, lambda text: echo(text, err=True))
-        return
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn())
-    with Bar(*columns, console=console, transient=True) as bar:
-        task, done = bar.add_task("starting", total=float(scenes * pieces)), 0
-        shares: dict[str, float] = {}  # of the pieces of work that are not finished, by scene
-
-        def advance(progress: Progress) -> None:
-            nonlocal done
-            starts(progress)
+    def on_progress(progress: Progress) -> None:
+        nonlocal done, has_timed
+        stop_if_interrupted()
+        name, is_new = progress.scene, not progress.timing and progress.scene not in {*started, *finished}
+        if is_new and progress.finished:  # in an interrupted run, of which only the end is reported
+            finished.add(name)
+        elif is_new:
+            started[name] = None
+        if not bar.disable:
             done += progress.finished
-            shares[progress.scene] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
-            description = f"{of_all(len(finished))} finished; {_described(progress)}"
-            bar.update(task, completed=done + sum(shares.values()), description=safe(description))
+            shares[name] = 0.0 if progress.added or progress.finished or not progress.total else progress.done / progress.total
+            description = safe(f"{of_all()} finished; {_described(progress)}")
+            bar.update(task, completed=done + sum(shares.values()), description=description)
+        elif progress.timing and not has_timed:
+            has_timed = True
+            show_line("timing the steps of each engine")
+        elif is_new and not progress.finished:
+            show_line(f"running {name} ({of_all()} finished, {_duration(time.monotonic() - start)} elapsed)")
 
-        yield RunProgress(advance, finished.add, lambda text: console.print(styled(text), soft_wrap=True))
+    def on_finished(scene: str) -> None:
+        finished.add(scene)
+        if bar.disable:
+            running = ", ".join(name for name in list(started) if name not in finished)
+            elapsed = f"{_duration(time.monotonic() - start)} elapsed"
+            show_line(f"finished {scene} ({of_all()}, {elapsed}{running and f'; still running: {running}'})")
+
+    with _bar(BarColumn(bar_width=20), TaskProgressColumn(), TimeRemainingColumn()) as bar:
+        task = bar.add_task("starting", total=float(scenes * pieces))
+        yield RunProgress(on_progress, on_finished, show_line)
 
 
 @contextmanager
@@ -91,24 +84,23 @@ def status(text: str) -> Iterator[None]:
     console = Console(stderr=True)
     if not console.is_terminal:
         echo(text, err=True)
-        yield
-        return
-    with console.status(text):
+    with console.status(text) if console.is_terminal else nullcontext():
         yield
 
 
 @contextmanager
 def share_bar(title: str) -> Iterator[Callable[[str, float], None]]:
     """A progress bar on a terminal; elsewhere, one line."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        echo(f"running {title}", err=True)
-        yield lambda what, share: None
-        return
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    with Bar(*columns, console=console, transient=True) as bar:
+
+    def on_progress(work: str, share: float) -> None:
+        stop_if_interrupted()
+        bar.update(task, completed=share, description=safe(f"{title}: {work}"))
+
+    with _bar(BarColumn(), TimeRemainingColumn()) as bar:
+        if bar.disable:
+            echo(f"running {title}", err=True)
         task = bar.add_task(safe(title), total=1.0)
-        yield lambda what, share: bar.update(task, completed=share, description=safe(f"{title}: {what}"))
+        yield on_progress
 
 
 EVERY = 5.0
@@ -121,46 +113,31 @@ def jobs_bar(total: int) -> Iterator[Callable[[int], None]]:
 
     The first call gives the number of jobs that an earlier run completed; they are not included in the rate.
     """
-    console = Console(stderr=True)
     start, before, done, last = time.monotonic(), -1, 0, 0.0
 
-    def rate() -> float:
-        return (done - max(before, 0)) / max(time.monotonic() - start, 1e-9)
-
-    def count(jobs: int) -> None:
-        nonlocal before, done
+    def on_progress(jobs: int) -> None:
+        nonlocal before, done, last
+        stop_if_interrupted()
         done += jobs
         before = done if before < 0 else before
+        now = time.monotonic()
+        rate = (done - before) / max(now - start, 1e-9)
+        bar.update(task, completed=done, rate=f"{rate:,.0f}/s")
+        if bar.disable and jobs and (now - last >= EVERY or done == total):
+            last = now
+            left = f", {_duration((total - done) / rate)} left" if rate > 0.0 else ""
+            echo(f"{done:,} of {total:,} jobs, {rate:,.0f} per second{left}", err=True)
 
-    if not console.is_terminal:
+    with _bar(BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn()) as bar:
+        task = bar.add_task("jobs", total=total, rate="0/s")
+        yield on_progress
 
-        def line(jobs: int) -> None:
-            nonlocal last
-            count(jobs)
-            now = time.monotonic()
-            if jobs and (now - last >= EVERY or done == total):
-                last = now
-                left = f", {_duration((total - done) / rate())} left" if rate() > 0.0 else ""
-                echo(f"{done:,} of {total:,} jobs, {rate():,.0f} per second{left}", err=True)
 
-        yield line
-        return
-
-    class Rate(TextColumn):
-        """Jobs per second."""
-
-        def render(self, task: Task) -> Text:
-            return Text(f"{rate():,.0f}/s")
-
-    columns = (TextColumn("jobs"), BarColumn(), MofNCompleteColumn(), Rate(""), TimeRemainingColumn())
-    with Bar(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("jobs", total=total)
-
-        def advance(jobs: int) -> None:
-            count(jobs)
-            bar.update(task, completed=done)
-
-        yield advance
+def _bar(*columns: Any) -> Bar:
+    """A bar after the description of its task; `disable` is set if standard error is not a terminal."""
+    console = Console(stderr=True)
+    description = TextColumn("{task.description}", markup=False)
+    return Bar(description, *columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 def _described(progress: Progress) -> str:

@@ -1,20 +1,15 @@
-"""Output of rows, as a table on a terminal, as one line per row elsewhere, or as JSON; and of sentences."""
+"""A document on the terminal: tables as wide as it is, sentences broken between words; elsewhere, one line for each row and sentence."""
 
-import json
-import math
 import re
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
 
-from rich.box import SIMPLE_HEAD
+from rich import box, table
 from rich.cells import cell_len
 from rich.console import Console
-from rich.table import Table
 
+from dropspin.reports.document import Document, Heading, Paragraph, Sentences, Table
+from dropspin.reports.output import json_text
 from dropspin.reports.terminal.safe import echo, styled
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PIECES = re.compile(r"(?<=\s)(?!(?<=\d\s)\S{1,4}\b)|(?:(?<=\w[\[=])|(?<=\w,))(?=[A-Za-z])")
 """The places at which a line of a cell may be broken: spaces that are not between a number and its unit, and between options of an
@@ -26,18 +21,45 @@ NARROWEST = 24
 """Width in characters to which columns of text are narrowed before a column is left out."""
 
 
-def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Sequence[str] = ()) -> None:
-    """Print rows with the same keys: as a table as wide as the terminal, as one line per row if the output is no terminal, or as JSON.
+def print_json_or(json_output: bool, data: object, document: Document, written: str = "") -> None:
+    """Print data as JSON; or a document, and where its page is."""
+    if json_output:
+        echo(json_text(data))
+        return
+    print_document(document)
+    if written:
+        echo(f"Written: {written}")
+
+
+def print_document(document: Document, console: Console | None = None) -> None:
+    """Print a document without its title and its charts, the summary last."""
+    console, is_first = console or Console(), True
+    for part in (*document.parts, *document.summary):
+        match part:
+            case Heading(text, on_terminal=True):
+                print_sentence(text if is_first else f"\n{text}", console)
+            case Paragraph(text, command, style):
+                console.print(styled(f"{text} {command}".strip(), style), soft_wrap=bool(command) or not console.is_terminal)
+            case Sentences(items, style=style):
+                for sentence in items:
+                    print_sentence(sentence, console, style)
+            case Table(lines=lines) if lines:
+                for line in lines:
+                    print_sentence(line, console)
+            case Table(rows, left_out_first) if rows:
+                print_rows(rows, left_out_first, console)
+        is_first = False
+
+
+def print_rows(rows: Sequence[Mapping[str, str]], left_out_first: Sequence[str] = (), console: Console | None = None) -> None:
+    """Print rows with the same keys, as a table as wide as the terminal, or as one line per row if the output is no terminal.
 
     Args:
         rows: The rows.
-        json_output: Whether to print JSON.
         left_out_first: The columns to leave out, in this order, if the table is wider than the terminal.
+        console: Rich's console to print to; None means standard output.
     """
-    if json_output:
-        echo(json.dumps(rows, indent=1, ensure_ascii=False))
-        return
-    console, head = Console(), list(rows[0])
+    console, head = console or Console(), list(rows[0])
     has_head = head not in (["what", "is"], ["what", "found"])
     if not console.is_terminal:
         for line in aligned([head] * has_head + [list(row.values()) for row in rows]):
@@ -50,12 +72,12 @@ def print_rows(rows: list[dict[str, str]], json_output: bool, left_out_first: Se
         head.remove(left_out[-1])
     cells = [head, *([row[key] for key in head] for row in rows)]
     widths = _widths(cells, console.width)
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_header=has_head)
-    for column, width in zip(cells[0], widths, strict=True):
-        table.add_column(styled(_wrapped(column, width)), overflow="fold")
+    shown = table.Table(box=box.SIMPLE_HEAD, pad_edge=False, show_header=has_head)
+    for column, width in zip(head, widths, strict=True):
+        shown.add_column(styled(_wrapped(column, width)), overflow="fold")
     for row in cells[1:]:
-        table.add_row(*(styled(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
-    console.print(table)
+        shown.add_row(*(styled(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
+    console.print(shown)
     if left_out:
         print_sentence(f"Columns not shown at this width: {', '.join(left_out)}; use a wider terminal or --json.", console)
 
@@ -81,14 +103,7 @@ def print_sentence(sentence: str, console: Console, style: str = "") -> None:
     console.print(styled(sentence, style=style), soft_wrap=not console.is_terminal)
 
 
-def print_sentences(sentences: Iterable[str]) -> None:
-    """Print several sentences."""
-    console = Console()
-    for sentence in sentences:
-        print_sentence(sentence, console)
-
-
-def _narrowest(rows: Sequence[dict[str, str]], head: Sequence[str]) -> int:
+def _narrowest(rows: Sequence[Mapping[str, str]], head: Sequence[str]) -> int:
     """The smallest width at which a table is readable: each column is as wide as its cells, or `NARROWEST` for text."""
     widths = []
     for key in head:
@@ -126,12 +141,3 @@ def _wrapped(text: str, width: int) -> str:
             lines.append("")
         lines[-1] += piece
     return "\n".join(line.rstrip() for line in lines)
-
-
-def json_rows(frame: "pd.DataFrame") -> str:
-    """A table as JSON with all digits; numbers that are not finite are null."""
-    rows = [
-        {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row.items()}
-        for row in frame.to_dict("records")
-    ]
-    return json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False)

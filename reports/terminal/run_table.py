@@ -1,7 +1,7 @@
 """The tables of a run on a terminal: for each scene, a table with a column for each engine."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -12,11 +12,11 @@ from dropspin.comparisons.judging.verdicts import MARKS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results
+from dropspin.reports.stories.findings import orders
+from dropspin.reports.stories.impact_laws import law_rows
+from dropspin.reports.stories.numbers import formatted, trend, word
 from dropspin.reports.terminal.safe import styled
 from dropspin.reports.terminal.summary import print_summary
-from dropspin.reports.views.findings import orders
-from dropspin.reports.views.impact_laws import law_rows
-from dropspin.reports.views.numbers import formatted, trend, word
 
 NUMBER_WIDTH = 9  # of -1.23e-04; a narrow terminal folds names and splits the table, but never cuts a number
 NAME_WIDTH, GAP = 20, 3
@@ -37,10 +37,11 @@ def print_table(results: Results, console: Console | None = None) -> None:
         out.print(styled(name, style="bold").append(f"  {scene.summary}" if scene.summary else "", style="not bold"))
         for first in range(0, len(results.engines), at_once):
             out.print(_scene_table(results, name, results.engines[first : first + at_once]))
-        _print_trends(results, name, out)
-        _print_ensemble(results, name, out)
-        _print_laws([row for row in laws if row["scene"] == name], out)
-        _print_remarks(results, name, out)
+        for sentence in (*_trends(results, name), *_ensemble(results, name), *_laws(row for row in laws if row["scene"] == name)):
+            out.print(styled(sentence, style="dim"))
+        remarks = results.table[(results.table["scene"] == name) & (results.table["metric"] == "")]
+        for row in remarks.drop_duplicates(["engine", "verdict", "reason"]).to_dict("records"):
+            out.print(styled(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))
         out.print()
     print_summary(results, out)
 
@@ -74,7 +75,7 @@ def _cell(value: float, verdict: str) -> Text:
     return styled(f"{formatted(value)} {MARKS[verdict]}", style=STYLES.get(verdict, ""))
 
 
-def _print_trends(results: Results, name: str, out: Console) -> None:
+def _trends(results: Results, name: str) -> Iterator[str]:
     """For each engine, a sentence with the observed orders and the errors that do not vanish as dt → 0."""
     frame = results.table[results.table["scene"] == name]
     for engine in results.engines:
@@ -87,10 +88,10 @@ def _print_trends(results: Results, name: str, out: Console) -> None:
             for metric, value, cause in zip(wrong["metric"], wrong["value"], wrong["cause"], strict=True)
         ]
         if trends:
-            out.print(styled(f"as dt → 0, {engine}: {', '.join(trends)}", style="dim"))
+            yield f"as dt → 0, {engine}: {', '.join(trends)}"
 
 
-def _print_ensemble(results: Results, name: str, out: Console) -> None:
+def _ensemble(results: Results, name: str) -> Iterator[str]:
     """The means over the initial states of the ensemble at the finest time step, each with the half-width of its confidence interval."""
     frame = results.table[(results.table["scene"] == name) & (results.table["kind"] == "ensemble")]
     finest = frame[frame["dt"] == frame["dt"].min()]
@@ -100,18 +101,12 @@ def _print_ensemble(results: Results, name: str, out: Console) -> None:
         spread = results.scenes[name].ensemble
         assert spread is not None
         starts = min(spread.size, QUICK_MEMBERS) if results.is_quick else spread.size
-        out.print(styled(f"over {starts} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}", style="dim"))
+        yield f"over {starts} starts, {str(metric).replace('_', ' ')}: {', '.join(means)}"
 
 
-def _print_laws(rows: Sequence[Mapping[str, str]], out: Console) -> None:
+def _laws(rows: Iterable[Mapping[str, str]]) -> Iterator[str]:
     """The distances of each engine to the exact solutions under the impact laws; that of the scene is marked."""
     for row in rows:
         _, engine, distance, *laws = row.items()
         listed = ", ".join(f"{law} {value}" for law, value in laws if value != "–")
-        out.print(styled(f"by impact law, {distance[1]}, {engine[1]}: {listed}", style="dim"))
-
-
-def _print_remarks(results: Results, name: str, out: Console) -> None:
-    frame = results.table[(results.table["scene"] == name) & (results.table["metric"] == "")]
-    for row in frame.drop_duplicates(["engine", "verdict", "reason"]).to_dict("records"):
-        out.print(styled(f"{row['engine']}: {word(row['verdict'])}. {row['reason']}", style=STYLES.get(row["verdict"], "")))
+        yield f"by impact law, {distance[1]}, {engine[1]}: {listed}"

@@ -6,45 +6,27 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from dropspin.comparisons.results.results import Results
-from dropspin.reports.terminal.rows import aligned, print_sentence
+from dropspin.reports.document import Document, Paragraph, Sentences
+from dropspin.reports.stories.check import MOST_PRINTED
+from dropspin.reports.stories.failures import failure_parts, grouped
+from dropspin.reports.stories.matrix import Matrix, matrix
+from dropspin.reports.stories.run import overview
+from dropspin.reports.terminal.rows import aligned, print_document, print_sentence
 from dropspin.reports.terminal.safe import styled
-from dropspin.reports.views.failures import FailureGroup, grouped
-from dropspin.reports.views.matrix import Matrix, matrix
-from dropspin.reports.views.run import overview
 from dropspin.scenarios.text import counted
-
-MOST_SENTENCES = 6
-"""Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
 
 
 def print_summary(results: Results, console: Console | None = None) -> None:
     """Print the findings, a matrix of scenes and engines, the failures, and the verdict."""
     out, summary = console or Console(), overview(results)
-    for sentence in summary.findings:
-        print_sentence(sentence, out)
+    print_document(Document("Findings", [Sentences(summary.findings)]), out)
     _print_matrix(matrix(results, summary.statuses), results.engines, out)
+    parts = failure_parts(grouped(results, [failure for failure in summary.failures if not failure.accepted]), MOST_PRINTED)
     if summary.laws:
         differing = counted(len({row["scene"] for row in summary.laws}), "scene")
-        print_sentence(
-            f"Impact laws differ in {differing}: the report lists each engine's distances to the other laws, which are not errors.",
-            out,
-            "dim",
-        )
-    print_failures(grouped(results, [one for one in summary.failures if not one.accepted]), out)
-    print_sentence(summary.verdict, out, "bold")
-
-
-def print_failures(groups: Sequence[FailureGroup], console: Console | None = None) -> None:
-    """Print the failures of each engine, what explains them first, with one command that reproduces them."""
-    out = console or Console()
-    for group in groups:
-        if group.consistent_with:
-            print_sentence(group.consistent_with, out, "red")
-        for sentence in group.sentences[:MOST_SENTENCES]:
-            print_sentence(f"✗ {sentence}", out, "red")
-        if len(group.sentences) > MOST_SENTENCES:
-            print_sentence(f"✗ {group.engine} has {counted(len(group.sentences) - MOST_SENTENCES, 'more failure')}.", out, "red")
-        out.print(styled(f"Reproduce: {group.reproduce}"), soft_wrap=True)  # a command is one line
+        others = "the report lists each engine's distances to the other laws, which are not errors."
+        parts.insert(0, Paragraph(f"Impact laws differ in {differing}: {others}", style="dim"))
+    print_document(Document("Failures", parts, [Paragraph(summary.verdict, style="bold")]), out)
 
 
 def _print_matrix(found: Matrix, engines: Sequence[str], out: Console) -> None:

@@ -19,12 +19,12 @@ from support.cli import dropspin
 from support.scenes import with_few_members
 
 import dropspin as ds
+from dropspin.reports.document import Charts, Document, Heading, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
 from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.plots.figures import CHARTS
 from dropspin.reports.replay import as_data, replay_of
-from dropspin.reports.sections import Section
-from dropspin.reports.views.run import overview
+from dropspin.reports.stories.run import overview
 from dropspin.scenarios.rotations import about, angle_between_orientations, multiply
 
 ENGINES = ["wang", "mujoco", "pybullet"]
@@ -59,15 +59,11 @@ def results(folder):
 def write_pages(place):
     failing = ds.load("drop-ball").model_dump(exclude_none=True, exclude={"expect"})
     failing |= {"name": "drop-<b>failing</b>", "expect": [{"metric": "energy_error", "below": 1e-12, "reason": "cannot hold"}]}
-    study = Section("What accuracy costs")
-    study.add_heading("A heading")
-    study.add_list(["One sentence.", "Another <one>."])
-    study.add_table([{"engine": "mujoco", "error": "1e-3"}])
-    study.add_charts(
-        "a-picture", [Chart("cost [s]", "error", [Line("<img src=x onerror=alert(1)>", np.array([1.0, 2.0]), np.array([3.0, 4.0]))])]
-    )
+    chart = Chart("cost [s]", "error", [Line("<img src=x onerror=alert(1)>", np.array([1.0, 2.0]), np.array([3.0, 4.0]))])
+    sentences = Sentences(["One sentence.", "Another <one>."], numbered=True)
+    parts = [Heading("A heading"), sentences, Table([{"engine": "mujoco", "error": "1e-3"}]), Charts("a-picture", [chart])]
     # Two studies of one scene have pictures of the same name.
-    sections = [study, Section("Where engines break down", study.parts)]
+    sections = [Document("What accuracy costs", parts), Document("Where engines break down", parts)]
     with pytest.MonkeyPatch.context() as patch:  # 16 of 32 start phases take two thirds of the time
         patch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 16)
         results = ds.run([*map(with_few_members, SCENES), ds.load(failing)], ENGINES)

@@ -38,7 +38,7 @@ def test_an_output_folder_that_stays_empty_is_removed(tmp_path):
 
 def test_a_table_is_the_same_as_csv_and_as_json(tmp_path):
     rows = [{"engine": "a,b", "error": 1e-300, "cost": None}, {"engine": "µ", "error": 0.1, "cost": 2.0}]
-    write_table(tmp_path, "made", ["engine", "error", "cost"], rows)
+    write_table(tmp_path, "made", rows)
     assert json.loads((tmp_path / "made.json").read_text(encoding="utf-8")) == rows
     with (tmp_path / "made.csv").open(newline="", encoding="utf-8") as file:
         read = list(csv.DictReader(file))

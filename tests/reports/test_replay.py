@@ -281,17 +281,3 @@ def test_damaged_run_is_refused(folder, tmp_path, damage):
     damage(copied)
     for verb in ("report", "replay"):
         assert_refused(dropspin(verb, copied, cwd=tmp_path), "not the folder of a run, or damaged")
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        '{"title": "a", "parts": 5}',
-        '{"title": "a", "parts": [{"kind": "bogus"}]}',
-        "[]",
-        '{"title": "a", "parts": [{"kind": "table", "rows": []}]}',
-    ],
-)
-def test_damaged_study_is_refused(folder, tmp_path, content):
-    (tmp_path / "section.json").write_text(content)
-    assert_refused(dropspin("report", folder, "--add", tmp_path, cwd=tmp_path), "has no study, or a damaged one (section.json: ")

@@ -21,15 +21,15 @@ from dropspin.comparisons.running.run import run
 from dropspin.reports import run_folder
 from dropspin.reports.html.replay import replay_page
 from dropspin.reports.html.report import html_report
-from dropspin.reports.markdown import run_markdown
+from dropspin.reports.markdown import markdown
 from dropspin.reports.plots import figures
 from dropspin.reports.plots.figures import report_charts
 from dropspin.reports.replay import replay_of
 from dropspin.reports.run_folder import write_report
+from dropspin.reports.stories.findings import profile_comparisons
+from dropspin.reports.stories.numbers import formatted
+from dropspin.reports.stories.run import document, overview
 from dropspin.reports.terminal.run_table import print_table
-from dropspin.reports.views.findings import profile_comparisons
-from dropspin.reports.views.numbers import formatted
-from dropspin.reports.views.run import overview
 from dropspin.scenarios import DropspinError, load
 
 NASTY = "<script>alert(1)</script>$x_{"
@@ -302,14 +302,14 @@ def test_markdown_cells_hold_anything():
         "expect": [{"metric": "energy_error", "within": [1.0, 2.0], "reason": "has | pipe and\nnewline"}],
     }
     found = run(load(scene), "mujoco", 1e-2)
-    markdown = run_markdown(found, overview(found))
-    tables = [line for line in markdown.splitlines() if line.startswith("|")]
+    page = markdown(document(found, overview(found)))
+    tables = [line for line in page.splitlines() if line.startswith("|")]
     assert {len(re.findall(r"(?<!\\)\|", line)) for line in tables} == {3}
-    [failed] = [line for line in markdown.splitlines() if line.startswith("- ✗")]
+    [failed] = [line for line in page.splitlines() if line.startswith("- ✗")]
     assert "has \\| pipe and newline" in failed
     assert failed.endswith("<br>`` dropspin.run(<scene 'a|b`c`*d*'>, 'mujoco', dt=[0.01]) ``"), failed
-    assert markdown.endswith("\n")
-    assert "&#39;" not in markdown
+    assert page.endswith("\n")
+    assert "&#39;" not in page
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import pytest
 from support.cli import TERMINAL, dropspin
 
 import dropspin as ds
+from dropspin.reports.stories.matrix import MOST_SCENES, matrix
+from dropspin.reports.stories.run import overview
 from dropspin.reports.terminal.rows import print_rows
 from dropspin.reports.terminal.summary import print_summary
-from dropspin.reports.views.matrix import MOST_SCENES, matrix
-from dropspin.reports.views.run import overview
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +161,7 @@ def test_table_keeps_numbers_whole(capsys, monkeypatch):
         "least wanted": "9.87e-05 and more",
         "less wanted": "1.23e+04 in all",
     }
-    print_rows([row], json_output=False, left_out_first=["least wanted", "less wanted"])
+    print_rows([row], left_out_first=["least wanted", "less wanted"])
     text = capsys.readouterr().out
     assert {"3.05e+00", "1.23e+04"} <= set(text.split())
     assert "49.1 ns" in text

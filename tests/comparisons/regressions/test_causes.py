@@ -13,9 +13,10 @@ from dropspin.comparisons.regressions.causes import causes
 from dropspin.comparisons.regressions.checking import check
 from dropspin.comparisons.regressions.parameters import PARAMETERS
 from dropspin.comparisons.running.run import run
-from dropspin.reports.markdown import check_markdown
-from dropspin.reports.terminal.summary import print_failures
-from dropspin.reports.views.failures import failures, grouped
+from dropspin.reports.markdown import markdown
+from dropspin.reports.stories.check import output, page
+from dropspin.reports.stories.failures import failures, grouped
+from dropspin.reports.terminal.rows import print_document
 from dropspin.scenarios import load
 from dropspin.scenarios.rotations import about, rotate
 
@@ -128,9 +129,9 @@ def test_check_prints_the_cause_first(capsys):
     worse = run(scenes, Made(title="worse", change=with_gravity(1.01 * np.eye(3))))
     checked = check(relabelled(worse, "worse", "mine"), accepted)
     found = failures(checked.results, "b.toml")
-    print_failures(grouped(checked.results, found, "b.toml"))
+    print_document(output(checked, None, found))
     assert capsys.readouterr().out.startswith("Consistent with gravity 1 % too high.\n✗ ")
-    assert "\n- Consistent with gravity 1 % too high.\n- ✗ " in check_markdown(checked, None, found)
+    assert "\n- Consistent with gravity 1 % too high.\n- ✗ " in markdown(page(checked, None, found))
 
 
 def test_moments_that_no_body_has_explain_no_error():

@@ -13,7 +13,7 @@ from dropspin.comparisons.regressions.checking import check
 from dropspin.comparisons.regressions.comparing import compare
 from dropspin.comparisons.regressions.motions import digests_of
 from dropspin.comparisons.running.run import run
-from dropspin.reports.views.check import BaselineFile, sentences
+from dropspin.reports.stories.check import BaselineFile, sentences
 
 BALL = SCENES[0]
 STEPS = [8e-3, 4e-3, 2e-3]

@@ -404,7 +404,7 @@ def test_largest_steps_are_those_whose_finer_steps_all_pass():
         ScanPoint(value, SOUND._replace(mode=mode))
         for value, mode in ((0.001, "sound"), (0.01, "inaccurate"), (0.1, "sound"), (1.0, "diverged"))
     )
-    study = RobustnessStudy(SPIN, DT, 0.1, (AxisScan(SPIN, AXES["step"], "exact", 0.001, points),), {}, {})
+    study = RobustnessStudy(SPIN, DT, 0.1, (AxisScan(AXES["step"], "exact", 0.001, points),), {}, {})
     assert study.largest_steps("exact") == (0.001, 0.1)
 
 

@@ -9,7 +9,7 @@ from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
-from dropspin.reports.views.run import forecast_sentence
+from dropspin.reports.stories.run import forecast_sentence
 
 DT = 8e-3
 SCENES = ("drop-ball", "spin-principal", "roll-prism", "drop-box-anyhow")

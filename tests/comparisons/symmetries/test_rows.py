@@ -13,7 +13,7 @@ from dropspin.comparisons.measuring.symmetries import AGAIN, BITWISE, NAMES
 from dropspin.comparisons.symmetries.findings import Finding
 from dropspin.comparisons.symmetries.rows import with_symmetries
 from dropspin.comparisons.symmetries.study import symmetries
-from dropspin.reports.views.failures import failures
+from dropspin.reports.stories.failures import failures
 
 SCENE, DTS = "spin-asymmetric", (8e-3, 4e-3)
 

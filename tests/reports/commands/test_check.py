@@ -13,7 +13,7 @@ from dropspin.comparisons.regressions.baseline import Baseline, accept
 from dropspin.comparisons.regressions.checking import check
 from dropspin.comparisons.running.run import run
 from dropspin.reports.junit import junit_xml
-from dropspin.reports.views.check import BaselineFile, accepted_sentences, sentences
+from dropspin.reports.stories.check import BaselineFile, accepted_sentences, sentences
 from dropspin.scenarios import load
 
 ENGINE, LABEL = "my_engine:MyEngine", "my-engine"

@@ -70,7 +70,7 @@ def test_exit_codes_of_the_installed_command(arguments, code, output, error, tmp
 
 def test_internal_error_is_exit_code_70(tmp_path):
     """With a traceback, which an error report needs."""
-    program = "import dropspin, dropspin.reports.views.listings as listings\nlistings.scene_rows = None\ndropspin.main()"
+    program = "import dropspin, dropspin.reports.stories.listings as listings\nlistings.scene_rows = None\ndropspin.main()"
     command = [sys.executable, "-c", program, "list"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout) == (70, "")
@@ -191,7 +191,7 @@ def test_an_interrupted_run_leaves_nothing(how, tmp_path):
 
 def test_an_interrupt_that_becomes_another_error_is_an_interrupt(monkeypatch, tmp_path):
     """As in compiled code: `import mujoco` turns it into an ImportError."""
-    monkeypatch.setattr("dropspin.reports.commands.interrupts._interrupts", [signal.SIGINT])
+    monkeypatch.setattr("dropspin.reports.terminal.interrupts._interrupts", [signal.SIGINT])
     monkeypatch.setattr("dropspin.comparisons.engines.registry.import_module", mock.Mock(side_effect=ImportError("initialization failed")))
     done = dropspin("show", "drop-ball", "-e", "mujoco", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (130, "dropspin: interrupted; nothing was written.\n")
@@ -201,7 +201,7 @@ def test_an_interrupt_that_becomes_another_error_is_an_interrupt(monkeypatch, tm
 def test_an_interrupt_that_is_swallowed_still_stops_the_command(verb, tmp_path, monkeypatch):
     """A callback of an engine or of the compiler may swallow the exception; the next step of the work raises it again."""
     (tmp_path / "spec.toml").write_text('scenes = ["drop-ball"]\nengines = ["mujoco"]\ndts = [0.004]\n')
-    monkeypatch.setattr("dropspin.reports.commands.interrupts._interrupts", [signal.SIGINT])
+    monkeypatch.setattr("dropspin.reports.terminal.interrupts._interrupts", [signal.SIGINT])
     given = ["spec.toml"] if verb == "sweep" else ["spin-principal", "-e", "mujoco", "--dt", "0.01"]
     done = dropspin(verb, *given, "-o", "out", cwd=tmp_path)
     assert done.returncode == 130

@@ -17,7 +17,7 @@ from dropspin.comparisons.running import run as running
 from dropspin.comparisons.running.processes import ResourceLimits
 from dropspin.comparisons.running.recording import simulate
 from dropspin.reports.run_folder import MeasuredScenes
-from dropspin.reports.views.failures import failures
+from dropspin.reports.stories.failures import failures
 from dropspin.scenarios import load
 
 SCENE = """

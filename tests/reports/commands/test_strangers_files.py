@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -16,7 +17,10 @@ from dropspin.comparisons.running.run import run
 from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
+from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff
 from dropspin.reports.run_folder import write_report
+from dropspin.reports.stories.tradeoff import TradeOffs
 from dropspin.scenarios import DropspinError, load
 
 DEEP = "[" * 5000 + "]" * 5000
@@ -55,17 +59,29 @@ def test_settings_are_printed_without_control_characters(verb, small_folder, cop
     assert not any("\x1b" in text for text in (done.stdout, done.stderr))
 
 
-def chart(**changes):
-    """A section with one chart of two points, with changes to its line."""
-    line = {"label": "a", "x": 0, "y": "AACAPwAAAEA=", "colour": "#0072B2", "width": 1.5} | changes
-    return {"title": "t", "parts": [{"kind": "charts", "name": "n", "charts": [{"xLabel": "x", "x": [[1.0, 2.0]], "lines": [line]}]}]}
+def study(scene=(), ladder=(), **point):
+    """A study of one engine at one time step, with changes to its scene, its ladder of time steps, and its configuration."""
+    found = TradeOff(
+        load("spin-principal"),
+        "orientation_error",
+        (CostPoint("<b>", 0.01, 1e-3, np.array([1.0, 2.0, 3.0])),),
+        (Ladder("<b>", ((0.01, 1e-3),), "budget", "it was spent"),),
+    )
+    content = TradeOffs(scenes=[found], within=[1e-2]).model_dump(mode="json")
+    [stored] = content["scenes"]
+    stored["points"][0] |= point
+    stored["ladders"][0] |= dict(ladder)
+    stored |= dict(scene)
+    return content
 
 
-def test_section_of_plain_data_is_added(copied, tmp_path):
+def test_study_of_a_stranger_is_added_as_text(copied, tmp_path):
     """The reference of the refused ones."""
-    (tmp_path / "section.json").write_text(json.dumps(chart()))
+    (tmp_path / "section.json").write_text(json.dumps(study()))
     assert dropspin("report", "run", "--add", ".", cwd=tmp_path).returncode == 0
-    assert '"y": "AACAPwAAAEA="' in (copied / "report.html").read_text()
+    page = (copied / "report.html").read_text()
+    assert "spin-principal, orientation error within 0.01 rad: &lt;b&gt; at 10 ms, 2 s per simulated second." in page
+    assert "<b>" not in page
 
 
 @pytest.mark.parametrize(
@@ -74,31 +90,30 @@ def test_section_of_plain_data_is_added(copied, tmp_path):
         "",
         "[]",
         DEEP,
-        '{"title": "t", "parts": [{"kind": "svg", "content": "<svg onload=alert(1)>"}]}',
-        '{"title": "t", "parts": [{"kind": "charts", "name": "n", "svg": "<svg>", "charts": []}]}',
-        '{"title": "t", "parts": [{"kind": "table", "rows": [{"a": "1"}, {"b": "1"}]}]}',
-        '{"title": "\\u001b[2J", "parts": []}',
+        '{"title": "t", "parts": []}',
+        '{"study": "run"}',
         *(
-            json.dumps(chart(**change))
-            for change in (
-                {"y": "AACAPw=="},
-                {"y": "no base 64"},
-                {"y": [1.0, 2.0]},
-                {"x": 1},
-                {"x": -1},
-                {"colour": "url(https://example.org/x)"},
-                {"dashes": "10000"},
-                {"marker": "<svg>"},
-                {"width": "1"},
-                {"onclick": "alert(1)"},
-                {"low": "AACAPwAAAEA="},
+            json.dumps(changed)
+            for changed in (
+                study() | {"study": "limits"},
+                study() | {"svg": "<svg onload=alert(1)>"},
+                study() | {"within": "all"},
+                study(scene={"points": []}),
+                study(scene={"metric": "beauty"}),
+                study(scene={"scene": {"duration": 1.0}}),
+                study(scene={"worlds": [{}]}),
+                study(ladder={"ended": "soon"}),
+                study(cost="1.0"),
+                study(cost=["a"]),
+                study(cost=[]),
+                study(error="Infinity"),
+                study(error=None),
+                study(dt="NaN"),
             )
         ),
-        json.dumps(chart()).replace("[[1.0, 2.0]]", '[{"first": 0, "step": 1, "count": 1000000000000}]'),
-        json.dumps(chart()).replace('"xLabel": "x"', '"reference": "other"'),
     ],
 )
-def test_section_of_anything_else_is_refused(content, copied, tmp_path):
+def test_study_of_anything_else_is_refused(content, copied, tmp_path):
     (tmp_path / "section.json").write_text(content)
     before = contents(tmp_path)
     assert_refused(dropspin("report", "run", "--add", ".", cwd=tmp_path), "has no study, or a damaged one (section.json: ")

@@ -12,7 +12,7 @@ import pytest
 from support.adapters import DRIFTING
 from support.cli import DROPSPIN, assert_refused, dropspin, spawn
 
-from dropspin.reports.views import listings
+from dropspin.reports.stories import listings
 
 STRAYS = ("bottleneck", "numexpr", "cloudpickle", "yaml", "colorama", "lxml", "click", "numpy", "matplotlib", "scenarios", "_pytest")
 BALL = """

@@ -7,6 +7,7 @@ from support.cli import dropspin
 
 from dropspin.comparisons.tradeoff.errors import BUDGET
 from dropspin.reports.commands.tradeoff import tradeoff_command
+from dropspin.reports.study_files import read_study
 
 SCENE = """
 duration = 0.5
@@ -92,4 +93,5 @@ def test_each_number_of_worlds_has_a_cost_and_a_recommendation(tmp_path):
     for row in rows:
         costs = [row["cost_per_world_2"], row["cost_per_world_16"]]
         assert costs == [None, None] if row["engine"] == "pybullet" else all(cost > 0.0 for cost in costs)
-    assert "number of worlds in a batch" in (tmp_path / "out/section.json").read_text()
+    [picture] = [part for part in read_study(str(tmp_path / "out")).parts if part.kind == "charts"]
+    assert picture.charts[-1].x_label == "number of worlds in a batch"

@@ -1,0 +1,81 @@
+"""A document as data: what a story makes of results, and what the terminal, HTML pages and Markdown show.
+
+A page begins with the summary; a terminal, on which the last lines are read first, ends with it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from dropspin.reports.plots.chart import Chart
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading within a page; a terminal shows it as a sentence, or not at all."""
+
+    kind: ClassVar = "heading"
+    text: str
+    on_terminal: bool = False
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A text, followed by a command as code if there is one; `style` is that of a terminal, and bold is bold on a page too."""
+
+    kind: ClassVar = "paragraph"
+    text: str
+    command: str = ""
+    style: str = ""
+
+
+@dataclass(frozen=True)
+class Sentences:
+    """A list of sentences, on a page each with a command below it if there are any; `style` is that of a terminal."""
+
+    kind: ClassVar = "sentences"
+    items: Sequence[str]
+    numbered: bool = False
+    style: str = ""
+    commands: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts by column. A terminal shows `lines` instead, if there are any.
+
+    A narrow terminal leaves out the columns in `left_out_first`, in this order.
+    """
+
+    kind: ClassVar = "table"
+    rows: Sequence[Mapping[str, str]]
+    left_out_first: Sequence[str] = ()
+    lines: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Charts:
+    """A picture of charts, which a terminal does not show; without charts, a picture that is drawn otherwise."""
+
+    kind: ClassVar = "charts"
+    name: str
+    charts: "Sequence[Chart]"
+
+
+Part = Heading | Paragraph | Sentences | Table | Charts
+
+
+@dataclass(frozen=True)
+class Document:
+    """A document. Lists and tables without content are not shown.
+
+    Attributes:
+        title: The title of the page; a terminal does not show it.
+        parts: The parts, in order.
+        summary: The parts that a page shows first and a terminal last.
+    """
+
+    title: str
+    parts: Sequence[Part]
+    summary: Sequence[Part] = ()

@@ -1,0 +1,40 @@
+"""The output of `dropspin calibrate`: the settings, and the values measured with them."""
+
+import math
+from typing import Any
+
+from dropspin.comparisons.calibration import Calibration, Measured
+from dropspin.reports.document import Document, Table
+from dropspin.scenarios import DropspinError
+
+
+def friction(text: str) -> str | float:
+    """The value of the option `--friction` as a floor's friction.
+
+    Raises:
+        DropspinError: The value is not a valid friction.
+    """
+    if text in ("none", "infinite"):
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise DropspinError(f"friction: got {text!r}; give none, infinite or a coefficient.") from None
+
+
+def document(found: Calibration) -> Document:
+    """The values that were measured with the calibrated settings; the settings and the reasons for them."""
+    measured = [{"measured": result.name, "value": _with_unit(result), "how": result.how} for result in found.measured]
+    settings = [{"set": name, "to": str(value), "why": found.reasons.get(name, "")} for name, value in found.settings.items()]
+    return Document(found.engine, [Table(measured), Table(settings)])
+
+
+def _with_unit(result: Measured) -> str:
+    if math.isnan(result.value):
+        return "–"
+    return f"{result.value:.4g}" if result.unit == "1" else f"{result.value:.4g} {result.unit}"
+
+
+def as_data(found: Calibration) -> dict[str, Any]:
+    """A calibration for JSON."""
+    return {name: getattr(found, name) for name in ("engine", "measured", "settings", "programs")}

@@ -1,0 +1,154 @@
+"""The output of `dropspin check` and `accept`: the outcome of a check, and annotations for GitHub."""
+
+import os
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import pandas as pd
+
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
+from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.checking import Checked
+from dropspin.comparisons.regressions.values import broke_down, comparable_results, regressed
+from dropspin.comparisons.results.provenance import versions_behind
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.document import Document, Paragraph, Sentences, Table
+from dropspin.reports.stories.failures import Failure, failure_parts, grouped
+from dropspin.reports.stories.findings import counts, verdict_sentence
+from dropspin.reports.stories.numbers import capitalized, failing
+from dropspin.scenarios.text import counted
+
+JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
+MOST_ANNOTATIONS = 10
+"""The number of annotations that GitHub shows for one step."""
+MOST_SENTENCES, MOST_PRINTED = 24, 6
+"""Largest number of sentences on the failures of one engine, on a page and on a terminal; JUnit, JSON and the report have all failures."""
+
+
+class BaselineFile(NamedTuple):
+    """A baseline, its file, and the folder of the run that is compared with it, as they appear in printed commands."""
+
+    baseline: Baseline
+    path: str
+    run: str
+
+    @property
+    def accept_command(self) -> str:
+        """The command that accepts the run's results."""
+        return shlex.join(["dropspin", "accept", self.run, "--baseline", self.path, "--reason"]) + ' "…"'
+
+
+def page(checked: Checked, file: BaselineFile | None, failures: Sequence[Failure]) -> Document:
+    """The outcome of a check as the title, the failures of each engine, and the numbers of its checks."""
+    results, groups = checked.results, grouped(checked.results, failures, file and file.path)
+    *notes, verdict = sentences(checked, file)
+    versions = ", ".join(f"{name} {version}" for name, version in versions_behind(results.provenance).items())
+    tallies = Table([_tally(results, engine) for engine in results.engines])
+    parts = [*failure_parts(groups, MOST_SENTENCES), tallies, Paragraph(f"{versions} on {results.provenance['cpu']}")]
+    return Document(f"dropspin: {'✗' if groups else '✓'} {verdict}", parts, [Sentences([_scope(file), *notes])])
+
+
+def output(checked: Checked, file: BaselineFile | None, failures: Sequence[Failure]) -> Document:
+    """The failures and the outcome of a check, for a terminal."""
+    groups = grouped(checked.results, failures, file and file.path)
+    outcome = Sentences([_scope(file), *sentences(checked, file)])
+    return Document("Check", failure_parts(groups, MOST_PRINTED), [outcome, *_annotations(failures)])
+
+
+def _scope(file: BaselineFile | None) -> str:
+    """A sentence on what was checked."""
+    if file is None:
+        return "Checked: the expectations of the scenes only, without a baseline."
+    return f"Checked: the expectations of the scenes, and the accepted results in {file.path}."
+
+
+def _tally(results: Results, engine: str) -> dict[str, str]:
+    """The number of checks of an engine with each verdict, and of those in which it broke down or is missing."""
+    mine = results.table["engine"] == engine
+    numbers = results.table.loc[mine, "verdict"].value_counts()
+    verdicts = {verdict: str(numbers.get(verdict, 0)) for verdict in ("passed", "failed", "known", "limited")}
+    return {"engine": engine, **verdicts, "broke down or missing": str(results.breakdowns[mine].sum())}
+
+
+def sentences(checked: Checked, file: BaselineFile | None) -> list[str]:
+    """The outcome of a check, the verdict last."""
+    table = checked.results.table
+    without_baseline = replace(checked.results, table=table[table["kind"] != "baseline"])
+    known = int((without_baseline.table["basis"] == "accepted_failure").sum())
+    is_judged = not known or without_baseline.table["verdict"].isin(JUDGED).any()
+    verdict = verdict_sentence(without_baseline, counts(without_baseline)) if is_judged else ""
+    if file is None:
+        return [verdict]
+    failed_rows = table[(table["kind"] == "baseline") & (table["verdict"] == "failed")]
+    changes = checked.changes["change"].value_counts()
+    notes = []
+    for (engine, cause), count in checked.attributions.items():
+        notes.append(f"{engine}: {counted(count, 'result is', 'results are')} worse, moved or gone. {capitalized(cause.message)}.")
+    for change, words in (("better", "better than accepted"), ("new", "new and not yet accepted")):
+        if count := int(changes.get(change, 0)):
+            notes.append(f"{counted(count, 'result is', 'results are')} {words}.")
+    if len(checked.not_run):
+        pairs = len(checked.not_run.drop_duplicates(["scene", "engine"]))
+        are = counted(len(checked.not_run), "accepted result is", "accepted results are")
+        notes.append(f"{are} not covered by this run ({counted(pairs, 'scene–engine pair')}).")
+    if known:
+        notes.append(f"{counted(known, 'known failure')}, not counted as failed.")
+    acceptable = (~(broke_down(failed_rows, checked.results) & (failed_rows["metric"] == ""))).any()
+    if acceptable or {"better", "new"} & set(changes.index):
+        notes.append(f"If the changes are intended: {file.accept_command}")
+    return [*notes, _verdict(checked, failed_rows, verdict)]
+
+
+def _verdict(checked: Checked, failed_rows: pd.DataFrame, verdict: str) -> str:
+    """The last sentence: the verdict on the accepted results beside that on the run's other checks."""
+    failed = len(regressed(checked.changes))
+    judged = int(checked.changes["change"].isin(["same", "better"]).sum()) + failed
+    changed = failed_rows.loc[failed_rows["basis"] == "scene_changed", "scene"].nunique()
+    scenes = f"{counted(changed, 'scene has', 'scenes have')} changed since results were accepted. " if changed else ""
+    if failed or changed:
+        those = f"{failing(failed, judged, 'accepted result')}." if judged else "No accepted result was compared."
+        return f"{scenes}{those} {verdict}".rstrip()
+    hold = "The accepted result holds" if judged == 1 else f"All {judged:,} accepted results hold"
+    return f"{verdict} {hold}.".lstrip() if judged else verdict
+
+
+def accepted_sentences(results: Results, accepted: pd.DataFrame, known_failures: bool) -> list[str]:
+    """Sentences on how many results of a run were accepted, and which cannot be accepted."""
+    changed = accepted["change"].value_counts()
+    kinds = [f"{changed[kind]:,} {kind}" for kind in ("new", "worse", "moved", "better", "gone", "same") if kind in changed]
+    measured = ", ".join(engine for engine in results.engines if (accepted["engine"] == engine).any())
+    notes = [f"Accepted for {counted(len(results.scenes), 'scene')} with {measured}: {', '.join(kinds) or 'no results'}."]
+    tally = counts(results)
+    acceptable = int(comparable_results(results)["verdict"].isin(FAILURES).sum())
+    unknown = tally.failed - acceptable
+    if tally.failed and not known_failures:
+        fail = counted(tally.failed, "check of this run fails", "checks of this run fail")
+        those = f"the {acceptable:,} with comparable results" if unknown else "them"
+        notes.append(f"{fail}, so dropspin check will fail too; --known-failures accepts {those} as known failures.")
+    if unknown and known_failures:
+        have = counted(unknown, "failing check has", "failing checks have")
+        notes.append(f"{have} no comparable result and cannot be accepted.")
+    if tally.broken:
+        notes.append(f"{counted(tally.broken, 'engine run')} broke down; results accepted earlier for them stay in the baseline.")
+    return notes
+
+
+def _annotations(failures: Sequence[Failure]) -> list[Paragraph]:
+    """The workflow commands by which a runner of GitHub shows failures; empty elsewhere."""
+    if os.environ.get("GITHUB_ACTIONS") != "true":
+        return []
+    commands = []
+    for failure in failures[:MOST_ANNOTATIONS]:
+        title = _escaped(f"{failure.scene} {failure.engine}", ":,")
+        text = _escaped(f"{failure.sentence.removesuffix('.')}. Reproduce: {failure.reproduce}")
+        commands.append(Paragraph("", f"::error title={title}::{text}"))
+    return commands
+
+
+def _escaped(text: str, more: str = "") -> str:
+    """Text escaped for GitHub's workflow commands; % is escaped first."""
+    for sign in f"%\r\n{more}":
+        text = text.replace(sign, f"%{ord(sign):02X}")
+    return text

@@ -1,0 +1,122 @@
+"""The output of `dropspin compare`: the changes between two runs."""
+
+import math
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+from dropspin.comparisons.regressions.comparing import Changes
+from dropspin.comparisons.regressions.motions import EqualMotions
+from dropspin.comparisons.regressions.speed import SpeedChange
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.stories.failures import reproduce_scenes
+from dropspin.reports.stories.numbers import capitalized, formatted, subject
+from dropspin.scenarios.text import counted
+
+TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
+"""The heading of each kind of change, the worst kind first."""
+MOST_LINES = 12
+"""Largest number of lines of a table; JSON has all lines."""
+
+
+def page(changes: Changes) -> Document:
+    """The verdict as the title, notes, and the changes of each kind."""
+    mark = "✗" if len(changes.regressions) else "✓"
+    return Document(f"dropspin: {mark} {_verdict(changes)}", _tables(changes), [Sentences(_notes(changes))])
+
+
+def output(changes: Changes, results: Results) -> Document:
+    """The changes of each kind, the commands that run the scenes of regressions again, notes, and the verdict, for a terminal."""
+    by_engine = changes.regressions.groupby("engine", sort=False)["scene"].unique()
+    commands = [Paragraph("Reproduce:", reproduce_scenes(results, list(scenes), str(engine))) for engine, scenes in by_engine.items()]
+    return Document("Changes", [*_tables(changes), *commands], [Sentences([*_notes(changes), _verdict(changes)])])
+
+
+def _verdict(changes: Changes) -> str:
+    regressed, total = len(changes.regressions), counted(len(changes.results), "result")
+    are = "is" if regressed == 1 else "are"
+    return f"{regressed:,} of {total} {are} worse, moved or gone." if regressed else f"None of {total} is worse."
+
+
+def _tables(changes: Changes) -> list[Part]:
+    """The changes of each kind, a row for each engine and scene with the largest change."""
+    parts: list[Part] = []
+    for change, word in TITLES.items():
+        changed = changes.of(change)
+        groups = [group for _, group in changed.groupby(["engine", "scene"], sort=False)]  # which probably have one cause
+        if groups:
+            more = f", the first {MOST_LINES} of {len(groups)} scenes and engines" if len(groups) > MOST_LINES else ""
+            rows = [_row(group.iloc[0].to_dict(), len(group)) for group in groups[:MOST_LINES]]
+            parts.append(Heading(f"{word}: {counted(len(changed), 'result')}{more}", on_terminal=True))
+            parts.append(Table(rows, lines=list(map(_line, rows))))
+    return parts
+
+
+def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
+    """The largest change of an engine in a scene, and the number of others."""
+    before, after = row["before"], row["value"]
+    ratio = abs(after / before) if abs(before) > row["tolerance"] else math.inf  # a ratio of rounding errors is meaningless
+    return {
+        "scene": row["scene"],
+        "engine": row["engine"],
+        "result": subject(row["metric"], row["kind"]),
+        "step": "→ 0" if "," in row["steps"] else f"{1e3 * float(row['steps']):g} ms",
+        "before": formatted(before),
+        "now": formatted(after),
+        "ratio": f"{ratio:.3g}" if math.isfinite(ratio) else "–",
+        "tolerances": "–" if math.isnan(row["in_tolerances"]) else f"{row['in_tolerances']:.3g}",
+        "others": counted(count - 1, "other result") if count > 1 else "–",
+    }
+
+
+def _line(row: Mapping[str, str]) -> str:
+    """A row of a table as a line."""
+    ratio = "" if row["ratio"] == "–" else f", {row['ratio']} times"
+    away = "" if row["tolerances"] == "–" else f", {row['tolerances']} times its tolerance away"
+    others = "" if row["others"] == "–" else f"; and {row['others']}"
+    change = f"{row['result']} at {row['step']} from {row['before']} to {row['now']}"
+    return f"  {row['scene']} · {row['engine']}: {change}{ratio}{away}{others}"
+
+
+def _notes(changes: Changes) -> list[str]:
+    """Sentences on the attributions, the scenes that were not compared, the speeds, and the motions."""
+    notes = []
+    for engine, cause in changes.attributions.items():
+        kinds = changes.results.loc[changes.results["engine"] == engine, "change"]
+        counts = ", ".join(f"{count:,} {change}" for change in TITLES if (count := int((kinds == change).sum())))
+        notes.append(f"{engine}: {counts}. {capitalized(cause.message)}.")
+    if changes.surroundings and not changes.attributions:
+        notes.append(f"No result has changed, although these differ between the runs: {', '.join(changes.surroundings)}.")
+    if changes.other_scenes:
+        notes.append(f"Not compared, because these scenes have changed: {', '.join(changes.other_scenes)}.")
+    if changes.in_one_only:
+        notes.append(f"In one of the runs only: {', '.join(changes.in_one_only)}.")
+    notes += map(_speed, changes.speed)
+    return notes + ([f"Motions equal bit for bit: {'; '.join(map(_motions, changes.motions))}."] if changes.motions else [])
+
+
+def _speed(change: SpeedChange) -> str:
+    between = f"{change.least:.2f} to {change.most:.2f}" if math.isfinite(change.most) else "unbounded with so few cases"
+    return (
+        f"Speed (reported, not gated): {change.engine} relative to {change.other} takes {change.ratio:.2f} times as long as before "
+        f"(median of {counted(change.cases, 'case')}, 95 % interval {between})."
+    )
+
+
+def _motions(motions: EqualMotions) -> str:
+    first = f", the first difference in {motions.scene} at {1e3 * motions.dt:g} ms in step {motions.step:,}"
+    return f"{motions.engine} {motions.equal:,} of {motions.compared:,}{first if motions.equal < motions.compared else ''}"
+
+
+def as_data(changes: Changes) -> dict[str, Any]:
+    """The comparison for JSON."""
+    return {
+        "results": changes.results[changes.results["change"] != "same"].to_dict("records"),
+        "compared": len(changes.results),
+        "attributed_to": {engine: {"origin": cause.origin, "message": cause.message} for engine, cause in changes.attributions.items()},
+        "surroundings": changes.surroundings,
+        "other_scenes": changes.other_scenes,
+        "in_one_only": changes.in_one_only,
+        "motions": [motions._asdict() for motions in changes.motions],
+        "speed": [change._asdict() for change in changes.speed],
+    }

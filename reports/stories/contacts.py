@@ -1,0 +1,39 @@
+"""The contacts of a scene: for each engine, the largest violation of each law of contact, and the time of the contact that has it."""
+
+import math
+
+import numpy as np
+
+from dropspin.comparisons.measuring.contacts import RESIDUALS, contacts
+from dropspin.comparisons.measuring.requirements import obeys_contact_laws
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.stories.numbers import formatted
+
+
+@np.errstate(all="ignore")  # an engine may return 1e300
+def worst_contacts(results: Results, scene_name: str) -> list[dict[str, str]]:
+    """A row for each engine that touches the floor at the finest time step: its contacts, and the worst for each law.
+
+    The motion is that from the scene's own start. Empty if the forces of the floor cannot be computed.
+    """
+    scene = results.scenes[scene_name]
+    if not obeys_contact_laws(scene, None):
+        return []
+    mine = {(engine, dt): motion for (name, engine, dt), motion in results.trajectories.items() if name == scene_name}
+    rows = []
+    for engine in results.engines:
+        motion = next((mine[key] for key in sorted(mine, key=lambda key: key[1]) if key[0] == engine), None)
+        sound = None if motion is None else motion[: motion.first_bad_row]
+        found = None if sound is None or len(sound) < 2 else contacts(scene, sound)
+        if found is not None and len(found):
+            worst = {name: _worst(found[name].tolist(), found["start"].tolist()) for name in RESIDUALS}
+            rows.append({"engine": engine, "contacts": str(len(found)), **worst})
+    return rows
+
+
+def _worst(values: list[float], times: list[float]) -> str:
+    """The largest value, with its time [s] unless it is 0; – if a value is undefined, as the cone of infinite friction is."""
+    if any(map(math.isnan, values)):
+        return "–"
+    largest = max(values)
+    return "0" if largest == 0.0 else f"{formatted(largest)} at {times[values.index(largest)]:.4g} s"

@@ -1,0 +1,249 @@
+"""The failures of a run, with scene, engine, result and size, and the commands that reproduce them."""
+
+import math
+import shlex
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dropspin.comparisons.judging.convergence import STUDIES
+from dropspin.comparisons.judging.verdicts import FAILURES
+from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.regressions.causes import WrongParameter, causes
+from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.running.processes import ResourceLimits
+from dropspin.reports.document import Paragraph, Part, Sentences
+from dropspin.reports.stories.numbers import bound, formatted, step, subject, word
+from dropspin.scenarios.text import counted, rounded
+
+Row = Mapping[Hashable, Any]
+MOST_NAMES = 4
+"""Largest number of names in a sentence."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A failure: the failed rows of one metric of one engine in one scene, described by the first of these rows.
+
+    Attributes:
+        scene: Name of the scene.
+        engine: Label of the engine.
+        where: The time step, in words.
+        what: The failed result in words, with value, bound and reason.
+        result: The name of the failed result, such as `order of orientation error`; empty for a breakdown.
+        others: Number of other rows, at other time steps, that fail in the same way.
+        reproduce: The command, or the call, that reproduces it.
+        broke_down: Whether the engine crashed, hung, diverged, or is missing.
+        accepted: Whether the failure is of an accepted result.
+        of_symmetry: Whether the failure is of a symmetry or of a repeated run.
+    """
+
+    scene: str
+    engine: str
+    where: str
+    what: str
+    result: str
+    others: int
+    reproduce: str
+    broke_down: bool
+    accepted: bool
+    of_symmetry: bool
+
+    @property
+    def sentence(self) -> str:
+        """The failure in one line, without the command."""
+        others = f" (and {self.others} other time {'step' if self.others == 1 else 'steps'})" if self.others else ""
+        return f"{self.scene} · {self.engine}{self.where}: {self.what}{others}"
+
+
+@dataclass(frozen=True)
+class FailureGroup:
+    """The failures of one engine: a sentence for each scene, whose failures probably have one cause, and one command for all scenes.
+
+    Attributes:
+        engine: Label of the engine.
+        sentences: For each scene its first failure and the number of other failing results; for a breakdown, the scenes in which it occurs.
+        consistent_with: The causes of which each alone explains the asymptotic errors: wrong parameters, and known faults; empty if there
+            is no such cause.
+        reproduce: The command, or the call, that reproduces them.
+    """
+
+    engine: str
+    sentences: list[str]
+    consistent_with: str
+    reproduce: str
+
+
+def failures(results: Results, baseline: str | None = None) -> list[Failure]:
+    """The failures of a run.
+
+    The order is: breakdowns, deviations from accepted results (the largest first), asymptotic errors, others.
+
+    Args:
+        results: The run, with the rows of a check if there was one.
+        baseline: The baseline file it was compared with, for the commands.
+    """
+    rows = results.table[results.breakdowns | results.table["verdict"].isin(FAILURES)]
+    of_kind = rows["kind"].map({"baseline": 0.0, "asymptotic_error": 1.0}).astype(float).fillna(2.0)
+    gone = (rows["value"].isna() & rows["metric"].ne("")).astype(float)
+    urgency = (of_kind + 0.5 * gone).where(rows["verdict"].isin(FAILURES), -1.0)
+    grouped: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows.assign(urgency=urgency).sort_values("urgency", kind="stable").to_dict("records"):
+        accepted = row["truth"] if row["kind"] == "baseline" else ""
+        grouped.setdefault((row["scene"], row["engine"], row["metric"], row["verdict"], row["kind"], accepted), []).append(row)
+    return [_failure(results, group, baseline) for group in grouped.values()]
+
+
+def _failure(results: Results, group: list[Row], baseline: str | None) -> Failure:
+    row = group[0]
+    where = "" if math.isnan(row["dt"]) and not row["metric"] else f" · {step(row['dt'])}{'' if math.isnan(row['dt']) else ' s'}"
+    return Failure(
+        scene=row["scene"],
+        engine=row["engine"],
+        where=where,
+        what=what_fails(row),
+        result=subject(row["metric"], row["kind"], row["truth"]) if row["metric"] else "",
+        others=len(group) - 1,
+        reproduce=reproduce(results, row, baseline),
+        broke_down=row["verdict"] not in FAILURES,
+        accepted=row["kind"] == "baseline",
+        of_symmetry=kind_of(row["metric"]) is not None,
+    )
+
+
+def grouped(results: Results, found: Sequence[Failure], baseline: str | None = None) -> list[FailureGroup]:
+    """The failures of a run, grouped by engine and scene; equal breakdowns of an engine in several scenes are one failure."""
+    by_engine: dict[str, dict[tuple[bool, str], list[Failure]]] = {}
+    broken = {(one.scene, one.engine) for one in found if one.broke_down}
+    for one in found:
+        if one.accepted and not one.result and (one.scene, one.engine) in broken:
+            continue  # its accepted results are gone because it broke down
+        cause = one.what if one.broke_down else one.scene
+        by_engine.setdefault(one.engine, {}).setdefault((one.broke_down, cause), []).append(one)
+    return [_group(results, engine, list(by_cause.values()), baseline) for engine, by_cause in by_engine.items()]
+
+
+def failure_parts(groups: Sequence[FailureGroup], most: int) -> list[Part]:
+    """The failures of each engine, at most so many, after what explains them, and one command that reproduces them."""
+    parts: list[Part] = []
+    for group in groups:
+        explained = [group.consistent_with] if group.consistent_with else []
+        listed = [f"✗ {sentence}" for sentence in group.sentences[:most]]
+        more = len(group.sentences) - most
+        others = [f"✗ {group.engine} has {counted(more, 'more failure')}."] if more > 0 else []
+        parts += [Sentences([*explained, *listed, *others], style="red"), Paragraph("Reproduce:", group.reproduce)]
+    return parts
+
+
+def _group(results: Results, engine: str, by_cause: Sequence[Sequence[Failure]], baseline: str | None) -> FailureGroup:
+    scenes = list(dict.fromkeys(one.scene for some in by_cause for one in some))
+    accepted = any(one.accepted for some in by_cause for one in some)
+    symmetric = any(one.of_symmetry for some in by_cause for one in some)
+    command = reproduce_scenes(results, scenes, engine, baseline=baseline if accepted else None, symmetries=symmetric)
+    return FailureGroup(engine, [_of_one_cause(some) for some in by_cause], _consistent_with(results, engine), command)
+
+
+def _consistent_with(results: Results, engine: str) -> str:
+    """The causes with which the errors of an engine are consistent, in a sentence; empty if there are none."""
+    parameters, faults = causes(results, engine)
+    found = [" or ".join(dict.fromkeys(map(_described, parameters))), *(f"this fault: {fault.message}" for fault in faults)]
+    listed = ", or with ".join(filter(None, found))
+    return f"Consistent with {listed}." if listed else ""
+
+
+def _described(wrong: WrongParameter) -> str:
+    name, unit, _ = wrong.parameter
+    size = f"{rounded(100.0 * abs(wrong.size), 2)} %" if unit == "1" else f"{rounded(abs(wrong.size), 2)} {unit}"
+    if not wrong.signed or unit == "rad":
+        return f"{name} wrong by {size}"
+    return f"{name} {size} too {'high' if wrong.size > 0.0 else 'low'}"
+
+
+def _of_one_cause(some: Sequence[Failure]) -> str:
+    """The first of some failures in words, and the number of the others."""
+    first = some[0]
+    if first.broke_down:
+        others = list(dict.fromkeys(one.scene for one in some[1:]))
+        return first.sentence.rstrip(".") + (f"; the same in {_listed(others)}" if others else "") + "."
+    rows = sum(1 + one.others for one in some[1:])
+    results = [name for name in dict.fromkeys(one.result for one in some[1:]) if name not in ("", first.result)]
+    others_too = f" ({_listed(results)})" if results else ""
+    fail = counted(rows, "other result of this scene fails", "other results of this scene fail")
+    return first.sentence.rstrip(".") + (f"; {fail}{others_too}" if rows else "") + "."
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first `MOST_NAMES` names, separated by commas, and the number of the others."""
+    return ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
+
+
+def what_fails(row: Row) -> str:
+    """A failed row in words: value, bound or interval, and reason."""
+    if not row["metric"]:
+        return str(row["reason"]) if row["verdict"] in FAILURES else f"{word(row['verdict'])}. {row['reason']}"
+    what = subject(row["metric"], row["kind"], row["truth"])
+    if row["kind"] == "baseline":  # with more digits than elsewhere: tolerances are small
+        return f"{what} is {row['value']:.6g}, {row['reason']}"
+    limits = bound(row["lower"], row["upper"])
+    expected = f", {'95 % interval' if row['kind'] in STUDIES else 'expected'} {limits}" if limits else ""
+    value = "undefined" if math.isnan(row["value"]) else formatted(row["value"])
+    return f"{what} is {value}{expected}: {row['reason']}"
+
+
+def reproduce(results: Results, row: Row, baseline: str | None = None) -> str:
+    """The command that measures a row again, or the Python call if the scene or the engine was given as an object."""
+    dts = None if math.isnan(row["dt"]) or row["kind"] in STUDIES else [row["dt"]]
+    of_baseline = baseline if row["kind"] == "baseline" else None
+    return reproduce_scenes(results, [row["scene"]], row["engine"], dts, of_baseline, symmetries=kind_of(row["metric"]) is not None)
+
+
+def reproduce_scenes(
+    results: Results,
+    names: Sequence[str],
+    label: str,
+    dts: Sequence[float] | None = None,
+    baseline: str | None = None,
+    *,
+    symmetries: bool = False,
+) -> str:
+    """The command that runs scenes with one engine again, or the Python call if a scene or the engine was given as an object.
+
+    Args:
+        results: The run.
+        names: Names of the scenes.
+        label: Label of the engine.
+        dts: Time steps [s]; None for all of the run.
+        baseline: The baseline file to compare with.
+        symmetries: Whether to test symmetries too.
+    """
+    asked = results.provenance["asked"]
+    scenes, steps = [results.scenes[name] for name in names], sorted(asked["dts"] if dts is None else dts, reverse=True)
+    engine = results.provenance["names"].get(label)  # my_module:MyEngine has a name of its own in results
+    if engine is None or not all(scene.origin for scene in scenes):
+        named = [repr(scene.origin) if scene.origin else f"<scene {scene.name!r}>" for scene in scenes]
+        named_scenes = named[0] if len(named) == 1 else f"[{', '.join(named)}]"
+        named_engine = f"<engine {label!r}>" if engine is None else repr(engine)
+        return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]}{', quick=True' * asked.get('quick', False)})"
+    options = [*_options(steps, asked), *["--symmetries"] * symmetries]
+    options += [] if baseline is None else ["--baseline", baseline]
+    return shlex.join(["dropspin", "run", *(scene.origin for scene in scenes), "-e", engine, *options, "-o", "out/again"])
+
+
+def reproduce_drawn(results: Results) -> list[str]:
+    """A sentence with the seed of a run's random scenes and the command that runs them again; empty if the run has no random scenes."""
+    asked = results.provenance["asked"]
+    if "draw" not in asked:
+        return []
+    named = [results.scenes[name].origin for name in asked["scenes"][: -asked["draw"]]]
+    engines = [word for label in results.engines for word in ("-e", results.provenance["names"][label])]
+    options = _options(sorted(asked["dts"], reverse=True), asked)
+    command = ["dropspin", "run", *named, "--draw", str(asked["draw"]), "--seed", str(asked["seed"]), *engines, *options, "-o", "out/again"]
+    return [f"Scenes drawn with seed {asked['seed']}: {asked['draw']}. Reproduce: {shlex.join(command)}"]
+
+
+def _options(dts: Sequence[float], asked: Mapping[str, Any]) -> list[str]:
+    """The options of `dropspin run` for time steps [s], a quick run, and a time limit [s] that is not the default one."""
+    options = [word for dt in dts for word in ("--dt", repr(float(dt)))]
+    options += ["--quick"] * asked.get("quick", False)
+    limit = asked["time_limit"]
+    return options if limit == ResourceLimits().processor_time else [*options, "--time-limit", f"{limit:g}"]

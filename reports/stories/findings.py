@@ -1,0 +1,279 @@
+"""The findings of a run as counts and sentences, for terminal, HTML and Markdown."""
+
+import math
+import statistics
+from collections import Counter
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
+from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
+from dropspin.comparisons.results.results import SMALLEST_STATED, UNDECIDED, Results, Status, is_undecided, relative_sizes
+from dropspin.reports.stories.leading_errors import step_times
+from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, quantity
+from dropspin.scenarios.text import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CONVERGING = frozenset({"passed", "measured", "no_truth"})
+"""Verdicts that are no finding."""
+MOST_NAMED = 3
+"""Scenes, metrics or engines that a sentence names; of more it has the number."""
+SAME_SIZE = 0.999
+"""Errors count as equal from this share of the largest one on."""
+ENGINE_NAMES = {"wang": "wang (Wang's method)"}
+"""Descriptive names of engines, by label, where the label is not descriptive."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """The checks of a run.
+
+    Attributes:
+        passed: Number of passed checks.
+        failed: Number of failed checks.
+        known: Number of checks that show a fault, with an error that is not negligible, that the scene expects of the engine by name.
+        known_scenes: Number of scenes with such checks.
+        fixed: Number of passed checks for which such a fault is expected.
+        known_engines: The engines of these checks.
+        limited: Number of checks whose failure is explained by a known limitation of the engine.
+        limited_engines: The engines of these checks.
+        broken: Number of rows that report a breakdown of an engine.
+    """
+
+    passed: int
+    failed: int
+    known: int
+    known_scenes: int
+    fixed: int
+    known_engines: tuple[str, ...]
+    limited: int
+    limited_engines: tuple[str, ...]
+    broken: int
+
+
+def counts(results: Results) -> Counts:
+    """Count the verdicts of a run."""
+    table = results.table
+    verdicts = table["verdict"]
+    known = table[(verdicts == "known") & (table["value"].abs() > SMALLEST_STATED)]
+    limited = table[(verdicts == "limited") & (table["metric"] != "")]
+    known_engines, limited_engines = (
+        tuple(engine for engine in results.engines if (rows["engine"] == engine).any()) for rows in (known, limited)
+    )
+    return Counts(
+        passed=int((verdicts == "passed").sum()),
+        failed=int(verdicts.isin(FAILURES).sum()),
+        known=len(known),
+        known_scenes=known["scene"].nunique(),
+        fixed=int(((verdicts == "passed") & (table["basis"] == "fault_absent")).sum()),
+        known_engines=known_engines,
+        limited=len(limited),
+        limited_engines=limited_engines,
+        broken=int(verdicts.isin(BREAKDOWNS).sum()),
+    )
+
+
+def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
+    """For each engine, the scenes in which an error with this cause does not vanish as dt → 0; negligible errors are left out."""
+    rows = results.asymptotic_errors(cause)
+    worth = rows[rows["value"].abs() > SMALLEST_STATED]
+    pairs = set(zip(worth["engine"], worth["scene"], strict=True))
+    return {engine: [scene for scene in results.scenes if (engine, scene) in pairs] for engine in results.engines}
+
+
+@dataclass(frozen=True)
+class ProfileComparison:
+    """An engine with default settings compared with the same engine, calibrated.
+
+    Attributes:
+        engine: Label of the engine with default settings.
+        calibrated: Label of the calibrated one.
+        rows: Errors of both at the finest time step; `part` is the share of the first error that the calibrated engine does not have.
+    """
+
+    engine: str
+    calibrated: str
+    rows: list[dict[Hashable, Any]]
+
+    @property
+    def clause(self) -> str:
+        """The comparison as a clause that follows the engine's name."""
+        parts = [row["part"] for row in self.rows]
+        most = sum(part > 0.5 for part in parts)
+        are = "is mostly a setting error" if most == 1 else "are mostly setting errors"
+        return (
+            f"{most} of its {counted(len(parts), 'error')} above {SMALLEST_STATED:g} at the finest time step {are} "
+            f"(median share {100 * statistics.median(parts):.1f} %)"
+        )
+
+    @property
+    def sentence(self) -> str:
+        """The comparison in one sentence."""
+        return f"{self.engine}: {self.clause}."
+
+
+def profile_comparisons(results: Results) -> list[ProfileComparison]:
+    """For each engine that was run with default and with calibrated settings, the share of its errors that is due to the settings."""
+    frame = results.measurements
+    truths = frame[(frame["kind"] == "truth") & frame["value"].notna()]
+    finest = truths[truths["dt"] == truths["dt"].min()].rename(columns={"value": "default"})
+    comparisons = []
+    for engine in results.engines:
+        calibrated = calibrated_label(engine)
+        others = finest.loc[finest["engine"] == calibrated, ["scene", "metric", "default"]].rename(columns={"default": "calibrated"})
+        both = finest[finest["engine"] == engine].merge(others, on=["scene", "metric"])
+        worth = both[both["default"].abs() > SMALLEST_STATED]
+        worth = worth.assign(part=(1.0 - worth["calibrated"].abs() / worth["default"].abs()).clip(lower=0.0).fillna(0.0))
+        if calibrated is not None and len(worth):
+            rows = worth[["scene", "metric", "unit", "default", "calibrated", "part"]].to_dict("records")
+            comparisons.append(ProfileComparison(engine, calibrated, rows))
+    return comparisons
+
+
+def orders(results: Results, scene: str, engine: str) -> str:
+    """The observed orders of an engine's errors in a scene, with the interval that contains the 95 % intervals of all; empty if none is."""
+    table = results.table
+    mine = table[(table["kind"] == "order") & (table["scene"] == scene) & (table["engine"] == engine)]
+    observed = mine[(mine["cause"] == "discretisation") & mine["value"].notna()]
+    known = observed[[is_determined(*ends) for ends in zip(observed["lower"], observed["upper"], strict=True)]]
+    parts = []
+    if len(known):
+        least, most = float(known["value"].min()), float(known["value"].max())
+        values = f"order {least:.2f}" if most - least < 0.005 else f"orders {least:.2f} to {most:.2f}"
+        parts.append(f"{values} ({known['lower'].min():.2f} to {known['upper'].max():.2f})")
+    if len(observed) > len(known):
+        parts.append(f"{counted(len(observed) - len(known), 'order')} not determined")
+    return ", ".join(parts)
+
+
+def verdict_sentence(results: Results, tally: Counts) -> str:
+    """The outcome of the checks in one sentence."""
+    judged, known = tally.passed + tally.failed, _known(tally)
+    if tally.broken:
+        judgement = f"; {failing(tally.failed, judged, 'check')}" if judged else ""
+        return f"{counted(tally.broken, 'engine run')} broke down{judgement}{known}."
+    if tally.failed:
+        return f"{failing(tally.failed, judged, 'check')}{known}."
+    passing = counted(judged, "check passes", "checks pass")
+    if tally.known or tally.limited:
+        return f"No unexpected results: {passing}{known}." if judged else f"No check passes or fails{known}."
+    if judged:
+        return f"{'The check passes' if judged == 1 else f'All {passing}'}{known}."
+    if results.measurements.empty:
+        return "No check was made, because no scene was simulated."
+    if (results.table["basis"] == "few_starts").any():
+        return "No check is decided by the few starts of a quick run."
+    set_at_all = any(scene.expect for scene in results.scenes.values())
+    none = "No expectation covers these engines at these time steps" if set_at_all else "The scenes have no expectations"
+    return f"{none}; {len(results.measurements):,} values were measured."
+
+
+def _known(tally: Counts) -> str:
+    """The end of a sentence: how many values show known errors or are within limitations, how many expected faults do not occur."""
+    parts = []
+    if tally.known:
+        shows = counted(tally.known, "value shows a known error", "values show known errors")
+        parts.append(f"{shows} of {_named(tally.known_engines, 'engine')} in {counted(tally.known_scenes, 'scene')}")
+    if tally.limited:
+        shows = counted(tally.limited, "value shows a known limitation", "values show known limitations")
+        parts.append(f"{shows} of {_named(tally.limited_engines, 'engine')}")
+    if tally.fixed:
+        parts.append(f"{counted(tally.fixed, 'expected fault does', 'expected faults do')} not occur")
+    return "".join(f"; {part}" for part in parts)
+
+
+def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
+    """One sentence for each engine, and one for all errors that the time steps leave undecided.
+
+    The sentence gives the number of scenes in which the engine converges, the number with each other status, its largest error that
+    is known or does not vanish as dt → 0, and the cost of a time step. The sentence of a missing engine gives the reason why it is missing.
+
+    Args:
+        results: The run.
+        lasting: The scenes with errors that do not vanish as dt → 0, by cause and engine.
+        profiles: Engines with default settings compared with the calibrated ones.
+    """
+    missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine").set_index("engine")["reason"]
+    times, statuses = step_times(results), results.statuses()
+    sentences, undecided, hidden = [], [], False
+    for engine in results.engines:
+        if engine in missing:
+            sentences.append(str(missing[engine]))
+            continue
+        remain = {scene for cause in ("model", "setting") for scene in lasting[cause][engine]}
+        errors = results.table[(results.table["kind"] == "asymptotic_error") & (results.table["engine"] == engine)]
+        opened = errors[is_undecided(errors) & ~errors["metric"].isin(JUMPING)]
+        parts = [
+            _convergence(results, engine, {scene: of[engine] for scene, of in statuses.items()}, remain),
+            *(profile.clause for profile in profiles if profile.engine == engine),
+            *_cost(engine, times, results.provenance.get("compilation", {}).get(engine)),
+        ]
+        sentences.append(f"{ENGINE_NAMES.get(engine, engine)}: {'; '.join(parts)}.")
+        if len(opened):
+            scenes = list(opened["scene"].unique())
+            names = [quantity(metric) for metric in opened["metric"].unique()]
+            undecided.append(f"{engine} in {_named(scenes, 'scene')} ({', '.join(names[:MOST_NAMED])}{', …' * (len(names) > MOST_NAMED)})")
+            hidden |= any(statuses[scene][engine].words != UNDECIDED for scene in scenes)
+    also = ", also in scenes counted otherwise" if hidden else ""
+    return [*sentences, *([f"Undecided as dt → 0{also}: {'; '.join(undecided)}."] if undecided else [])]
+
+
+def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], remain: Collection[str]) -> str:
+    """The number of scenes in which an engine converges, the number with each other status, and the largest known or remaining error."""
+    mine = results.table[results.table["engine"] == engine]
+    kinds: Counter[str] = Counter()
+    for scene, status in sorted(statuses.items(), key=lambda item: -SEVERITY.index(item[1].verdict)):
+        kinds["setting error" if scene in remain and status.verdict in CONVERGING else status.words] += 1
+    declined = kinds.pop("declined", 0)
+    others = [f"{kind} in {count}" for kind, count in kinds.items() if kind != "converges"] + [f"declines {declined}"] * bool(declined)
+    if not (mine["kind"] == "asymptotic_error").any():
+        enough = is_sufficient(results.provenance["asked"]["dts"])
+        none = "no asymptotic errors" + ("" if enough else ", which need three time steps that span a factor of four")
+        return f"{', '.join(others)} of {counted(len(statuses), 'scene')}; {none}"
+    converges = ", ".join([f"converges in {kinds['converges']} of {counted(len(statuses), 'scene')}", *others])
+    found = mine[mine["kind"].isin(["truth", "invariant"]) & (mine["value"].abs() > SMALLEST_STATED)]
+    found = found[~found["metric"].isin([*JUMPING, *ARTEFACTS])]
+    finest = found[found["dt"] == found.groupby("scene")["dt"].transform("min")]
+    wrong = finest[finest["verdict"].isin(["known", "limited", *FAILURES]) | finest["cause"].isin(["model", "setting"])]
+    return f"{converges}{_largest(results, wrong)}"
+
+
+def _largest(results: Results, errors: "pd.DataFrame") -> str:
+    """The largest of some errors relative to their scales, with the scenes in which it has this size; empty if there are none."""
+    if errors.empty:
+        return ""
+    sizes = np.array(relative_sizes(errors, results.scenes))
+    first = errors.to_dict("records")[int(np.argmax(sizes))]
+    similar = errors["value"].abs().between(SAME_SIZE * abs(first["value"]), abs(first["value"]) / SAME_SIZE)
+    equal = errors[(errors["metric"] == first["metric"]) & (sizes >= SAME_SIZE * sizes.max()) & similar]
+    of = "" if first["unit"] == "1" else f" {first['unit']}"
+    names = _named(list(equal["scene"].unique()), "scene")
+    return f"; largest error {quantity(first['metric'])} {formatted(abs(first['value']))}{of} at dt = {in_ms(first['dt'])} in {names}"
+
+
+def _named(names: Collection[str], kind: str) -> str:
+    """Names if they are few, otherwise their number."""
+    if len(names) > MOST_NAMED:
+        return f"{len(names)} {kind}s"
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _cost(engine: str, times: Mapping[str, float], compilation: float | None) -> list[str]:
+    """The time per step of an engine, its ratio to that of the fastest engine, and the time to compile a scene [s] if it compiles."""
+    timed = {label: time for label, time in times.items() if not math.isnan(time)}
+    if engine not in timed:
+        return []
+    absolute = f"{duration(float(f'{timed[engine]:.2g}'))} per step"
+    fastest = min(timed, key=timed.__getitem__)
+    ratio = float(f"{timed[engine] / timed[fastest]:.2g}")
+    relative = "" if engine == fastest or ratio == 1.0 else f", {ratio:g} times that of {fastest}"
+    compiling = "" if compilation is None else f", after compiling a scene for up to {duration(float(f'{compilation:.2g}'))}"
+    return [f"{absolute}{relative}{compiling}"]

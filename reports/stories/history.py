@@ -1,0 +1,48 @@
+"""The output of `dropspin compare history`: the runs in which results changed."""
+
+from dropspin.comparisons.regressions.history import History
+from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
+from dropspin.reports.stories.numbers import capitalized, formatted, subject
+from dropspin.scenarios.text import counted
+
+MOST_RESULTS = 6
+"""Largest number of results listed for one run; the table in the file has all of them."""
+
+
+def document(history: History) -> Document:
+    """The results that changed most, and the cause to which the changes in each run are attributed."""
+    causes = [
+        f"{move.engine}: {counted(len(move.results), 'result')} changed in {history.names[move.run]}, after {history.names[move.before]}. "
+        f"{capitalized(move.attribution.message)}."
+        for move in history.moves
+    ]
+    scenes = counted(history.results["scene"].nunique(), "scene")
+    unchanged = f"No result changed in {counted(len(history.names), 'run')} of {scenes}."
+    changed = rows(history)
+    lines = [
+        f"{row['run']} · {row['engine']} · {row['scene']}: "
+        f"{row['result']} at {row['step']} from {row['before']} to {row['now']}, {row['change']}"
+        for row in changed
+    ]
+    parts: list[Part] = [Table(changed, lines=lines), Sentences(causes or [unchanged])]
+    for scene in history.results["scene"].unique():
+        parts += [Heading(scene), Charts(scene, ())]
+    return Document(f"Results over {len(history.names)} runs", parts)
+
+
+def rows(history: History) -> list[dict[str, str]]:
+    """For each run in which results changed, the results that changed most."""
+    return [
+        {
+            "run": history.names[move.run],
+            "engine": move.engine,
+            "scene": row["scene"],
+            "result": subject(row["metric"], row["kind"]),
+            "step": "→ 0" if "," in row["steps"] else f"{1e3 * float(row['steps']):g} ms",
+            "before": formatted(row["before"]),
+            "now": formatted(row["value"]),
+            "change": row["change"],
+        }
+        for move in history.moves
+        for row in move.results.head(MOST_RESULTS).to_dict("records")
+    ]

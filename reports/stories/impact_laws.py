@@ -1,0 +1,27 @@
+"""How far each engine is from the exact solution under each law of impacts with friction, where the slip turns and the laws differ."""
+
+from dropspin.comparisons.results.results import Results
+from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
+from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of
+
+NOTE = (
+    "Distances to the exact solution under each law of impacts with friction, in scenes where the laws differ. Engines are judged by the "
+    "law of the scene (*); the other laws are other models, and the distances to them are not errors. A law without a distance (–) has the "
+    "same impacts as that of the scene, or no solution."
+)
+
+
+def law_rows(results: Results) -> list[dict[str, str]]:
+    """A row for each scene in which the laws differ and each engine with a motion; the law of the scene is marked by *."""
+    others = results.table[results.table["kind"] == "other_law"]
+    rows = []
+    for _, distances in others.groupby(["scene", "engine"], sort=False):
+        case = distances.iloc[:1][["scene", "engine", "dt", "metric", "unit"]]
+        [first] = case.to_dict("records")
+        own = law_of(results.scenes[first["scene"]])
+        sizes = dict(zip(distances["truth"], distances["value"].abs(), strict=True))
+        sizes |= dict.fromkeys([str(own)], float(results.measurements.merge(case)["value"].abs().max()))
+        cells = {str(law): f"{formatted(sizes[law])}{' *' * (law == own)}" if law in sizes else "–" for law in FRICTION_LAWS}
+        distance = f"{quantity(first['metric'])}{unit(first['unit'])} at {in_ms(first['dt'])}"
+        rows.append({"scene": first["scene"], "engine": first["engine"], "distance": distance, **cells})
+    return rows

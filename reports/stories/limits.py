@@ -1,0 +1,135 @@
+"""The output of `dropspin limits`: the largest time steps, and for each engine the range of tested values in which it is sound."""
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any, Literal
+
+import numpy as np
+
+from dropspin.comparisons.robustness.axes import AXES
+from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint
+from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.plots.figures import limits_charts
+from dropspin.reports.stories.numbers import left_out
+from dropspin.reports.stories.study import Study
+from dropspin.scenarios.text import rounded
+
+ACCURATE_AND_STABLE = "Accurate: sound at every smaller tested time step. Stable: there, errors beyond the tolerance are the only failures."
+COLUMNS = ("scene", "engine", "axis", "value", "unit", "failure_mode", "criterion", "size", "message")
+
+
+class Limits(Study):
+    """What `dropspin limits` found in each scene."""
+
+    study: Literal["limits"] = "limits"
+    scenes: list[RobustnessStudy]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every tested value, and a row for each engine that is missing."""
+        return [row for found in self.scenes for row in _rows(found)]
+
+    def document(self) -> Document:
+        """The ranges in each scene; and the largest time steps."""
+        parts: list[Part] = []
+        for found in self.scenes:
+            charts = [Charts(found.scene.name, limits_charts(found))] if found.scans else []
+            parts += [Heading(found.scene.name), Paragraph(nominal(found)), *charts, Table(range_rows(found))]
+            parts.append(Sentences(sentences(found), numbered=True))
+        steps = step_rows(self.scenes)
+        summary: list[Part] = [Heading("The largest steps"), Table(steps), Paragraph(ACCURATE_AND_STABLE)] if steps else []
+        return Document("Where engines break down", parts, summary)
+
+
+def _rows(found: RobustnessStudy) -> list[dict[str, Any]]:
+    """Every tested value of every scan, the smaller time steps tried at the nominal values, and a row for each engine left out."""
+    name, scanned = found.scene.name, {scan.engine for scan in found.scans if scan.axis.name == "step"}
+    points = [(scan.engine, scan.axis, point) for scan in found.scans for point in scan.points]
+    not_scanned = [engine for engine in found.refinements if engine not in scanned]
+    points += [(engine, AXES["step"], point) for engine in not_scanned for point in found.steps(engine)]
+    tested = [(name, engine, axis.name, point.value, axis.unit, *point.diagnosis) for engine, axis, point in points]
+    missing = [(name, engine, None, None, None, "missing", None, None, reason) for engine, reason in found.left_out.items()]
+    return [dict(zip(COLUMNS, row, strict=True)) for row in [*tested, *missing]]
+
+
+def nominal(found: RobustnessStudy) -> str:
+    """The conditions of a study: scene, time step and tolerance. An axis may vary the time step."""
+    return (
+        f"{found.scene.name} at dt = {_step(found.dt)}. "
+        f"Sound: the engine does not fail, and its errors are at most {found.within:g} (ratios, and angles in rad)."
+    )
+
+
+def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
+    """The largest tested time steps at which each engine is accurate and stable, for each scene."""
+    table = []
+    for one in found:
+        spin = float(np.linalg.norm(one.scene.start.angular_velocity)) if one.scene.floor is None else 0.0
+        for engine in dict.fromkeys(scan.engine for scan in one.scans if scan.axis.name == "step"):
+            accurate, stable = (_largest(dt, one.steps(engine), spin) for dt in one.largest_steps(engine))
+            table.append({"scene": one.scene.name, "engine": engine, "accurate up to": accurate, "stable up to": stable})
+    return table
+
+
+def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
+    """The largest time step that meets a condition, or, if none does, the smallest tested one with its failure mode."""
+    if dt is None:
+        return f"{_mode(tried[0])} at {_step(tried[0].value)}, the smallest tested"
+    turn = f", {spin * dt:.2g} rad" if spin else ""
+    return _step(dt) + turn + (", the largest tested" if dt == tried[-1].value else "")
+
+
+def _step(dt: float) -> str:
+    return f"{rounded(1e3 * dt, 3)} ms" if dt < 0.9995 else f"{rounded(dt, 3)} s"
+
+
+def _mode(point: ScanPoint) -> str:
+    return point.mode.replace("_", " ")
+
+
+def range_rows(found: RobustnessStudy) -> list[dict[str, str]]:
+    """The range in which each engine is sound along each axis, and the failure modes beyond."""
+    modes = {engine: _mode(points[0]) for engine, points in found.refinements.items() if points[0].mode != "sound"}
+    return [{"axis": scan.axis.label, "engine": scan.engine, **_range(scan, modes.get(scan.engine))} for scan in found.scans]
+
+
+def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
+    """The range of an axis; `nominal` is the failure mode at the nominal values, if there is one, which an invariant axis repeats."""
+    points, sound = scan.points, scan.sound_range
+    if scan.axis.invariant and nominal and all(point.mode == "sound" for point in points):
+        beyond = f"{nominal} at the nominal value; the same motion at all {len(points)} tested values"
+        return {"sound from": "–", "to": "–", "beyond": beyond}
+    if sound is None:
+        those = sum(point.mode == "sound" for point in points)
+        beyond = f"{_mode(scan.at(scan.base))} at the nominal value, {scan.base:.4g}; sound at {those} of {len(points)} tested values"
+        return {"sound from": "–", "to": "–", "beyond": beyond}
+    first, last = sound
+    outside = [f"{_mode(points[number])} at {points[number].value:.4g}" for number in (first - 1, last + 1) if 0 <= number < len(points)]
+    if scan.axis.invariant and nominal:
+        same = f"{nominal} at the nominal value; the same motion from {points[first].value:.4g} to {points[last].value:.4g}"
+        return {"sound from": "–", "to": "–", "beyond": "; ".join([same, *outside])}
+    if not outside:
+        outside = [f"not tested; {'the same motion' if scan.axis.invariant else 'sound'} at all {len(points)} tested values"]
+    elif len(outside) == 1:
+        outside.append(f"no {'smaller' if first == 0 else 'larger'} value tested")
+    return {"sound from": f"{points[first].value:.4g}", "to": f"{points[last].value:.4g}", "beyond": "; ".join(outside)}
+
+
+def sentences(found: RobustnessStudy) -> list[str]:
+    """Sentences on engines that are not sound at the nominal values, with their errors, and on engines left out."""
+    failing = [(engine, points) for engine, points in found.refinements.items() if points[0].mode != "sound"]
+    return [_refinement(engine, points) for engine, points in failing] + left_out(found.left_out)
+
+
+def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:
+    nominal, *smaller = points
+    sentence = (
+        f"{engine} is not sound at the nominal values and dt = {_step(nominal.value)}: {_mode(nominal)}, {nominal.diagnosis.message}."
+    )
+    if not smaller:
+        return f"{sentence} No smaller time step was tried."
+    tried = [f"{mode} at {', '.join(_step(point.value) for point in some)}" for mode, some in groupby(smaller, _mode)]
+    at_the_end = (
+        "" if smaller[-1].mode == "sound" else f" At {_step(smaller[-1].value)}, the smallest tried, {smaller[-1].diagnosis.message}."
+    )
+    return f"{sentence} Smaller time steps tried: {'; '.join(tried)}.{at_the_end}"

@@ -1,0 +1,107 @@
+"""The format of numbers, bounds and verdicts in all output."""
+
+import math
+from collections.abc import Mapping
+from functools import cache
+
+from dropspin.comparisons.judging.error_budget import is_determined
+from dropspin.comparisons.judging.verdicts import WORDS
+from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.scenarios.text import counted, rounded
+
+
+def formatted(value: float) -> str:
+    """Three significant digits, with an exponent below 0.01 and from 1000 on; an exact zero is 0, an undefined value is –."""
+    if math.isnan(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    rounded = f"{value:#.3g}".removesuffix(".")
+    return rounded if "e" not in rounded and abs(float(rounded)) >= 0.01 else f"{value:.2e}"
+
+
+def bound(lower: float, upper: float) -> str:
+    """Bounds as an inequality; empty if there are none."""
+    if math.isnan(lower) and math.isnan(upper):
+        return ""
+    if math.isnan(lower):
+        return f"≤ {upper:.3g}"
+    if math.isnan(upper):
+        return f"≥ {lower:.3g}"
+    return f"± {upper:.3g}" if lower == -upper else f"{lower:.3g} … {upper:.3g}"
+
+
+def word(verdict: str) -> str:
+    """A verdict in words."""
+    return WORDS.get(verdict, verdict)
+
+
+def quantity(metric: str) -> str:
+    """The quantity of which a metric is the error, in words; for a metric that is no error, its name."""
+    return metric.replace("_", " ").removesuffix(" error")
+
+
+def duration(seconds: float) -> str:
+    """A time in s, ms, µs or ns, to three significant digits."""
+    units = ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns"))
+    seconds = float(f"{seconds:.3g}")
+    scale, unit = next((scale, unit) for scale, unit in units if seconds * scale >= 1.0 or unit == "ns")
+    return f"{rounded(seconds * scale, 3)} {unit}"
+
+
+def failing(count: int, total: int, what: str) -> str:
+    """How many of some things fail, such as 1 of 2 checks fails."""
+    return f"{count:,} of {counted(total, what)} {'fails' if count == 1 else 'fail'}"
+
+
+def capitalized(sentence: str) -> str:
+    """A sentence with a capital first letter."""
+    return sentence[:1].upper() + sentence[1:]
+
+
+def left_out(reasons: Mapping[str, str]) -> list[str]:
+    """A sentence for each engine that is left out of a study; a reason may be a sentence that begins with the engine's name."""
+    return [f"Left out: {'' if why.startswith(label) else f'{label}, '}{why.removesuffix('.')}." for label, why in reasons.items()]
+
+
+def step(dt: float) -> str:
+    """A time step in seconds; → 0 for an extrapolation of several."""
+    return "→ 0" if math.isnan(dt) else f"{dt:g}"
+
+
+def in_ms(dt: float) -> str:
+    """A time step in milliseconds; → 0 for an extrapolation of several."""
+    return "→ 0" if math.isnan(dt) else f"{1e3 * dt:g} ms"
+
+
+def unit(of: str) -> str:
+    """A unit in brackets, to follow a name; empty for a ratio."""
+    return "" if of == "1" else f" [{of}]"
+
+
+def subject(metric: str, kind: str, truth: str = "") -> str:
+    """The subject of a row in words, such as `order of orientation error`; for a row of kind `baseline`, that of the accepted result."""
+    words = metric.replace("_", " ")
+    prefixed = {"order": f"order of {words}", "asymptotic_error": f"asymptotic {words}", "ensemble": f"mean {words}"}
+    if kind_of(metric) is not None:
+        return f"difference of the motion {words}"
+    return prefixed.get(_accepted_kinds().get(truth, kind), words)
+
+
+@cache
+def _accepted_kinds() -> dict[str, str]:
+    from dropspin.comparisons.regressions.checking import ACCEPTED
+
+    return {text: kind for kind, text in ACCEPTED.items()}
+
+
+def observed_order(order: float, lower: float, upper: float) -> str:
+    """An order with its interval; empty if the time steps do not determine it."""
+    return f"order {order:.2f} ({lower:.2f} to {upper:.2f})" if is_determined(lower, upper) else ""
+
+
+def trend(asymptotic_error: float, cause: str, order: str = "") -> str:
+    """The behaviour of an error as dt → 0, in a few words; the order is that of `observed_order`."""
+    if cause == "discretisation":
+        return order or "→ 0"
+    return {"model": f"→ {formatted(asymptotic_error)}", "setting": f"→ {formatted(asymptotic_error)}, a setting"}.get(cause, cause)

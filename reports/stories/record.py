@@ -1,0 +1,165 @@
+"""The pages of a record in words: the digits in a cell, what changed in a release, and what an engine gets right and wrong."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from shlex import quote
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dropspin.comparisons.judging.verdicts import MARKS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import scale
+from dropspin.comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
+from dropspin.reports.stories.leading_errors import level
+from dropspin.reports.stories.numbers import duration, formatted, in_ms, word
+
+GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}
+"""What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""
+
+
+class Cell(NamedTuple):
+    """A cell of a matrix: its text, the decade of the error for its colour, the status, and what it shows when pointed at."""
+
+    text: str
+    level: int | None
+    status: str
+    title: str
+
+
+def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
+    """The digits of a release in a scene."""
+    case, metric = release.cases.get((label, scene, dt)), leading(scene)
+    if case is None:
+        return Cell("?", None, "not measured", "not measured")
+    error, again = relative_error(case, scene), f"{label} {release.name}, dt = {in_ms(dt)}; to repeat it: {rerun(label, release, scene)}"
+    remark = f"{case.reason}; " if case.reason else ""
+    if math.isnan(error):  # a motion without this error: the time step is too coarse
+        status = "too coarse" if case.verdict == "measured" else word(case.verdict)
+        return Cell(MARKS[case.verdict], None, status, remark + again)
+    parts = [f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}"]
+    parts += [f"over starts {sizes(case)}"] if sizes(case) else []
+    parts += [f"{cost(case)} per simulated second, {case.relative_cost:.3g} times that of Wang's method"] if cost(case) != "–" else []
+    shown = ", ".join(parts) + ", "
+    status, mark = ("known limitation", "! ") if case.reason else ("measured", "")
+    return Cell(f"{mark}{math.floor(10.0 * digits(error)) / 10.0:.1f}", level(error), status, remark + shown + again)
+
+
+def rerun(label: str, release: Release, scene: str) -> str:
+    """The command that measures a cell again."""
+    return f"dropspin record rerun {quote(label)} {release.name} {scene}"
+
+
+def cost(case: Case) -> str:
+    """The wall time of the steps per simulated second."""
+    return "–" if math.isnan(case.cost) else duration(case.cost)
+
+
+def sizes(case: Case) -> str:
+    """The range of the size of the leading error over starts; empty for a scene with one."""
+    return "" if math.isnan(case.low) else f"{formatted(case.low)} to {formatted(case.high)}"
+
+
+def error(case: Case, scene: str) -> str:
+    """The leading error from the scene's own start, or why there is none."""
+    return word(case.verdict) if case.verdict != "measured" else formatted(case.values.get(leading(scene), math.nan))
+
+
+def mean_cost(release: Release, label: str, dt: float, *, with_floor: bool) -> str:
+    """The geometric mean of the cost over scenes with or without a floor."""
+    cases = release.at(label, dt).items()
+    costs = [case.cost for scene, case in cases if (problem(scene).floor is not None) == with_floor and not math.isnan(case.cost)]
+    return duration(math.exp(np.mean(np.log(costs)))) if costs else "–"
+
+
+def remarks(cases: Mapping[str, Case]) -> list[str]:
+    """Why there is no result, or which limitation is known: a sentence for all names, of scenes or labels, that have the same."""
+    found: dict[str, list[str]] = {}
+    for name, case in cases.items():
+        if case.reason:
+            words = "known limitation" if case.verdict == "measured" else word(case.verdict)
+            found.setdefault(f"{words}: {case.reason}", []).append(name)
+    return [f"{', '.join(names)}: {words}" for words, names in found.items()]
+
+
+def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
+    """What changed in each release, newest first: a sentence for each scene, the largest change of digits first.
+
+    Labels and scenes that changed alike have one sentence; scenes with values in one of the releases only come last.
+    """
+    groups: dict[tuple[str, str, str], list[Change]] = {}
+    for change in changed:
+        groups.setdefault((change.release, change.label, change.scene), []).append(change)
+    scenes: dict[tuple[str, str, str], list[str]] = {}
+    shown = {key: _shown(found) for key, found in groups.items()}
+    for (release, label, scene), change in sorted(shown.items(), key=lambda item: -_gained(item[1])):
+        scenes.setdefault((release, label, _words(change)), []).append(scene)
+    labels: dict[str, dict[tuple[str, str], list[str]]] = {change.release: {} for change in reversed(changed)}
+    for (release, label, words), names in scenes.items():
+        labels[release].setdefault((", ".join(names), words), []).append(label)
+    return {
+        release: [f"{names} with {', '.join(own)}: {words}" for (names, words), own in found.items()] for release, found in labels.items()
+    }
+
+
+def _shown(found: Sequence[Change]) -> Change:
+    """The change of a scene at the finest time step: of its leading error, else of the metric that changed most."""
+    finest = [change for change in found if change.dt == min(one.dt for one in found)]
+    return next((change for change in finest if change.metric == leading(change.scene)), finest[0])
+
+
+def _gained(change: Change) -> float:
+    """The size of the change of digits; -1 where there is a value in one of the releases only."""
+    if not change.metric:
+        return -1.0
+    of = scale(problem(change.scene), METRICS[change.metric].unit)
+    return abs(digits(abs(change.new) / of) - digits(abs(change.old) / of))
+
+
+def _words(change: Change) -> str:
+    if not change.metric:
+        reason = change.now.reason if change.now.verdict != "measured" else f"before: {change.was.reason}"
+        return f"{word(change.was.verdict)} → {word(change.now.verdict)} ({reason})"
+    old, new = formatted(change.old), formatted(change.new)
+    if old == new:  # as many digits as are needed to see the difference
+        old, new = next(pair for n in range(4, 18) if len(set(pair := (f"{change.old:.{n}g}", f"{change.new:.{n}g}"))) == 2)
+    step = f"dt = {in_ms(change.dt)}".replace(" ", "\xa0")  # in one line
+    return f"{change.metric.replace('_', ' ')} {old} → {new}{_unit(change.metric)} at {step}"
+
+
+def _unit(metric: str) -> str:
+    return "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
+
+
+def summary(release: Release, label: str, dt: float) -> list[str]:
+    """What an engine gets right and wrong in a release: sentences."""
+    groups: dict[str, list[str]] = {words: [] for words in GROUPS}
+    for scene, case in release.at(label, dt).items():
+        found = digits(relative_error(case, scene))
+        without = "too coarse" if case.verdict == "measured" else word(case.verdict)  # as in `cell`
+        groups.setdefault(next((words for words, least in GROUPS.items() if found >= least), without), []).append(scene)
+    return [f"{words}: {', '.join(scenes)}" for words, scenes in groups.items() if scenes]
+
+
+def since(label: str, scene: str, releases: Sequence[Release], changed: Iterable[Change]) -> str:
+    """The release since which nothing changed in a scene."""
+    moved = [change.release for change in changed if (change.label, change.scene) == (label, scene)]
+    if moved:
+        return moved[-1]
+    return f"{next(one.name for one in releases if any(key[:2] == (label, scene) for key in one.cases))}, the oldest"
+
+
+def changes_in_words(changed: Sequence[Change]) -> str:
+    """In which releases results changed, and in which of the others scenes have a result that had none, or the reverse."""
+    numbers = list(dict.fromkeys(change.release for change in changed if change.metric))
+    others = [release for release in dict.fromkeys(change.release for change in changed) if release not in numbers]
+    parts = [f"results changed in {', '.join(numbers)}" if numbers else "no result changed"]
+    return "; ".join(parts + ([f"which scenes have results changed in {', '.join(others)}"] if others else []))
+
+
+def badge(engine: str, release: Release, label: str, dt: float) -> dict[str, Any]:
+    """The badge of an engine, as shields.io reads it: https://shields.io/badges/endpoint-badge."""
+    errors = [relative_error(case, scene) for scene, case in release.at(label, dt).items()]
+    found = [digits(error) for error in errors if not math.isnan(error)]
+    message = f"median {np.median(found):.1f} digits in {len(found)} of {len(errors)} scenes" if found else "no scene"
+    return {"schemaVersion": 1, "label": f"{engine} {release.name}", "message": message, "color": "blue" if found else "lightgrey"}

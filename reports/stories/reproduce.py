@@ -1,0 +1,96 @@
+"""The output of `dropspin reproduce`: published values beside those found here, source by source."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import groupby
+from typing import Any, Literal, get_args
+
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS
+from dropspin.comparisons.published.results import Result, Status
+from dropspin.comparisons.published.sources import Source
+from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.stories.study import Study
+from dropspin.scenarios.text import counted
+
+STATUSES: tuple[Status, ...] = get_args(Status)
+WORDS: dict[Status, str] = {"differs": "differs by", "error of the source": "error"}
+"""The word before a difference, by status."""
+LEGEND = (
+    "Reproduced: the value has the digits that the source prints. Within: it is within the bound or the tolerance that the source states, "
+    "and counts as reproduced. Error: that of the published value, beside the exact solution. For comparison: not in the source."
+)
+
+
+class Reproduction(Study):
+    """What `dropspin reproduce` found, and the sources."""
+
+    study: Literal["reproduce"] = "reproduce"
+    sources: list[Source]
+    results: list[Result]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every result."""
+        return list(map(asdict, self.results))
+
+    def document(self) -> Document:
+        """The results of each source, and how many of all are reproduced."""
+        parts: list[Part] = []
+        for source in self.sources:
+            results = [result for result in self.results if result.source == source.name]
+            citation = f"Source: {source.citation}; {source.place} (licence: {source.licence})."
+            parts += [Heading(f"{source.name}: {source.title}", on_terminal=True), Paragraph(citation), Paragraph(source.setting)]
+            parts += [Table(_table(results)), Sentences(_notes(source, results), numbered=True)]
+        parts += [Heading("All sources", on_terminal=True), Table(_summary(self.results))]
+        parts.append(Sentences([LEGEND, _verdict(self.results)], numbered=True))
+        return Document("Published results", parts)
+
+
+def _table(results: Sequence[Result]) -> list[dict[str, str]]:
+    """The results of one source: a row for each tool and what gave its values here, and below it one for each value."""
+    rows = []
+    for (tool, by), group in groupby(results, key=lambda result: (result.tool, result.by)):
+        rows.append((f"{tool}: {by}" if by else tool, "", "", ""))
+        rows += [(f"- {result.quantity}", result.published, result.here or "–", _difference(result)) for result in group]
+    return [dict(zip(("result", "published", "here", "verdict"), row, strict=True)) for row in rows]
+
+
+def _difference(result: Result) -> str:
+    if result.status == "reproduced" and set(result.published) & set("<>≤±"):
+        return "within"
+    word = WORDS.get(result.status, result.status)
+    return f"{word} {result.difference:.1e}" if result.status in WORDS and math.isfinite(result.difference) else word
+
+
+def _notes(source: Source, results: Sequence[Result]) -> list[str]:
+    """Why engines give the values of a source, why others cannot, and the remarks on the source."""
+    reasons = [(group.tool, group.by, group.why) for group in source.groups if group.why]
+    reasons += [(one.tool, one.by, f"{one.status}: {one.reason.removesuffix('.')}") for one in results if one.reason]
+    return [*(f"{tool}, {by}: {why}." if by else f"{tool}: {why}." for tool, by, why in dict.fromkeys(reasons)), *source.remarks]
+
+
+def _summary(results: Sequence[Result]) -> list[dict[str, str]]:
+    """The number of results of each status for each source, and their sums."""
+    present = [status for status in STATUSES if any(one.status == status for one in results)]
+    names = list(dict.fromkeys(one.source for one in results))
+    counts = {name: Counter(one.status for one in results if one.source == name) for name in names}
+    counts |= {"all": Counter(one.status for one in results)} if len(names) > 1 else {}
+    return [{"source": name, **{status: str(count[status]) for status in present}} for name, count in counts.items()]
+
+
+def _verdict(results: Sequence[Result]) -> str:
+    """Whether everything that is claimed to be reproducible is."""
+    counts = Counter(one.status for one in results)
+    claimed = counts["reproduced"] + counts["differs"]
+    not_run = f"; {counted(counts['not run'], 'was', 'were')} not run" if counts["not run"] else ""
+    are = "is" if 1 in (counts["reproduced"], claimed) else "are"
+    reproduced = f"{counts['reproduced']} of {counted(claimed, 'value')} {are} reproduced"
+    return f"{reproduced}; {counted(counts['differs'], 'differs', 'differ')}{not_run}."
+
+
+def exit_code(results: Sequence[Result]) -> int:
+    """1 if a value differs that is claimed to be reproducible, 3 if an engine broke down, otherwise 0."""
+    if any(one.status == "differs" for one in results):
+        return 1
+    return 3 if any(one.verdict in BREAKDOWNS for one in results) else 0

@@ -1,0 +1,59 @@
+"""The output of `dropspin record rerun`: a row for each time step, and what is not as in the record."""
+
+import math
+from typing import Any
+
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.record.findings import Case, leading
+from dropspin.comparisons.record.rerun import Again
+from dropspin.reports.document import Document, Sentences, Table
+from dropspin.reports.stories.numbers import in_ms, quantity, unit, word
+from dropspin.scenarios.text import counted
+
+
+def document(found: Again, scene: str) -> Document:
+    """A row for each time step: the leading error of the scene in the record and now, and whether the motion is the same."""
+    metric = leading(scene)
+    error = f"{quantity(metric)} error{unit(METRICS[metric].unit)}"
+    rows = [
+        {"dt": in_ms(dt), f"{error}, recorded": _value(was, metric), "now": _value(now, metric), "motion": _motion(was, now)}
+        for dt, (was, now) in found.cases.items()
+    ]
+    return Document(f"{scene} again", [Table(rows), Sentences(_sentences(found))])
+
+
+def _value(case: Case, metric: str) -> str:
+    """All digits of a value, or why there is none."""
+    return word(case.verdict) if case.verdict != "measured" else repr(case.values.get(metric, math.nan))
+
+
+def _motion(was: Case, now: Case) -> str:
+    if not (was.trajectory or now.trajectory):
+        return "none"
+    return "the same bits" if was.trajectory == now.trajectory else "differs"
+
+
+def _sentences(found: Again) -> list[str]:
+    """Why there is no motion, whether the record was reproduced, and what is not as in the record."""
+    reasons = []
+    for was, now in found.cases.values():
+        if was.verdict != "measured" and was.reason != now.reason:
+            reasons.append(f"In the record {word(was.verdict)}: {was.reason}.")
+        if now.verdict != "measured":
+            reasons.append(f"{word(now.verdict).capitalize()}: {now.reason or 'the plan no longer has this time step'}.")
+    moved, count = len(found.moved), len(found.cases)
+    differ = f"{moved} of {counted(count, 'result')} {'differs' if moved == 1 else 'differ'} from the record."
+    result = differ if moved else "Every result is that of the record, bit for bit."
+    others = "; ".join(f"{name} {now} (in the record: {was})" for name, (was, now) in found.differing.items())
+    surroundings = f"Not as in the record: {others}." if others else "Adapter, versions and machine are those of the record."
+    return [*dict.fromkeys(reasons), result, surroundings]
+
+
+def as_data(found: Again) -> dict[str, Any]:
+    """Everything with all digits, for JSON."""
+    cases = [{"dt": dt, "same": dt not in found.moved, "recorded": _case(was), "now": _case(now)} for dt, (was, now) in found.cases.items()]
+    return {"cases": cases, "differing": {name: {"recorded": was, "now": now} for name, (was, now) in found.differing.items()}}
+
+
+def _case(case: Case) -> dict[str, Any]:
+    return {name: getattr(case, name) for name in ("verdict", "reason", "trajectory", "values")}

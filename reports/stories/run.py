@@ -1,0 +1,99 @@
+"""The output of `dropspin run`: the overview of a run, computed once for terminal, HTML and Markdown."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
+from dropspin.comparisons.results.results import Results, Status
+from dropspin.comparisons.running.forecast import Forecast
+from dropspin.comparisons.running.start_phases import QUICK_START_PHASES, START_PHASES
+from dropspin.reports.document import Document, Paragraph, Part, Sentences, Table
+from dropspin.reports.stories.failures import Failure, failures, reproduce_drawn
+from dropspin.reports.stories.findings import (
+    Counts,
+    ProfileComparison,
+    asymptotic_errors,
+    counts,
+    finding_sentences,
+    profile_comparisons,
+    verdict_sentence,
+)
+from dropspin.reports.stories.impact_laws import NOTE, law_rows
+from dropspin.scenarios.text import counted
+
+
+@dataclass(frozen=True)
+class Overview:
+    """The first part of a report.
+
+    Attributes:
+        verdict: The outcome of the checks in one sentence.
+        findings: What a quick run left out, the main finding on each engine, and the command that draws the same random scenes again.
+        counts: The number of checks with each verdict.
+        statuses: The status of each engine in each scene, by scene and engine.
+        profiles: Engines with default settings compared with the calibrated ones.
+        failures: The failures, grouped.
+        laws: The distances of engines to other impact laws, in scenes in which the laws differ: the rows of `law_rows`.
+    """
+
+    verdict: str
+    findings: Sequence[str]
+    counts: Counts
+    statuses: Mapping[str, Mapping[str, Status]]
+    profiles: Sequence[ProfileComparison]
+    failures: Sequence[Failure]
+    laws: Sequence[Mapping[str, str]]
+
+
+def overview(results: Results) -> Overview:
+    """The overview of a run."""
+    tally, profiles = counts(results), profile_comparisons(results)
+    findings = finding_sentences(results, {cause: asymptotic_errors(results, cause) for cause in ("model", "setting")}, profiles)
+    findings = [*_quick(results), *findings, *reproduce_drawn(results)]
+    return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results), law_rows(results))
+
+
+def document(results: Results, summary: Overview) -> Document:
+    """A short report: findings, the status of each engine in each scene, distances to other impact laws, and failures."""
+    statuses = [
+        {"scene": scene, **{engine: f"{status.mark} {status.words}" for engine, status in by_engine.items()}}
+        for scene, by_engine in summary.statuses.items()
+    ]
+    laws: list[Part] = [Paragraph(NOTE), Table(summary.laws)] if summary.laws else []
+    failed = [f"✗ {failure.sentence}" for failure in summary.failures]
+    listed = Sentences(failed, commands=[failure.reproduce for failure in summary.failures])
+    versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in results.provenance["versions"].items())
+    parts = [Table(statuses), *laws, listed, Paragraph(f"{versions} on {results.provenance['cpu']}")]
+    return Document("dropspin", parts, [Paragraph(summary.verdict, style="bold"), Sentences(summary.findings)])
+
+
+def _quick(results: Results) -> list[str]:
+    """What a quick run left out, and the number of its checks that are not decided, if any; empty for other runs."""
+    if not results.is_quick:
+        return []
+    undecided = int((results.table["basis"] == "few_starts").sum())
+    decided = f"{counted(undecided, 'check is', 'checks are')} not decided by so few starts. " if undecided else ""
+    return [
+        f"Quick run: {QUICK_START_PHASES} start phases instead of {START_PHASES}, at most {QUICK_MEMBERS} members of an ensemble, and no "
+        f"perturbed starts in double precision. {decided}Run again without --quick to compare or accept the results."
+    ]
+
+
+WORTH_SAYING = 60.0
+"""Shortest run whose time is forecast on the terminal [s]."""
+MUCH_SHORTER = 0.5
+"""Share of the time of a run below which a quick run is mentioned."""
+
+
+def forecast_sentence(found: Forecast) -> str:
+    """The time that a run will take, with that of the engine that takes longest and of a quick run; empty if it is short."""
+    if found.seconds < WORTH_SAYING:
+        return ""
+    longest = max(found.by_engine, key=found.by_engine.__getitem__)
+    of_engine = f", of which {longest} {_minutes(found.by_engine[longest])}" if len(found.by_engine) > 1 else ""
+    of_quick = f"; --quick takes {_minutes(found.quick)}" if found.quick < MUCH_SHORTER * found.seconds else ""
+    return f"{_minutes(found.seconds)} on {counted(found.jobs, 'processor')}{of_engine}{of_quick}"
+
+
+def _minutes(seconds: float) -> str:
+    return "less than 1 min" if seconds < WORTH_SAYING else f"about {seconds / WORTH_SAYING:.0f} min"

@@ -1,0 +1,114 @@
+"""The output of `dropspin show`: a scene, or the model that an engine builds of the scene."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dropspin.comparisons.engines.base import EngineBroken
+from dropspin.comparisons.judging.verdicts import verify_expectations
+from dropspin.reports.stories.numbers import bound
+from dropspin.reports.stories.scene import left_out, modelled
+from dropspin.scenarios import Scenario, Truth, truth_for
+from dropspin.scenarios.model import Expectation
+from dropspin.scenarios.problems import identifier
+from dropspin.scenarios.state import VELOCITY
+from dropspin.scenarios.truths import Law, other_laws
+
+if TYPE_CHECKING:
+    from dropspin.comparisons.running.inputs import EngineEntry
+
+Rows = list[dict[str, str]]
+
+
+def scene_rows(scene: Scenario) -> Rows:
+    """The description of a scene: what it models, its exact solution and its expectations."""
+    truth = truth_for(scene)
+    verify_expectations(scene, truth, [])
+    start = scene.start
+    facts = {
+        "scene": scene.name,
+        "problem": identifier(scene),
+        "summary": scene.summary,
+        "source": scene.source,
+        "duration": f"{scene.duration:g} s",
+        "modelled": ", ".join(modelled(scene)),
+        "left out": ", ".join(left_out(scene)) or "nothing",
+        "inertia": f"{scene.body.inertia_tensor.tolist()} kg m²",
+        "start": f"x = {list(start.position)} m, q = {list(start.orientation)}",
+        "start rates": f"v = {list(start.velocity)} m/s, ω = {list(start.angular_velocity)} rad/s",
+        "truth": truth.statement if truth else "none known",
+    }
+    if truth and truth.events:
+        facts["impacts"] = f"{len(truth.events)}, the first at {truth.events[0].time:.6f} s"
+    if truth and not truth.covers_all(scene.duration):
+        facts["valid until"] = f"{truth.horizon:.6f} s: {truth.ends}"
+    if truth and (others := other_laws(scene)):
+        facts["other laws"] = _other_laws(truth, others)
+    for expectation in scene.expect:
+        facts[f"expect {expectation.metric} ({_applies_to(expectation)})"] = f"{_allowed(expectation)}: {expectation.reason}"
+    return [{"what": key, "is": value} for key, value in facts.items() if value]
+
+
+def _other_laws(truth: Truth, others: Mapping[Law, Truth]) -> str:
+    """By how much the velocity after the first impact differs under the other laws of impacts with friction."""
+    after = truth.events[0].after[VELOCITY]
+    found = [f"{law} {np.linalg.norm(other.events[0].after[VELOCITY] - after):.2g} m/s" for law, other in others.items() if other.events]
+    return f"velocity after the first impact differs by: {', '.join(found)}; these are other models, not errors"
+
+
+def _applies_to(expectation: Expectation) -> str:
+    """The engine and the time steps to which an expectation applies."""
+    steps = ", ".join(f"{dt:g}" for dt in expectation.dt or ())
+    return " at ".join(filter(None, [expectation.engine or "any engine", f"{steps} s" if steps else ""]))
+
+
+def _allowed(expectation: Expectation) -> str:
+    below, within, above = expectation.below, expectation.within, expectation.above
+    limits = (-below, below) if below else within or (above, float("nan"))
+    return bound(*limits)
+
+
+def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
+    """The model that an engine builds of a scene, as read back from the engine, with its settings.
+
+    Raises:
+        DropspinError: The engine cannot run, or breaks down while it builds the scene.
+    """
+    from dropspin.comparisons.running.engine_process import Failed
+    from dropspin.comparisons.running.entries import present_entry
+    from dropspin.comparisons.running.inputs import verify_time_step
+    from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+
+    verify_time_step(scene, dt)
+    entry = present_entry(engine_name)
+    with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
+        try:
+            return processes.call(entry, _built, scene, dt)
+        except Failed as failure:
+            raise EngineBroken(f"{entry.label} cannot build {scene.name}: {failure.reason}.") from None
+
+
+def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:
+    """The model that an engine builds; runs in the engine's process."""
+    from dropspin.comparisons.running.verification import verified_refusal, verified_settings, verify_build
+
+    engine = entry.adapter
+    refusal = verified_refusal(engine.refusal(scene))
+    if refusal is not None:
+        return [{"what": engine.label, "is": f"declines {scene.name}: {refusal}"}]
+    with engine.prepare(scene, dt) as simulation:
+        verify_build(engine, scene, simulation, dt)
+        built, settings = simulation.as_built(), verified_settings(simulation.settings)
+        rows = [
+            {"what": "engine", "is": engine.label, "why": ""},
+            {"what": "velocity lag", "is": f"{simulation.velocity_lag:g} s", "why": "time by which velocity lags position"},
+        ]
+    if built is not None:
+        rows += [
+            {"what": "mass", "is": f"{built.mass!r} kg", "why": "read back"},
+            {"what": "inertia", "is": f"{built.inertia.tolist()} kg m²", "why": "read back"},
+            {"what": "gravity", "is": f"{built.gravity.tolist()} m/s²", "why": "read back"},
+        ]
+    reasons = {} if settings.get("profile") == "default" else engine.reasons
+    return rows + [{"what": key, "is": str(value), "why": str(reasons.get(key, ""))} for key, value in settings.items()]

@@ -1,0 +1,103 @@
+"""The output of `dropspin symmetries`: the worst finding for each engine and symmetry, and a sentence on each symmetry that is lost."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from dropspin.comparisons.measuring.symmetries import NAMES
+from dropspin.comparisons.symmetries.findings import STATUSES, Finding, Status
+from dropspin.reports.document import Document, Paragraph, Sentences, Table
+from dropspin.reports.stories.study import Study
+
+COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
+MARKS: dict[Status, str] = {"kept": "✓", "rounding": "≈", "nearly kept": "~", "lost": "✗", "not run": "–"}
+MEANINGS: dict[Status, str] = {
+    "kept": "kept up to rounding",
+    "rounding": "above 1e-5, but rounding explains it",
+    "nearly kept": "up to 1e-5, but more than rounding explains",
+    "lost": "lost",
+    "not run": "not run",
+}
+
+
+class Symmetries(Study):
+    """What `dropspin symmetries` found."""
+
+    study: Literal["symmetries"] = "symmetries"
+    findings: list[Finding]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every finding, with all digits."""
+        return [{name: getattr(finding, name) for name in COLUMNS} for finding in self.findings]
+
+    def document(self) -> Document:
+        """The worst finding for each engine and symmetry, and each symmetry that is not kept."""
+        listed = Sentences(sentences(self.findings), numbered=True)
+        return Document("Symmetries and repeated runs", [Table(worst_rows(self.findings)), Paragraph(legend(self.findings)), listed])
+
+
+def worst_rows(findings: Sequence[Finding]) -> list[dict[str, str]]:
+    """The worst finding of all scenes for each symmetry, with a column for each engine."""
+    engines, tested = (dict.fromkeys(getattr(finding, name) for finding in findings) for name in ("engine", "symmetry"))
+    names = [name for name in dict.fromkeys([*NAMES, *tested]) if name in tested]
+    return [{"the scene": name, **{engine: _cell(_of(findings, engine, name)) for engine in engines}} for name in names]
+
+
+def _of(findings: Sequence[Finding], engine: str, symmetry: str) -> list[Finding]:
+    """The findings for an engine and a symmetry, the worst first; those that were not run come last."""
+    mine = [finding for finding in findings if (finding.engine, finding.symmetry) == (engine, symmetry)]
+    return sorted(mine, key=lambda finding: (finding.status != "not run", STATUSES.index(finding.status), finding.difference), reverse=True)
+
+
+def _cell(findings: Sequence[Finding]) -> str:
+    if not findings or findings[0].status == "not run":
+        return MARKS["not run"]
+    worst = findings[0]
+    return f"{MARKS[worst.status]} {worst.difference:.0e}" if worst.difference else f"{MARKS[worst.status]} 0"
+
+
+def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
+    """For each engine that loses a symmetry, the finding with the largest difference."""
+    lost = [finding for finding in findings if finding.motions is not None]
+    worst: dict[str, Finding] = {}
+    for finding in sorted(lost, key=lambda finding: -finding.difference):
+        worst.setdefault(finding.engine, finding)
+    return list(worst.values())
+
+
+def legend(findings: Sequence[Finding]) -> str:
+    """The meaning of the numbers, and of each mark that occurs."""
+    marks = ", ".join(f"{MARKS[status]} {MEANINGS[status]}" for status in STATUSES if any(finding.status == status for finding in findings))
+    return f"Each number is the largest difference of two motions of any scene, in radians or relative to sizes and speeds. {marks}."
+
+
+def sentences(findings: Sequence[Finding]) -> list[str]:
+    """A sentence for each symmetry that an engine does not keep, the largest differences first, and one for each reason not to run."""
+    broken = [finding for finding in findings if finding.status in ("lost", "nearly kept")]
+    engines = list(dict.fromkeys(finding.engine for finding in findings))
+    pairs = dict.fromkeys((finding.engine, finding.symmetry) for finding in broken)
+    groups = sorted((_of(broken, *pair) for pair in pairs), key=lambda group: (engines.index(group[0].engine), -group[0].difference))
+    return [*map(_broken, groups), *_not_run(findings)]
+
+
+def _broken(findings: Sequence[Finding]) -> str:
+    worst, others = findings[0], findings[1:]
+    more = f"; in {len(others)} other scene{'s' if len(others) > 1 else ''} too" if others else ""
+    since = f"from step {worst.step} on (t = {worst.time:.4g} s)"
+    size = f"{worst.difference:.2g}" if math.isfinite(worst.difference) else "infinite"
+    return f"{worst.engine}, {worst.symmetry}: another motion in {worst.scene}, {since}; the largest difference is {size}{more}."
+
+
+def _not_run(findings: Sequence[Finding]) -> list[str]:
+    """The engines, symmetries and scenes that were not run, by reason."""
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in sorted(findings, key=lambda finding: (finding.engine, finding.reason)):
+        if finding.status == "not run":
+            groups.setdefault((finding.engine, finding.reason), []).append(finding)
+    sentences = []
+    for (engine, reason), group in groups.items():
+        scenes, names = (dict.fromkeys(getattr(finding, name) for finding in group) for name in ("scene", "symmetry"))
+        ways = f" ({', '.join(names)})" if len(names) < len(NAMES) // 2 else ""
+        options = " (options --time-limit and --dt)" if group[0].verdict == "timed_out" else ""
+        sentences.append(f"Not run: {engine} in {', '.join(scenes)}{ways}: {reason.removesuffix('.')}{options}.")
+    return sentences

@@ -1,0 +1,48 @@
+"""The output of `dropspin symmetries twins`: a row for each scene and pair of engines."""
+
+import math
+from collections.abc import Sequence
+
+from dropspin.comparisons.symmetries.twins import LEVELS, TwinFinding
+from dropspin.reports.document import Document, Sentences, Table
+
+LEGEND = (
+    "Steps are the first after which the motions differ at all, and by more than each size, of angles in radians, and relative to sizes "
+    "and speeds; 0 is the start. Rounding explains a difference if the initial state perturbed by 16 eps changes the motion of one of the "
+    "two engines as much."
+)
+
+
+def document(findings: Sequence[TwinFinding]) -> Document:
+    """A row for each finding, what the columns mean, and each reason not to run."""
+    reasons = [
+        f"Not run: {finding.engine} and {finding.twin} in {finding.scene}: {finding.reason}."
+        for finding in findings
+        if finding.status == "not run"
+    ]
+    rows = Table(list(map(_row, findings)), left_out_first=["> 1e-12", "> 1e-09"])
+    return Document("Engines of the same algorithm", [rows, Sentences([LEGEND, *reasons])])
+
+
+def _row(finding: TwinFinding) -> dict[str, str]:
+    """A finding; – means never, or that there is no such difference."""
+    explained = "yes" if finding.unexplained is None else f"not from step {finding.unexplained:,} on"
+    return {
+        "scene": finding.scene,
+        "engines": f"{finding.engine}, {finding.twin}",
+        "differ from step": _step(finding.first),
+        "before contact": _number(finding.before_contact),
+        "after contact": _number(finding.after_contact),
+        **{f"> {level:g}": _step(finding.beyond.get(level)) for level in LEVELS},
+        "rounding explains it": "not run" if finding.status == "not run" else explained,
+    }
+
+
+def _step(step: int | None) -> str:
+    return "–" if step is None else f"{step:,}"
+
+
+def _number(difference: float) -> str:
+    if math.isnan(difference):
+        return "–"
+    return "0" if difference == 0.0 else f"{difference:.1e}"

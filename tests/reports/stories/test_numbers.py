@@ -1,0 +1,54 @@
+"""Numbers as text."""
+
+import math
+
+import pytest
+
+from dropspin.reports.stories.leading_errors import level
+from dropspin.reports.stories.numbers import duration, failing, formatted, left_out
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.18, "0.180"),
+        (-0.1796, "-0.180"),
+        (2.0, "2.00"),
+        (12.0, "12.0"),
+        (123.0, "123"),
+        (999.7, "1.00e+03"),
+        (0.01, "0.0100"),
+        (0.00999, "9.99e-03"),
+        (0.0, "0"),
+        (-0.0, "0"),
+        (math.nan, "–"),
+        (math.inf, "inf"),
+    ],
+)
+def test_three_significant_digits(value, text):
+    """Also where the last ones are zero, so that the numbers of a column have the same precision."""
+    assert formatted(value) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.9997, "1 s"), (0.123456, "123 ms"), (1234.0, "1230 s"), (9.999e-7, "1 µs"), (3e-8, "30 ns"), (1.5, "1.5 s"), (0.0, "0 ns")],
+)
+def test_durations_have_no_exponent(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_sizes_of_errors_that_are_infinite_have_the_largest_level():
+    assert [level(error) for error in (0.0, 1e-8, 2e-8, 0.1, 0.11, math.inf, math.nan)] == [0, 0, 1, 7, 8, 8, None]
+
+
+def test_counts_and_reasons_are_sentences():
+    assert [failing(*counts, "check") for counts in ((1, 1), (1, 2), (2, 1200))] == [
+        "1 of 1 check fails",
+        "1 of 2 checks fails",
+        "2 of 1,200 checks fail",
+    ]
+    assert left_out({"rapier": "rapier is not installed: pip install x.", "a": "diverged"}) == [
+        "Left out: rapier is not installed: pip install x.",
+        "Left out: a, diverged.",
+    ]

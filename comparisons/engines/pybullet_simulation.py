@@ -2,13 +2,13 @@
 
 import os
 import sys
-from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from itertools import product
+from struct import pack
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,9 @@ SQUARE = {
     "indices": [0, 1, 2, 2, 1, 3],
 }
 """The floor as a mesh: two triangles, with upward normals."""
+CHUNK = 512  # states that are read before they are stored as numbers of an array
+MOST_USES = 50
+"""Simulations after which a connection is reset, which takes as long as 500 steps; until then the shapes of removed bodies take memory."""
 LARGEST_TURN = np.pi / 4  # rad a step; beyond it Bullet's rotation is too small
 
 
@@ -75,13 +78,13 @@ class PyBulletSimulation(Simulation):
         self._grips = scene.floor is not None and scene.floor.friction == "infinite"
         self._turning_slip_of = scene if scene.floor is not None and 0.0 < scene.floor.coefficient < np.inf and not form.multibody else None
         self._idle = _idle.setdefault(form.default, [])
-        self._client = self._idle.pop() if self._idle else self._bullet.connect(self._bullet.DIRECT)
+        self._client, self._uses = self._idle.pop() if self._idle else (int(self._bullet.connect(self._bullet.DIRECT)), 0)
         if self._client < 0:
             raise RuntimeError("PyBullet returned no connection")
         try:
             self._build(scene, dt, form)
         except BaseException:
-            self.close()
+            self._reset()
             raise
 
     def _build(self, scene: Scenario, dt: float, form: Form) -> None:
@@ -170,20 +173,29 @@ class PyBulletSimulation(Simulation):
         for _ in range(steps):
             step(client)
 
-    def _numbers(self) -> tuple[float, ...]:
-        position, orientation = self._bullet.getBasePositionAndOrientation(self._body, self._client)
-        velocity, angular_velocity = self._bullet.getBaseVelocity(self._body, self._client)
-        return position + orientation + velocity + angular_velocity
-
     def state(self) -> Array:
-        return np.array(self._numbers())
+        return self._states_after_each(0, 1)[0].copy()
+
+    def _states_after_each(self, steps: int, count: int) -> Array:
+        """The states after each of `count` times `steps` steps, shape (count, 13), without look-ups: reading costs as much as a step."""
+        step, pose, rates = self._bullet.stepSimulation, self._bullet.getBasePositionAndOrientation, self._bullet.getBaseVelocity
+        body, client, numbers = self._body, self._client, list[float]()
+        for _ in range(count):
+            for _ in range(steps):
+                step(client)
+            position, orientation = pose(body, client)
+            velocity, spin = rates(body, client)
+            numbers += position
+            numbers += orientation
+            numbers += velocity
+            numbers += spin
+        return np.frombuffer(pack(f"{len(numbers)}d", *numbers)).reshape(-1, 13)
 
     def record(self, steps: int, every: int = 1) -> Array:
-        numbers = array("d", self._numbers())
-        for _ in range(steps // every):
-            self.advance(every)
-            numbers.extend(self._numbers())
-        rows = np.array(numbers).reshape(-1, 13)
+        rows = np.empty((1 + steps // every, 13))
+        rows[0] = self.state()
+        for first in range(1, len(rows), CHUNK):
+            rows[first : first + CHUNK] = self._states_after_each(every, min(CHUNK, len(rows) - first))
         self.known_limitations = list(_limitations_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
         if every == 1 and self._turning_slip_of is not None:
             self.known_limitations += _turning_slip(self._turning_slip_of, rows, self._dt)
@@ -196,12 +208,21 @@ class PyBulletSimulation(Simulation):
         return AsBuilt(dynamics[0], np.diag(dynamics[2]), gravity)
 
     def close(self) -> None:
+        if self._uses == MOST_USES or not np.isfinite(self.state()).all():
+            self._reset()
+            return
+        for number in reversed(range(self._bullet.getNumBodies(physicsClientId=self._client))):
+            body = self._bullet.getBodyUniqueId(number, physicsClientId=self._client)
+            self._bullet.removeBody(body, physicsClientId=self._client)
+        self._idle.append((self._client, self._uses + 1))
+
+    def _reset(self) -> None:
         self._bullet.resetSimulation(physicsClientId=self._client)
-        self._idle.append(self._client)
+        self._idle.append((self._client, 0))
 
 
-_idle: dict[bool, list[int]] = {}
-"""Unused connections, by profile (True: default); to clear one takes a fifth of the time of opening one, for the same bits."""
+_idle: dict[bool, list[tuple[int, int]]] = {}
+"""Unused connections, by profile (True: default), and how often each was used since it was reset; they give the bits that new ones give."""
 
 
 def _limitations_met(rows: Array, dt: float, fall: Array | None) -> Iterator[KnownLimitation]:

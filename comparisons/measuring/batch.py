@@ -1,16 +1,21 @@
 """Quantities at each state of many motions at once: the formulas of `dropspin.scenarios.mechanics` in one compiled loop."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.measuring import motions
-from dropspin.comparisons.measuring.motions import Array, Mask, Motions, RowNumbers, Setup, States, is_touching
+from dropspin.comparisons.measuring import states as states_module
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.contacts import contact_residuals
+from dropspin.comparisons.measuring.motions import Motions, RowNumbers, Setup
+from dropspin.comparisons.measuring.requirements import obeys_contact_laws
+from dropspin.comparisons.measuring.states import Array, Mask, States, is_touching
 from dropspin.scenarios import Scenario, Trajectory, mechanics
 from dropspin.scenarios.mechanics import energy_of, energy_origin, kinetic_energy_of, offset_of
 
@@ -60,24 +65,51 @@ def motions_side_by_side(
     return Motions(setup, _StatesOfMany(height, states[..., 8], kinetic, energy, lowest, touching), dt, last_row), valid
 
 
-def states_of(scenes: Sequence[Scenario], motions: Sequence[Trajectory]) -> list[States]:
-    """The quantities at each state of motions of equal length, from several starts of one scene, computed at once where all are finite."""
-    found = [States(scene, motion) for scene, motion in zip(scenes, motions, strict=True)]
-    setup, rows, dt = Setup.of(scenes[0]).as_batch(), len(motions[0]), motions[0].t[1] - motions[0].t[0]
-    many = max(1, BATCH_BYTES // (rows * 13 * 8))
-    for some in (found[first : first + many] for first in range(0, len(found), many)):
+def compute_cases(cases: Sequence[Comparison]) -> None:
+    """Compute what metrics need of motions from several starts of one scene, of all at once where their states are finite."""
+    scene = cases[0].scene
+    setup, has_residuals = Setup.of(scene), obeys_contact_laws(scene, None)
+    for case in cases:
+        own = replace(setup, origin=energy_origin(case.scene), clearance=np.asarray(case.scene.clearance))
+        vars(case)["motions"] = Motions(own, States(case.scene, case.motion), np.asarray(case.dt), np.asarray(len(case.motion) - 1))
+    for numbers, states, motions in compute_states([case.states for case in cases]):
+        some = cases[numbers]
+        clearance = np.array([case.motions.setup.clearance for case in some])
+        together = replace(motions, setup=replace(motions.setup, clearance=clearance))
+        residuals = contact_residuals(scene, states, together) if has_residuals else None
+        for number, case in enumerate(some):
+            vars(case.motions).update(together.of_motion(number))
+            if residuals is not None:
+                vars(case)["contacts"] = residuals.of_motion(number)
+
+
+def compute_states(found: Sequence[States]) -> Iterator[tuple[slice, Array, Motions]]:
+    """Compute the quantities at each state of motions from several starts of one scene, of those of equal length at once.
+
+    Yields:
+        For each batch of motions whose states are finite: which of the motions they are, their states, shape (B, n, 13), and the motions.
+    """
+    setup = Setup.of(found[0].scene).as_batch()
+    lengths = [len(one.motion) for one in found]
+    edges = [0, *(number for number in range(1, len(found)) if lengths[number] != lengths[number - 1]), len(found)]
+    batches = [(start, end, max(1, BATCH_BYTES // (max(lengths[start], 1) * 13 * 8))) for start, end in pairwise(edges)]
+    for numbers in (slice(first, min(first + many, end)) for start, end, many in batches for first in range(start, end, many)):
+        some, rows = found[numbers], lengths[numbers.start]
+        if rows < 2:
+            continue
         of_each = replace(setup, origin=np.array([energy_origin(one.scene) for one in some]))
-        states, lag = np.array([one.motion.states for one in some]), np.array([one.motion.velocity_lag for one in some])
-        together, valid = motions_side_by_side(of_each, states, np.full(len(some), dt), lag, np.full(len(some), rows - 1), np.inf)
+        states, lag = np.stack([one.motion.states for one in some]), np.array([one.motion.velocity_lag for one in some])
+        dt, last_row = np.full(len(some), some[0].motion.t[1] - some[0].motion.t[0]), np.full(len(some), rows - 1)
+        together, valid = motions_side_by_side(of_each, states, dt, lag, last_row, np.inf)
         if valid.all():
             for number, one in enumerate(some):
                 vars(one).update({name: getattr(together.states, name)[number] for name in AT_ONCE})
-    return found
+            yield numbers, states, together
 
 
 def compile_states(scene: Scenario) -> None:
-    """Compile the loop of `states_of` in this thread: a process that is forked while another thread compiles may wait for it forever."""
-    states_of([scene], [Trajectory.from_states(np.arange(2.0), np.tile(scene.initial_state, (2, 1)))])
+    """Compile the loop over the states in this thread: a process that is forked while another thread compiles may wait for it forever."""
+    any(compute_states([States(scene, Trajectory.from_states(np.arange(2.0), np.tile(scene.initial_state, (2, 1))))]))
 
 
 def _for_each(values: Array, size: int) -> NDArray[np.float64]:
@@ -93,7 +125,7 @@ def _kernel() -> Callable[..., None]:
 
     for formula in (*mechanics.FORMULAS, is_touching):
         register_jitable(formula)
-    return compile_cached(_fill, *(Path(module) for module in (__file__, mechanics.__file__, motions.__file__)))
+    return compile_cached(_fill, *(Path(module) for module in (__file__, mechanics.__file__, states_module.__file__)))
 
 
 def _fill(

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.measuring.contacts import ContactResiduals, contact_residuals
-from dropspin.comparisons.measuring.motions import Motions, States
+from dropspin.comparisons.measuring.motions import Motions
+from dropspin.comparisons.measuring.states import States
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import apex
 from dropspin.scenarios.model import TOUCHING
@@ -28,6 +29,8 @@ Rows = NDArray[np.intp]
 SHORTEST_FLIGHT = 16  # steps; a shorter flight is not resolved, and not judged
 SHORT = 0.2
 """A flight is much shorter than the longest if it lasts less than this share of it; its apex is then 25 times lower."""
+OF_EACH_STATE = ("kinetic_energy", "energy", "angular_momentum")
+"""Quantities of a motion that are reused where it is the reference of another engine."""
 LOW = 0.01
 """A body that rises after an impact by less than this share of its drop stays down: its flight is shorter than `SHORT` of its fall."""
 
@@ -72,8 +75,8 @@ class Comparison:
     def between(cls, one: "Comparison", other: "Comparison", until: int) -> "Comparison":
         """Compare the motions of two engines over `until` rows; what was already computed of them is reused."""
         case = cls(one.scene, one.motion, other.motion[:until], one.impacts)
-        vars(case)["states"] = one.states
-        vars(case.exact_states)["energy"] = other.states.energy[:until]
+        vars(case)["motions"] = one.motions
+        vars(case.exact_states).update({name: vars(other.states)[name][:until] for name in OF_EACH_STATE if name in vars(other.states)})
         return case
 
     @cached_property
@@ -99,20 +102,21 @@ class Comparison:
         return self.motion[: len(self.exact)]
 
     @cached_property
+    def motions(self) -> Motions:
+        """The motion as the input of metrics that need no reference."""
+        return Motions.of(self.scene, self.motion)
+
+    @property
     def states(self) -> States:
         """Quantities at each state of the motion."""
-        return States(self.scene, self.motion)
+        states: States = self.motions.states  # type: ignore[assignment]
+        return states
 
     @cached_property
     def exact_states(self) -> States:
         """Quantities at each state of the reference."""
         assert self.reference is not None
         return States(self.scene, self.reference)
-
-    @cached_property
-    def motions(self) -> Motions:
-        """The motion as the input of metrics that need no reference."""
-        return Motions.of(self.scene, self.motion, self.states)
 
     @property
     def energy(self) -> Array:
@@ -137,7 +141,7 @@ class Comparison:
     @cached_property
     def contacts(self) -> ContactResiduals:
         """The violations of the laws of contact at each step in which the floor acts."""
-        return contact_residuals(self.scene, self.motion, self.motions)
+        return contact_residuals(self.scene, self.motion.states, self.motions)
 
     @property
     def has_impact_to_come(self) -> bool:

@@ -20,7 +20,7 @@ In an impact with friction these laws permit a gain of energy (T. R. Kane, 1984)
 reverses within an impact, Coulomb's law at each instant (E. J. Routh, 1860) may leave a slip along F, against the third law.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,7 +46,8 @@ class ContactResiduals:
     """The violations of the laws of contact in each time step in which the velocity changes otherwise than by gravity; 0 where a law holds.
 
     Attributes:
-        steps: The numbers of these time steps, the first step being 0, shape (n,).
+        motion: The number of the motion of each of these time steps, shape (n,).
+        steps: Their numbers, the first step being 0, shape (n,).
         in_contact: Whether they are in a contact, shape (n,); only `pull` is not 0 in others.
         pull: Impulse with which the floor pulls, over M v, shape (n,), with the speed v at which the kinetic energy is the scene's energy.
         cone_excess: Impulse along the floor beyond the friction coefficient times the normal impulse, over M v, shape (n,); NaN if
@@ -55,6 +56,7 @@ class ContactResiduals:
         gap: Height of the body's lowest point above the floor, before or after the step, whichever is lower [m], shape (n,).
     """
 
+    motion: NDArray[np.intp]
     steps: NDArray[np.intp]
     in_contact: NDArray[np.bool_]
     pull: Array
@@ -62,27 +64,33 @@ class ContactResiduals:
     push: Array
     gap: Array
 
+    def of_motion(self, number: int) -> "ContactResiduals":
+        """Those of one of several motions."""
+        first, last = np.searchsorted(self.motion, (number, number + 1))
+        return ContactResiduals(*(getattr(self, field.name)[first:last] for field in fields(self)))
 
-def contact_residuals(scene: Scenario, motion: Trajectory, motions: Motions | None = None) -> ContactResiduals:
-    """The violations of the laws of contact in a motion of a scene with a floor.
+
+def contact_residuals(scene: Scenario, states: Array, motions: Motions) -> ContactResiduals:
+    """The violations of the laws of contact in motions from several starts of a scene.
 
     Args:
-        scene: The scene; it must not have damping.
-        motion: At least two states, equally spaced in time.
-        motions: `Motions.of(scene, motion)`, if it was already computed.
+        scene: The scene; it must have a floor and no damping.
+        states: Shape (B, n, 13), or (n, 13) of one motion.
+        motions: The motions.
     """
     assert scene.floor is not None
-    found = motions or Motions.of(scene, motion)
-    steps = np.flatnonzero(found.states.touching)
-    in_contact = found.in_contact[steps]
-    before, after, lowest = motion[steps], motion[steps + 1], found.lowest_height
-    energy = float(found.energy_scale) or 1.0  # a body at rest without gravity violates nothing
+    motion, steps = np.nonzero(np.atleast_2d(motions.states.touching))
+    in_contact = np.atleast_2d(motions.in_contact)[motion, steps]
+    rows, lowest = states.reshape(-1, *states.shape[-2:]), np.atleast_2d(motions.lowest_height)
+    before, after = (Trajectory.from_states(np.zeros(len(steps)), rows[motion, row]) for row in (steps, steps + 1))
+    scale, dt = np.atleast_1d(motions.energy_scale)[motion], np.broadcast_to(motions.dt, len(rows))[motion, np.newaxis]
+    energy = np.where(scale == 0.0, 1.0, scale)  # a body at rest without gravity violates nothing
     momentum = scene.body.mass * np.sqrt(2.0 * energy / scene.body.mass)
 
-    impulse = scene.body.mass * (after.velocity - before.velocity - float(found.dt) * scene.acceleration)
+    impulse = scene.body.mass * (after.velocity - before.velocity - dt * scene.acceleration)
     normal, along = impulse @ UP, impulse - np.outer(impulse @ UP, UP)
     moment = (angular_momentum(scene, after) - angular_momentum(scene, before)) @ UP
-    to_floor = (lowest[steps + 1] - after.position[:, 1])[:, np.newaxis] * UP
+    to_floor = (lowest[motion, steps + 1] - after.position[:, 1])[:, np.newaxis] * UP
     slip = after.velocity + cross(after.angular_velocity, to_floor)
     along_slip = np.sum(along * slip, axis=1) + moment * (after.angular_velocity @ UP)
     if np.isinf(scene.floor.coefficient):
@@ -90,12 +98,13 @@ def contact_residuals(scene: Scenario, motion: Trajectory, motions: Motions | No
     else:
         excess = in_contact * np.maximum(length(along) - scene.floor.coefficient * np.maximum(normal, 0.0), 0.0)
     return ContactResiduals(
+        motion,
         steps,
         in_contact,
         pull=np.maximum(-normal, 0.0) / momentum,
         cone_excess=excess / momentum,
         push=in_contact * np.maximum(along_slip, 0.0) / energy,
-        gap=np.where(in_contact, np.maximum(np.minimum(lowest[steps], lowest[steps + 1]), 0.0), 0.0),
+        gap=np.where(in_contact, np.maximum(np.minimum(lowest[motion, steps], lowest[motion, steps + 1]), 0.0), 0.0),
     )
 
 
@@ -119,7 +128,7 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
     if scene.floor is None or scene.damping is not None:
         raise DropspinError(f"{scene.name}: the forces of the floor need a scene with a floor and without damping.")
     motions = Motions.of(scene, motion)
-    found = contact_residuals(scene, motion, motions)
+    found = contact_residuals(scene, motion.states, motions)
     starts, ends = motions.contacts.before, motions.contacts.after
     first = np.cumsum(ends - starts) - (ends - starts)  # the number of the first step of each contact among those in contact
     falling = (motion.t[ends] - motion.t[starts]) * scene.acceleration[1]

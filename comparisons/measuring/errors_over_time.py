@@ -10,6 +10,8 @@ from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.scenarios.rotations import angle_between_orientations, angle_between_vectors, length, rotation_vector
 
 Array = NDArray[np.float64]
+Rows = slice | list[int]
+ALL = slice(None)
 
 
 def energy_error(case: Comparison, synchronised: bool = True) -> Array:
@@ -23,13 +25,12 @@ def angular_momentum_error(case: Comparison) -> Array:
     return length(angular_momentum_difference(case))
 
 
-def angular_momentum_difference(case: Comparison) -> Array:
+def angular_momentum_difference(case: Comparison, rows: Rows = ALL) -> Array:
     """The difference as a vector in the world frame, over the largest exact value, shape (n, 3)."""
-    found, exact = case.angular_momentum, case.exact_states.angular_momentum
-    scale = np.max(length(exact))
+    found, exact, scale = case.angular_momentum, case.exact_states.angular_momentum, case.exact_states.largest_angular_momentum
     if scale == 0.0:
         raise Unresolved("the angular momentum is 0 in double precision")
-    difference: Array = (found - exact) / scale
+    difference: Array = (found[rows] - exact[rows]) / scale
     return difference
 
 
@@ -43,9 +44,9 @@ def position_error(case: Comparison) -> Array:
     return length(position_difference(case))
 
 
-def position_difference(case: Comparison) -> Array:
+def position_difference(case: Comparison, rows: Rows = ALL) -> Array:
     """The vector from the exact centre of mass to that of the engine [m], shape (n, 3)."""
-    return case.compared.position - case.exact.position
+    return case.compared.position[rows] - case.exact.position[rows]
 
 
 def orientation_error(case: Comparison) -> Array:
@@ -53,9 +54,9 @@ def orientation_error(case: Comparison) -> Array:
     return angle_between_orientations(case.compared.orientation, case.exact.orientation)
 
 
-def orientation_difference(case: Comparison) -> Array:
+def orientation_difference(case: Comparison, rows: Rows = ALL) -> Array:
     """The rotation from the exact orientation to that of the engine as a vector in the world frame [rad], shape (n, 3)."""
-    return rotation_vector(case.exact.orientation, case.compared.orientation)
+    return rotation_vector(case.exact.orientation[rows], case.compared.orientation[rows])
 
 
 @dataclass(frozen=True)

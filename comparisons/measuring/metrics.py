@@ -10,7 +10,6 @@ from dropspin.comparisons.measuring import requirements
 from dropspin.comparisons.measuring.comparison import SHORTEST_FLIGHT, Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Applies, Array, Components, Measure, Metric
 from dropspin.comparisons.measuring.motions import Motions, at_rows
-from dropspin.comparisons.measuring.stored_energy import energy_with_stored
 from dropspin.scenarios import Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.mechanics import angular_momentum, apex
 from dropspin.scenarios.rotations import angle_between_orientations, cross, length
@@ -48,13 +47,13 @@ def _metric(
     return register
 
 
-def _at_end_of_each_flight(at_each_row: Components) -> Components:
+def _at_end_of_each_flight(at_rows: Callable[[Comparison, list[int]], Array]) -> Components:
     """Components at the last row of the middle half of each flight, shape (flights, 3).
 
     This time is the same at every time step, to within one step, and far from impacts, near which errors are errors in time. The time at
     which an error is largest depends on the time step, so the components at that time do not follow a power of the time step.
     """
-    return lambda case: at_each_row(case)[[rows[-1] for rows in case.flights]]
+    return lambda case: at_rows(case, [int(rows[-1]) for rows in case.flights])
 
 
 @_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True, agreement=True)
@@ -82,7 +81,7 @@ def energy_gain(case: Comparison | Motions) -> Array:
     Energy that a contact may have stored, at most its force times the depth of the lowest point, counts as present.
     """
     motions = case.motions if isinstance(case, Comparison) else case
-    return (motions.energy - np.minimum.accumulate(energy_with_stored(motions), axis=-1)).max(axis=-1) / case.energy_scale
+    return motions.energy_gained / case.energy_scale
 
 
 @_metric(

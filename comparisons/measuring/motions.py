@@ -7,50 +7,18 @@ a quantity at each state has shape (..., n).
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.measuring.contact_runs import ContactRuns, contact_runs
+from dropspin.comparisons.measuring.contact_runs import RESOLVED, STEADY, ContactRuns, contact_runs
+from dropspin.comparisons.measuring.states import Array, Mask, StateQuantities, States
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.mechanics import Components, angular_momentum, energy, energy_origin, kinetic_energy, lowest_height, scalar_product
+from dropspin.scenarios.mechanics import energy_origin, scalar_product
 from dropspin.scenarios.model import TOUCHING
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 RowNumbers = NDArray[np.intp]
-
-
-class StateQuantities(Protocol):
-    """Quantities at each state of a motion; rows after the last one of a shorter motion repeat its last state."""
-
-    @property
-    def height(self) -> Array:
-        """Height of the centre of mass [m], shape (..., n)."""
-
-    @property
-    def vertical_velocity(self) -> Array:
-        """Of the centre of mass [m/s], shape (..., n)."""
-
-    @property
-    def kinetic_energy(self) -> Array:
-        """[J], shape (..., n)."""
-
-    @property
-    def energy(self) -> Array:
-        """Kinetic plus potential energy, velocity synchronised with position [J], shape (..., n)."""
-
-    @property
-    def lowest_height(self) -> Array:
-        """Height of the body's lowest point above the floor [m], shape (..., n).
-
-        It may be inf where no point is below the floor, except at the rows of a step in `touching` and of the step before it.
-        """
-
-    @property
-    def touching(self) -> Mask:
-        """For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (..., n - 1)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +112,9 @@ class Motions:
     last_row: RowNumbers
 
     @classmethod
-    def of(cls, scene: Scenario, motion: Trajectory, states: "States | None" = None) -> "Motions":
-        """One motion of a scene: at least two rows, equally spaced in time; `states` are its `States`, if there are any yet."""
-        one = states or States(scene, motion)
-        return cls(Setup.of(scene), one, np.asarray(motion.t[1] - motion.t[0]), np.asarray(len(motion) - 1))
+    def of(cls, scene: Scenario, motion: Trajectory) -> "Motions":
+        """One motion of a scene: at least two rows, equally spaced in time."""
+        return cls(Setup.of(scene), States(scene, motion), np.asarray(motion.t[1] - motion.t[0]), np.asarray(len(motion) - 1))
 
     @property
     def energy(self) -> Array:
@@ -192,6 +159,37 @@ class Motions:
         return found.reshape(self.states.touching.shape)
 
     @cached_property
+    def energy_gained(self) -> Array:
+        """Largest increase of energy above any earlier value [J], shape (...); energy that a contact may have stored counts as present."""
+        return (self.energy - np.minimum.accumulate(self._energy_with_stored(), axis=-1)).max(axis=-1)
+
+    def _energy_with_stored(self) -> Array:
+        """Energy plus the largest energy that a contact may have stored and give back [J], shape (..., n).
+
+        A force that grows with the depth of the lowest point below its height before the contact stores at most force times depth, and no
+        more than the energy that the body lost in the contact. A contact is rigid, and stores none, unless the point moves down against a
+        force larger than the weight in two successive time steps.
+        """
+        runs = self.contacts
+        motion, step, number = runs.steps
+        energy, lowest, velocity = map(np.atleast_2d, (self.energy, self.lowest_height, self.states.vertical_velocity))
+        fall, dt, mass = (np.broadcast_to(one, len(energy))[motion] for one in (self.fall, self.dt, self.setup.mass))
+        rise, sinking = velocity[motion, step + 1] - velocity[motion, step], lowest[motion, step] - lowest[motion, step + 1]
+        compressed = (rise > STEADY * fall) & (sinking > RESOLVED * fall * dt)
+        again = compressed[1:] & compressed[:-1] & (number[1:] == number[:-1])
+        is_soft = np.zeros(len(runs.motion), dtype=bool)
+        is_soft[number[1:][again]] = True
+        before = runs.before[number]
+        level = np.maximum(lowest[motion, np.maximum(before - 1, 0)], 0.0)
+        force = np.where(is_soft[number], mass * np.maximum(rise + fall, 0.0) / dt, 0.0)
+        found = energy.copy()
+        for row in (step, step + 1):
+            lost = energy[motion, before] - energy[motion, row]
+            stored = np.minimum(force * np.maximum(level - lowest[motion, row], 0.0), lost)
+            found[motion, row] = np.maximum(found[motion, row], energy[motion, row] + stored)
+        return found.reshape(self.energy.shape)
+
+    @cached_property
     def first_contact(self) -> tuple[RowNumbers, RowNumbers]:
         """The last row before and the first row after the first contact, each of shape (...); -1 if there is no contact.
 
@@ -225,72 +223,17 @@ class Motions:
         last = moves.shape[-1] - 1 - moves[..., ::-1].argmax(axis=-1)
         return np.where(moves.any(axis=-1), np.minimum(last, self.last_row), 0)
 
-
-def is_touching(before: Components, after: Components, dt: float, gravity: Components, strength: float, damping_share: float) -> Any:
-    """Whether the velocity changes otherwise than by gravity and damping in a step, from the velocities before and after it.
-
-    Without contact, only gravity and damping change the velocity. A remaining change counts if it exceeds 1e-3 of the change by gravity,
-    1e-6 of the speed (for engines in single precision) and twice the change by damping (because engines use different laws of damping). The
-    arithmetic is plain, as in `dropspin.scenarios.mechanics`, for one step or for arrays of steps.
-    """
-    x = after[0] - before[0] - dt * gravity[0]
-    y = after[1] - before[1] - dt * gravity[1]
-    z = after[2] - before[2] - dt * gravity[2]
-    allowed = 1e-3 * dt * strength + (1e-6 + 2.0 * damping_share) * np.sqrt(scalar_product(before, before))
-    return np.sqrt(scalar_product((x, y, z), (x, y, z))) > allowed
-
-
-@dataclass(frozen=True, eq=False)
-class States:
-    """`StateQuantities` of one motion of a scene, each computed once."""
-
-    scene: Scenario
-    motion: Trajectory
-
-    @property
-    def height(self) -> Array:
-        """Height of the centre of mass [m], shape (n,)."""
-        return self.motion.position[:, 1]
-
-    @property
-    def vertical_velocity(self) -> Array:
-        """Of the centre of mass [m/s], shape (n,)."""
-        return self.motion.velocity[:, 1]
-
-    @cached_property
-    def angular_momentum(self) -> Array:
-        """About the centre of mass, world frame [kg m²/s], shape (n, 3)."""
-        return angular_momentum(self.scene, self.motion)
-
-    @cached_property
-    def kinetic_energy(self) -> Array:
-        """[J], shape (n,)."""
-        return kinetic_energy(self.scene, self.motion)
-
-    @cached_property
-    def energy(self) -> Array:
-        """Kinetic plus potential energy, velocity synchronised with position [J], shape (n,)."""
-        return energy(self.scene, self.motion, kinetic=self.kinetic_energy)
-
-    @cached_property
-    def energy_as_stored(self) -> Array:
-        """Kinetic plus potential energy, with velocities as stored [J], shape (n,)."""
-        return energy(self.scene, self.motion, synchronised=False, kinetic=self.kinetic_energy)
-
-    @cached_property
-    def lowest_height(self) -> Array:
-        """Height of the body's lowest point above the floor [m], shape (n,)."""
-        return lowest_height(self.scene, self.motion)
-
-    @cached_property
-    def touching(self) -> Mask:
-        """For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (n - 1,)."""
-        setup, dt = Setup.of(self.scene), np.asarray(self.motion.t[1] - self.motion.t[0])
-        before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
-        found: Mask = is_touching(
-            before, after, float(dt), tuple(setup.gravity), float(setup.gravity_strength), float(setup.damping_share(dt))
-        )
-        return found
+    def of_motion(self, number: int) -> dict[str, Any]:
+        """The cached properties of one of many motions, by name."""
+        runs = self.contacts
+        first, last = np.searchsorted(runs.motion, (number, number + 1))
+        return {
+            "contacts": ContactRuns(np.zeros(last - first, dtype=np.intp), runs.before[first:last], runs.after[first:last]),
+            "in_contact": self.in_contact[number],
+            "first_contact": tuple(np.asarray(rows[number]) for rows in self.first_contact),
+            "energy_scale": self.energy_scale[number],
+            "energy_gained": self.energy_gained[number],
+        }
 
 
 def at_rows(values: Array, rows: RowNumbers | int) -> Array:

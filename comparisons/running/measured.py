@@ -9,11 +9,11 @@ import numpy as np
 from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.judging.horizon import with_horizon
 from dropspin.comparisons.judging.verdicts import Judgement, judge, with_limitations, with_precision
-from dropspin.comparisons.measuring.batch import states_of
+from dropspin.comparisons.measuring.batch import compute_cases, compute_states
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.metrics import metrics_for
-from dropspin.comparisons.measuring.motions import States
+from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.measuring.tolerances import FEW_DRAWS, rounding, tolerance
 from dropspin.comparisons.results.table import Case, Measurement
 from dropspin.comparisons.running.engine_run import EngineRun
@@ -47,17 +47,20 @@ def phases_at(own: StartPhase, dt: float) -> tuple[Sequence[StartPhase], list[St
 def exactly_at(scene: Scenario, dt: float, truth: Truth, phases: Sequence[StartPhase]) -> list[States | None]:
     """The exact motion of an exact solution from each start phase of a scene, at every step."""
     exact = exact_motions(truth, phases, dt * np.arange(1 + scene.steps(dt), dtype=float))
-    return [States(phase.scene, motion) for phase, motion in zip(phases, exact, strict=True)]
+    found = [States(phase.scene, motion) for phase, motion in zip(phases, exact, strict=True)]
+    for _ in compute_states(found):
+        pass  # all that is needed of a batch is what was computed
+    return list(found)
 
 
 def compare(motions: Sequence[Trajectory], phases: Sequence[StartPhase], exact: Sequence[States | None]) -> list[Comparison]:
     """Motions from all start phases compared with the exact solution."""
     cases = []
-    together = zip(phases, states_of([phase.scene for phase in phases], motions), exact, strict=True)
-    for phase, states, known in together:
-        case = Comparison.with_truth(phase.scene, states.motion, phase.truth, None if known is None else known.motion)
-        vars(case).update({"states": states} if known is None else {"states": states, "exact_states": known})
-        cases.append(case)
+    for phase, motion, known in zip(phases, motions, exact, strict=True):
+        cases.append(Comparison.with_truth(phase.scene, motion, phase.truth, None if known is None else known.motion))
+        if known is not None:
+            vars(cases[-1])["exact_states"] = known
+    compute_cases(cases)
     return cases
 
 

@@ -12,7 +12,7 @@ from dropspin.comparisons.judging.error_budget import is_sufficient
 from dropspin.comparisons.judging.verdicts import Judgement
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
-from dropspin.comparisons.measuring.motions import States
+from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.results import Results, TrajectoryKey

@@ -9,7 +9,8 @@ from support.engines import QUICK
 
 import dropspin as ds
 from dropspin import scenarios
-from dropspin.comparisons.measuring.contacts import RESIDUALS, contact_residuals
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.contacts import RESIDUALS
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
 from dropspin.scenarios import Trajectory, truth_for
 
@@ -25,7 +26,7 @@ def exact(name, dt=DT):
 
 
 def largest(scene, motion):
-    found = contact_residuals(scene, motion)
+    found = Comparison(scene, motion).contacts
     return {name: float(np.nan_to_num(getattr(found, name)).max(initial=0.0)) for name in RESIDUALS}
 
 
@@ -106,7 +107,7 @@ def test_floor_that_pulls_is_measured():
     row = int(0.7 / DT)
     velocity = motion.velocity.copy()
     velocity[row:, 1] -= 0.2
-    found = contact_residuals(scene, replace(motion, velocity=velocity))
+    found = Comparison(scene, replace(motion, velocity=velocity)).contacts
     assert found.pull.max() == pytest.approx(0.2 / math.sqrt(2.0 * G * scene.clearance), rel=1e-9)
     assert found.steps[found.pull.argmax()] == row - 1
 
@@ -115,7 +116,7 @@ def test_floor_that_pulls_is_measured():
 def test_floor_that_acts_at_a_distance_is_measured(gap):
     scene, motion = exact("drop-ball")
     raised = replace(motion, position=motion.position + np.array([0.0, gap, 0.0]))
-    difference = contact_residuals(scene, raised).gap - contact_residuals(scene, motion).gap
+    difference = Comparison(scene, raised).contacts.gap - Comparison(scene, motion).contacts.gap
     # The sampled rows around an impact are up to a step away from it.
     assert difference.max() == pytest.approx(gap, abs=4.5 * DT)
 

@@ -64,4 +64,6 @@ def _with_text(result: Failure | Error, text: str) -> Failure | Error:
 
 def _printable(text: str) -> str:
     """A text without the characters that XML cannot contain; the error message of an engine may contain such characters."""
+    if text.replace("\n", "").replace("\t", "").isprintable():
+        return text
     return "".join(sign if sign in "\n\t" or sign.isprintable() else "�" for sign in text)

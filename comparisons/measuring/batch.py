@@ -17,7 +17,7 @@ from dropspin.comparisons.measuring.motions import Motions, RowNumbers, Setup
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
 from dropspin.comparisons.measuring.states import Array, Mask, States, is_touching
 from dropspin.scenarios import Scenario, Trajectory, mechanics
-from dropspin.scenarios.mechanics import energy_of, energy_origin, kinetic_energy_of, offset_of
+from dropspin.scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
 
 BATCH_BYTES = 8 * 2**20
 """States that are held in memory at a time; more would not be faster."""
@@ -67,17 +67,14 @@ def motions_side_by_side(
 
 def compute_cases(cases: Sequence[Comparison]) -> None:
     """Compute what metrics need of motions from several starts of one scene, of all at once where their states are finite."""
-    scene = cases[0].scene
+    scene, starts = cases[0].scene, Setup.of_starts([case.scene for case in cases])
     setup, has_residuals = Setup.of(scene), obeys_contact_laws(scene, None)
-    for case in cases:
-        own = replace(setup, origin=energy_origin(case.scene), clearance=np.asarray(case.scene.clearance))
-        vars(case)["motions"] = Motions(own, States(case.scene, case.motion), np.asarray(case.dt), np.asarray(len(case.motion) - 1))
-    for numbers, states, motions in compute_states([case.states for case in cases]):
-        some = cases[numbers]
-        clearance = np.array([case.motions.setup.clearance for case in some])
-        together = replace(motions, setup=replace(motions.setup, clearance=clearance))
+    for case, origin, clearance in zip(cases, starts.origin, starts.clearance, strict=True):
+        own, last_row = replace(setup, origin=origin, clearance=np.asarray(clearance)), np.asarray(len(case.motion) - 1)
+        vars(case)["motions"] = Motions(own, States(case.scene, case.motion), np.asarray(case.dt), last_row)
+    for numbers, states, together in compute_states([case.states for case in cases]):
         residuals = contact_residuals(scene, states, together) if has_residuals else None
-        for number, case in enumerate(some):
+        for number, case in enumerate(cases[numbers]):
             vars(case.motions).update(together.of_motion(number))
             if residuals is not None:
                 vars(case)["contacts"] = residuals.of_motion(number)
@@ -89,7 +86,6 @@ def compute_states(found: Sequence[States]) -> Iterator[tuple[slice, Array, Moti
     Yields:
         For each batch of motions whose states are finite: which of the motions they are, their states, shape (B, n, 13), and the motions.
     """
-    setup = Setup.of(found[0].scene).as_batch()
     lengths = [len(one.motion) for one in found]
     edges = [0, *(number for number in range(1, len(found)) if lengths[number] != lengths[number - 1]), len(found)]
     batches = [(start, end, max(1, BATCH_BYTES // (max(lengths[start], 1) * 13 * 8))) for start, end in pairwise(edges)]
@@ -97,10 +93,10 @@ def compute_states(found: Sequence[States]) -> Iterator[tuple[slice, Array, Moti
         some, rows = found[numbers], lengths[numbers.start]
         if rows < 2:
             continue
-        of_each = replace(setup, origin=np.array([energy_origin(one.scene) for one in some]))
+        setup = Setup.of_starts([one.scene for one in some])
         states, lag = np.stack([one.motion.states for one in some]), np.array([one.motion.velocity_lag for one in some])
         dt, last_row = np.full(len(some), some[0].motion.t[1] - some[0].motion.t[0]), np.full(len(some), rows - 1)
-        together, valid = motions_side_by_side(of_each, states, dt, lag, last_row, np.inf)
+        together, valid = motions_side_by_side(setup, states, dt, lag, last_row, np.inf)
         if valid.all():
             for number, one in enumerate(some):
                 vars(one).update({name: getattr(together.states, name)[number] for name in AT_ONCE})

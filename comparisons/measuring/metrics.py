@@ -1,6 +1,7 @@
 """The metrics: functions from a comparison to one value, or to values for each flight. Docstrings are the definitions."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -21,9 +22,10 @@ AnyMeasure = TypeVar("AnyMeasure", bound=Measure)
 METRICS: dict[str, Metric] = {}
 
 
-def metrics_for(scene: Scenario, truth: Truth | None) -> list[Metric]:
+@lru_cache(maxsize=128)  # every engine at every time step of a scene needs them
+def metrics_for(scene: Scenario, truth: Truth | None) -> tuple[Metric, ...]:
     """The metrics that apply to a scene with its exact solution."""
-    return [metric for metric in METRICS.values() if metric.applies(scene, truth)]
+    return tuple(metric for metric in METRICS.values() if metric.applies(scene, truth))
 
 
 def _metric(

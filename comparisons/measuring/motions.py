@@ -4,8 +4,8 @@ The same definitions apply to one motion and to many at once. A quantity of a mo
 a quantity at each state has shape (..., n).
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from dropspin.comparisons.measuring.contact_runs import RESOLVED, STEADY, ContactRuns, contact_runs
 from dropspin.comparisons.measuring.states import Array, Mask, StateQuantities, States
 from dropspin.scenarios import Scenario, Trajectory
+from dropspin.scenarios.ensemble import clearances
 from dropspin.scenarios.mechanics import energy_origin, scalar_product
-from dropspin.scenarios.model import TOUCHING
+from dropspin.scenarios.model import TOUCHING, initial_states
 
 RowNumbers = NDArray[np.intp]
 
@@ -66,13 +67,17 @@ class Setup:
             floor=scene.floor is not None,
         )
 
+    @classmethod
+    def of_starts(cls, scenes: Sequence[Scenario]) -> "Setup":
+        """The setups of scenes that differ in their starts alone."""
+        body, starts = scenes[0].body, initial_states(scenes)
+        shared = cls.of(scenes[0])._with_arrays(lambda values: values[np.newaxis])
+        origin, clearance = np.array([energy_origin(scene) for scene in scenes]), clearances(starts, body.vertices, body.rounding)
+        return replace(shared, origin=origin, clearance=clearance)
+
     def __getitem__(self, motions: RowNumbers | Mask) -> "Setup":
         """The setups of a selection of the motions."""
         return self._with_arrays(lambda values: values if len(values) == 1 else values[motions])
-
-    def as_batch(self) -> "Setup":
-        """The setup of one motion as a batch with one motion."""
-        return self._with_arrays(lambda values: values[np.newaxis])
 
     def _with_arrays(self, change: Callable[[Array], Array]) -> "Setup":
         changed: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}

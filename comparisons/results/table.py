@@ -117,7 +117,8 @@ def schema_of(names: Iterable[str], numbers: Iterable[str] = ()) -> pa.Schema:
 
 def as_table(measurements: Sequence[Measurement]) -> pd.DataFrame:
     """Measurements as a table, one row each, with the columns and types of `COLUMNS`."""
-    return pd.DataFrame([vars(one) for one in measurements], columns=list(COLUMNS)).astype(COLUMNS)
+    columns = {name: [getattr(one, name) for one in measurements] for name in COLUMNS}
+    return pd.DataFrame({name: pd.Series(values, dtype=COLUMNS[name]) for name, values in columns.items()})
 
 
 def empty_table() -> pd.DataFrame:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.judging.verdicts import Judgement
-from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.batch import compute_states
+from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.measuring.tolerances import OF_TWO_DRAWS, tolerance
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, SAMPLES, EnsembleOutcome
 from dropspin.comparisons.running.recording import record_batch
-from dropspin.scenarios import Scenario, members
+from dropspin.scenarios import Scenario, Trajectory, members
 from dropspin.scenarios.mechanics import angular_momentum
 
 Array = NDArray[np.float64]
@@ -34,22 +35,22 @@ def run_ensemble(engine: Engine, scene: Scenario, dt: float, most: int | None = 
     steps = scene.steps(dt)
     rows = np.round(np.linspace(0.0, steps, SAMPLES)).astype(int)
     energies, momenta, rebounds, rest_times = [], [], [], []
-    starts = members(scene)[:most]
+    t, starts = dt * np.arange(steps + 1, dtype=float), members(scene)[:most]
     for first in range(0, len(starts), BATCH_SIZE):
         batch = starts[first : first + BATCH_SIZE]
-        for member, recording in zip(batch, record_batch(engine, batch, dt), strict=True):
-            motion = recording.motion
+        recorded = [recording.motion for recording in record_batch(engine, batch, dt)]
+        for motion in recorded:
             if motion.first_bad_row is not None:
-                raise Diverged(f"a start of the ensemble is not finite at t = {motion.t[motion.first_bad_row]:g} s")
-            case = Comparison(member, motion)
-            scale = _energy_scale(case)
-            energies.append(case.energy[rows] / scale)
-            lengths = np.linalg.norm(angular_momentum(member, motion[rows]), axis=1)
-            momenta.append(lengths / (scene.body.size * np.sqrt(2.0 * scale * scene.body.mass)))
-            rebounds.append(case.motions.rebound)
-            rest_times.append(motion.t[case.motions.last_row_in_motion])
-    t = (dt * np.arange(steps + 1, dtype=float))[rows]
-    return EnsembleOutcome(t, np.array(energies), np.array(rebounds), np.array(rest_times), np.array(momenta))
+                raise Diverged(f"a start of the ensemble is not finite at t = {t[motion.first_bad_row]:g} s")
+        for _, states, motions in compute_states(list(map(States, batch, recorded))):
+            scale = np.where(motions.energy_scale == 0.0, 1.0, motions.energy_scale)  # where nothing moves and nothing pulls
+            shown = states[:, rows].reshape(-1, 13)
+            momentum = angular_momentum(scene, Trajectory.from_states(np.zeros(len(shown)), shown)).reshape(len(states), -1, 3)
+            energies.append(motions.energy[:, rows] / scale[:, np.newaxis])
+            momenta.append(np.linalg.norm(momentum, axis=-1) / (scene.body.size * np.sqrt(2.0 * scale * scene.body.mass))[:, np.newaxis])
+            rebounds.append(motions.rebound)
+            rest_times.append(t[motions.last_row_in_motion])
+    return EnsembleOutcome(t[rows], *map(np.concatenate, (energies, rebounds, rest_times, momenta)))
 
 
 def judge_means(scene: Scenario, dt: float, outcome: EnsembleOutcome) -> Iterator[tuple[str, Judgement]]:
@@ -77,11 +78,3 @@ def _mean(values: Array) -> tuple[float, float]:
 
     error = float(np.std(values, ddof=1)) / len(values) ** 0.5
     return float(np.mean(values)), float(stdtrit(len(values) - 1, 0.5 + 0.5 * CONFIDENCE)) * error
-
-
-def _energy_scale(case: Comparison) -> float:
-    """The scene's energy [J]; 1 where nothing moves and nothing pulls, as there is no energy to measure then."""
-    try:
-        return case.energy_scale
-    except Unresolved:
-        return 1.0

@@ -173,7 +173,7 @@ def _set_recorded(outcomes: Outcomes, job: _Built, recording: Recording | Breakd
     if (diverged := divergence(motion)) is not None:
         outcomes.set_breakdown(index, diverged)
         return
-    setup, states, lag = Setup.of(job.scene).as_batch(), motion.states[np.newaxis], np.array([motion.velocity_lag])
+    setup, states, lag = Setup.of_starts([job.scene]), motion.states[np.newaxis], np.array([motion.velocity_lag])
     motions, _ = motions_side_by_side(setup, states, np.array([job.dt]), lag, np.array([steps]), UNIT_TOLERANCE)
     outcomes.set_measured(np.array([index]), states, motions)
     outcomes.reason[index] = "; ".join(limitation.message for limitation in recording.limitations if not limitation.is_minor)

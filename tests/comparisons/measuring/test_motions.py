@@ -28,7 +28,7 @@ def one(scene, states, lag=0.0):
 def in_a_batch(scene, states, lag=0.0):
     """The same motion beside another one, longer than it, so that its rows are padded; of the results, those of this motion."""
     longer = np.concatenate([states, np.tile([0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 1.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0], (5, 1))])
-    setup = Setup.of(scene).as_batch()
+    setup = Setup.of_starts([scene])
     last = np.array([len(longer) - 1, len(states) - 1])
     both, valid = motions_side_by_side(setup, np.array([longer[::-1], longer]), np.full(2, DT), np.full(2, lag), last, 1e-5)
     assert valid.all()
@@ -209,5 +209,5 @@ def test_states_that_are_not_valid_are_reported(fault, column):
     states = np.array([bouncing(20)] * 3)
     states[0, 10, column] = states[1, 20, column] = fault
     last = np.array([20, 19, 20])
-    _, valid = motions_side_by_side(Setup.of(load(BALL)).as_batch(), states, np.full(3, DT), np.zeros(3), last, 1e-5)
+    _, valid = motions_side_by_side(Setup.of_starts([load(BALL)]), states, np.full(3, DT), np.zeros(3), last, 1e-5)
     np.testing.assert_array_equal(valid, [fault == 2.0 and column != 5, True, True])

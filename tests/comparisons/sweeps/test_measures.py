@@ -45,7 +45,7 @@ def test_standard_metrics_are_those_of_a_run(name):
         with warnings.catch_warnings(action="ignore"):
             motion = ds.simulate(scene, label, DT)
         dt, lag, last = (np.array([value]) for value in (DT, motion.velocity_lag, len(motion) - 1))
-        motions, valid = motions_side_by_side(Setup.of(scene).as_batch(), motion.states[np.newaxis], dt, lag, last, UNIT_TOLERANCE)
+        motions, valid = motions_side_by_side(Setup.of_starts([scene]), motion.states[np.newaxis], dt, lag, last, UNIT_TOLERANCE)
         assert valid.all()
         np.testing.assert_array_equal(standard_metrics(motions)[0], metrics_of_a_run(scene, motion))
 

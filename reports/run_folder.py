@@ -87,7 +87,7 @@ class MeasuredScenes:
         """Write the results of a scene, completely or not at all."""
         [scene] = part.scenes
         with run_folder(self._path / f"{len(self):03d}-{part.scenes[scene].digest}") as folder:
-            save(part, folder)
+            save(part, folder, compress=False)  # a run that succeeds writes all of them again
 
     def __len__(self) -> int:
         return len(list(self._path.glob(PARTS)))

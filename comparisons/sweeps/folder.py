@@ -8,6 +8,7 @@ import json
 import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any
 
 import fsspec
@@ -138,7 +139,7 @@ class SweepFolder:
     def _put(self, name: str, content: bytes) -> None:
         path, remedy = f"{self._root}/{name}", "the parts written so far are complete: --resume continues the sweep"
         if isinstance(self._files, LocalFileSystem):
-            with written_whole(path, remedy) as unfinished:
+            with written_whole(path, remedy, Path(self._root)) as unfinished:
                 unfinished.write_bytes(content)
             return
         try:

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from dropspin.scenarios.drawing import uniform
 from dropspin.scenarios.model import Ensemble, Scenario, unit
 from dropspin.scenarios.rotations import about, multiply, rotate
-from dropspin.scenarios.state import ORIENTATION, RATES
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import ORIENTATION, RATES, Array
 
 GRID_SIZE = 4001  # angles at which the distribution is tabulated
 SERIES_BELOW = 0.1  # rad; below it θ - sin θ is computed by its series

@@ -9,12 +9,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios.rotations import about, multiply, rotate
-from dropspin.scenarios.state import UP
+from dropspin.scenarios.state import UP, Array
 
-Array = NDArray[np.float64]
 Table = dict[str, Any]
 Drawn = tuple[Table, int | None]
 
@@ -236,7 +234,7 @@ def _height(body: Table, attitude: Array) -> float:
     """Height at which a body of this orientation touches the floor [m]."""
     from pydantic import TypeAdapter
 
-    from dropspin.scenarios.body import Body
+    from dropspin.scenarios.bodies import Body
 
     made: Any = TypeAdapter(Body).validate_python(body)
     return made.rounding - float(rotate(attitude, made.vertices)[:, 1].min())

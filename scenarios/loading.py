@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
 from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
@@ -24,7 +23,6 @@ CATALOGUE = Path(__file__).parent / "catalogue"
 DRAWN = r"draw-([0-9]{1,20})-([0-9]{1,4})"
 """The name of a random scene of `draw`, with its seed and its number."""
 MAX_FILE_SIZE = 1_000_000  # bytes; a scene of ten thousand vertices is smaller
-INERTIA_ROUNDING = 1.001  # moments are often given with four digits
 ALONG_FLOOR = 1e-6  # of gravity, across a floor to which it is parallel
 DEEPEST = 30
 """Largest depth of nested tables and lists in a file; a baseline has six."""
@@ -91,26 +89,13 @@ def _plausible(scene: Scenario, where: str) -> Scenario:
         SceneError: A body that strikes a floor has moments of inertia that no body of its size has.
     """
     body, g = scene.body, scene.acceleration
-    if not isinstance(body.inertia, str):
-        spread = (0.5 * sum(body.inertia) - np.array(body.inertia)) / body.mass  # mean squares of x, y and z
-        largest = body.largest_spread
-        if np.any(spread > INERTIA_ROUNDING * largest) or spread.sum() > INERTIA_ROUNDING * body.size**2:
-            moments = body.mass * np.minimum(largest.sum() - largest, body.size**2)
-            message = (
-                f"{where}: body.inertia: got {list(body.inertia)} kg m², which needs mass outside of the body: a root mean square of "
-                f"x, y and z of {_digits(np.sqrt(spread))} m, of which this shape allows {_digits(np.sqrt(largest))} m, and moments of "
-                f"inertia of up to {_digits(moments)} kg m² for {body.mass:g} kg. Correct the inertia, the mass or the size."
-            )
-            if scene.floor is not None:
-                raise SceneError(message)
-            warnings.warn(f"{message} Without a floor, the size has no effect.", SceneWarning, stacklevel=3)
-    if body.shape == "vertices" and not {"inertia", "masses"} & body.model_fields_set:
-        warnings.warn(
-            f"{where}: body: without inertia and masses, the mass is at the {len(body.points)} points; a solid body has other moments of "
-            "inertia. Give inertia = [Ixx, Iyy, Izz], or inertia = 'vertices' if this is meant.",
-            SceneWarning,
-            stacklevel=3,
-        )
+    if body.excess_inertia:
+        message = f"{where}: body.inertia: {body.excess_inertia}"
+        if scene.floor is not None:
+            raise SceneError(message)
+        warnings.warn(f"{message} Without a floor, the size has no effect.", SceneWarning, stacklevel=3)
+    if body.ambiguity:
+        warnings.warn(f"{where}: body: {body.ambiguity}", SceneWarning, stacklevel=3)
     if scene.floor is not None and g.any() and abs(g[1]) <= ALONG_FLOOR * np.linalg.norm(g):
         warnings.warn(
             f"{where}: gravity.acceleration: got {g.tolist()}, along the floor, so that the body does not fall onto it; "
@@ -119,10 +104,6 @@ def _plausible(scene: Scenario, where: str) -> Scenario:
             stacklevel=3,
         )
     return scene
-
-
-def _digits(values: NDArray[np.float64]) -> str:
-    return f"[{', '.join(f'{value:.3g}' for value in values)}]"
 
 
 def _find(scene: str | Path) -> Path:

@@ -1,4 +1,4 @@
-"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory; the principal axes of its inertia.
+"""Energy, angular momentum, apex and lowest point of a scene's body along a trajectory.
 
 Functions of a scene and a motion call the functions whose names end in `_of`. The latter contain the formulas, for the components of one
 state or of arrays of states. They use plain arithmetic only, so that they can be compiled for many bodies with bit-identical results.
@@ -7,12 +7,11 @@ state or of arrays of states. They use plain arithmetic only, so that they can b
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 Components = tuple[Any, ...]
 """The components of a vector or quaternion, each a number or an array. A tensor is a tuple of its rows."""
 
@@ -121,16 +120,3 @@ def _components(array: Array) -> Components:
 
 def _tensor(scene: Scenario) -> Components:
     return tuple(map(tuple, scene.body.inertia_tensor.tolist()))
-
-
-def is_diagonal(tensor: Array) -> bool:
-    """Whether the body axes are exactly principal axes."""
-    return np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0
-
-
-def principal_axes(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments and axes (columns, right-handed): the body axes of a diagonal tensor, else by ascending moment."""
-    if is_diagonal(inertia):
-        return np.diag(inertia).copy(), np.eye(3)
-    moments, axes = np.linalg.eigh(inertia)
-    return moments, axes * np.linalg.det(axes)

@@ -8,9 +8,10 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from dropspin.scenarios.body import Array, Body, NotNegative, Number, Positive, Table, Vector
+from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector
 from dropspin.scenarios.text import Prose, Text, joined, verify_line
 
 TOUCHING = 1e-9
@@ -212,9 +213,20 @@ class Scenario(Table):
         return self.floor is not None and self.clearance > TOUCHING * self.body.size
 
     @property
+    def starts_on_floor(self) -> bool:
+        """Whether the body touches the plane y = 0 at the start."""
+        return abs(self.clearance) <= TOUCHING * self.body.size
+
+    @property
     def acceleration(self) -> Array:
         """Gravity [m/s²], shape (3,); zero where the scene has none."""
         return np.zeros(3) if self.gravity is None else np.array(self.gravity.acceleration)
+
+    @property
+    def falls_straight_down(self) -> bool:
+        """Whether gravity acts along -y."""
+        x, y, z = self.acceleration.tolist()
+        return y < 0.0 and x == z == 0.0
 
     @property
     def digest(self) -> str:

@@ -25,12 +25,14 @@ class Problem(NamedTuple):
         scene: The name of its scene in the catalogue.
         version: The version of its definition, from 1.
         digest: `Scenario.digest` of the definition.
+        truth: The name of its exact solution, for lists; `truth_for` computes the impacts too, which takes half a second.
     """
 
     number: str
     scene: str
     version: int
     digest: str
+    truth: str
 
     @property
     def identifier(self) -> str:

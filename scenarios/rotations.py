@@ -1,9 +1,8 @@
 """Rotations by quaternions [x, y, z, w], body to world, for arrays with any leading axes."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 
 def cross(a: Array, b: Array) -> Array:

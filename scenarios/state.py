@@ -4,6 +4,9 @@
 """
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 POSITION = slice(0, 3)
 ORIENTATION = slice(3, 7)

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 def _shown(values: Array) -> str:

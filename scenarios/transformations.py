@@ -5,16 +5,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.scenarios.body import Vertices
+from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.loading import from_mapping
-from dropspin.scenarios.mechanics import is_diagonal
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import conjugate, multiply, rotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 
 AWAY = np.array([0.8, 0.0, 0.6])
 """A horizontal direction that is no axis."""
@@ -36,15 +32,15 @@ def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: floa
     """The scene in other units; the arguments are a metre, a second and a kilogram in these units."""
     start, speed = scene.start, length / time
     tables: dict[str, Mapping[str, Any]] = {
-        "body": body_times(scene, length, mass),
+        "body": scene.body.scaled(length, mass),
         "start": {
-            "position": _times(length, start.position),
-            "velocity": _times(speed, start.velocity),
-            "angular_velocity": _times(1.0 / time, start.angular_velocity),
+            "position": times(length, start.position),
+            "velocity": times(speed, start.velocity),
+            "angular_velocity": times(1.0 / time, start.angular_velocity),
         },
     }
     if scene.gravity is not None:
-        tables["gravity"] = {"acceleration": _times(length / time**2, scene.gravity.acceleration)}
+        tables["gravity"] = {"acceleration": times(length / time**2, scene.gravity.acceleration)}
     if scene.floor is not None:
         tables["floor"] = {"rest_speed": speed * scene.floor.rest_speed}
     if scene.damping is not None:
@@ -54,9 +50,9 @@ def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: floa
 
 def with_other_numbers(scene: Scenario, share: float) -> Scenario:
     """A scene of the same structure: a smaller body, and the other numbers of all tables but the start multiplied by a factor above 1."""
-    tables: dict[str, Mapping[str, Any]] = {"body": body_times(scene, 1.0 / share, share)}
+    tables: dict[str, Mapping[str, Any]] = {"body": scene.body.scaled(1.0 / share, share)}
     if scene.gravity is not None:
-        tables["gravity"] = {"acceleration": _times(share, scene.gravity.acceleration)}
+        tables["gravity"] = {"acceleration": times(share, scene.gravity.acceleration)}
     if scene.floor is not None:
         friction = scene.floor.friction
         tables["floor"] = {
@@ -76,25 +72,6 @@ def units_of_states(length: float = 1.0, time: float = 1.0) -> Array:
     return units
 
 
-def body_times(scene: Scenario, length: float, mass: float) -> dict[str, Any]:
-    """Keys of the body table, with lengths and masses multiplied by factors."""
-    given = scene.body.model_dump(exclude_none=True)
-    keys: dict[str, Any] = {"mass": mass * given["mass"]}
-    for name in {"radius", "half_extents", "points"} & given.keys():
-        keys[name] = _times(length, given[name])
-    if "masses" in given:
-        keys["masses"] = _times(mass, given["masses"])
-    if given["inertia"] == "note" and is_diagonal(scene.body.inertia_tensor):  # it has unit masses for a body of any mass
-        given["inertia"] = tuple(float(moment) for moment in np.diag(scene.body.inertia_tensor))
-    if not isinstance(given["inertia"], str):
-        keys["inertia"] = _times(mass * length**2, given["inertia"])
-    return keys
-
-
-def _times(factor: float, values: Any) -> Any:
-    return tuple(_times(factor, value) for value in values) if isinstance(values, tuple) else factor * values
-
-
 def turned_states(states: Array, rotation: Array) -> Array:
     """States, shape (..., 13), turned by a rotation, a unit quaternion."""
     parts = [rotate(rotation, states[..., part]) for part in (POSITION, VELOCITY, SPIN)]
@@ -111,26 +88,18 @@ def turned(scene: Scenario, rotation: Array) -> Scenario:
 
 def mirrored(scene: Scenario) -> Scenario:
     """The scene, body and gravity included, mirrored at the plane x = 0."""
-    tables: dict[str, Mapping[str, Any]] = {}
+    tables: dict[str, Mapping[str, Any]] = {"body": scene.body.mirrored()}
     if scene.gravity is not None:
         x, y, z = scene.gravity.acceleration
         tables["gravity"] = {"acceleration": (-x, y, z)}
-    if isinstance(scene.body, Vertices):
-        tables["body"] = {"points": tuple((-x, y, z) for x, y, z in scene.body.points)}
     return changed(scene.starting_at(REFLECTED * scene.initial_state), scene.duration, **tables)
 
 
 def with_next_axes(scene: Scenario) -> Scenario:
     """The same motion with other names of the body's axes: its x axis becomes y, y becomes z, and z becomes x."""
-    given, tables = scene.body.model_dump(exclude_none=True), {}
-    for name in ("half_extents", "inertia"):
-        if isinstance(given.get(name), tuple):
-            tables[name] = (given[name][2], *given[name][:2])
-    if "points" in given:
-        tables["points"] = tuple((z, x, y) for x, y, z in given["points"])
     state = scene.initial_state
     state[ORIENTATION] = multiply(state[ORIENTATION], conjugate(NEXT_AXES))
-    return changed(scene.starting_at(state), body=tables)
+    return changed(scene.starting_at(state), body=scene.body.with_axes((2, 0, 1)))
 
 
 def with_previous_axes(states: Array) -> Array:

@@ -7,8 +7,8 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from dropspin.scenarios.body import LARGEST
 from dropspin.scenarios.errors import DropspinError, did_you_mean, nearest
+from dropspin.scenarios.tables import LARGEST
 
 Kind = TypeVar("Kind", bound=BaseModel)
 Problem = Mapping[str, Any]

@@ -20,7 +20,6 @@ from dropspin.comparisons.faults.fault_model import Exact, FaultModel
 from dropspin.comparisons.faults.flight import FLIGHT
 from dropspin.comparisons.faults.impact import IMPACT
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Sphere
 
 Array = NDArray[np.float64]
 
@@ -55,7 +54,7 @@ def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Arra
 
 
 def _has_pairs(probe: Probe) -> bool:
-    return probe.scene.floor is None or isinstance(probe.scene.body, Sphere)
+    return probe.scene.floor is None or probe.scene.body.is_ball
 
 
 def _best(candidates: Iterable[FaultModel], probes: Iterable[Probe], motion_of: Callable[[Probe], Array | None]) -> FaultModel | None:

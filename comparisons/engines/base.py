@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from dropspin.comparisons.engines.npm_packages import is_npm, npm_version
 from dropspin.comparisons.measuring.symmetries import REPRESENTED
 from dropspin.scenarios import Scenario, Truth
-from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.errors import DropspinError, UnknownName
-from dropspin.scenarios.mechanics import is_diagonal
 from dropspin.scenarios.validation import shown
 
 Array = NDArray[np.float64]
@@ -210,7 +209,7 @@ def refusal_of_hull(scene: Scenario, name: str) -> str | None:
     """Why a scene's body is not represented by its corners, which an engine calls `name`; None if it can be."""
     if scene.floor is None:
         return f"there is no shape without a floor, and no {name}"
-    return f"a {name} would only approximate a ball" if isinstance(scene.body, Sphere) else None
+    return f"a {name} would only approximate a ball" if scene.body.is_ball else None
 
 
 def refusal_of_axes(scene: Scenario, does: str) -> str | None:

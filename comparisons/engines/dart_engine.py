@@ -7,10 +7,10 @@ import numpy as np
 
 from dropspin.comparisons.engines import base
 from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE, AsBuilt, Diverged, Engine, KnownLimitation, Simulation, version
-from dropspin.scenarios.body import Array, Box
+from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.rotations import cross, rotate
-from dropspin.scenarios.state import ORIENTATION, SPIN
+from dropspin.scenarios.state import ORIENTATION, SPIN, Array
 from dropspin.scenarios.transformations import heavy_neighbour
 
 REASONS = {

@@ -14,9 +14,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from dropspin.comparisons.engines import base
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
-from dropspin.scenarios.body import Array
 from dropspin.scenarios.model import Floor, Scenario
-from dropspin.scenarios.state import ORIENTATION
+from dropspin.scenarios.state import ORIENTATION, Array
 from dropspin.scenarios.transformations import heavy_neighbour
 
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies

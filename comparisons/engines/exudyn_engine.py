@@ -8,8 +8,8 @@ from exudyn import utilities as items
 from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
-from dropspin.scenarios.body import Array
 from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.state import Array
 
 INTEGRATORS = {
     "generalized-alpha": ("GeneralizedAlpha", 2.0),

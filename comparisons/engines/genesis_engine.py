@@ -25,7 +25,7 @@ from dropspin.comparisons.engines.base import (
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
 from dropspin.comparisons.engines.one_world import OneWorld
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.model import initial_states
 
 INTEGRATORS = {"approximate_implicitfast": "approximate_implicitfast", "euler": "Euler"}

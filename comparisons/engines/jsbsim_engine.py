@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
-from dropspin.scenarios.body import Array
 from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.state import Array
 
 EULER, TRAPEZOIDAL, AB2, AB3, _, _, BUSS2, LOCAL, AB5 = range(1, 10)
 INTEGRATORS = {

@@ -36,7 +36,7 @@ from dropspin.comparisons.engines.mujoco_versions import (
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.body import Box, Sphere, Vertices
+from dropspin.scenarios.bodies import Box, Sphere, Vertices
 from dropspin.scenarios.model import differ_in_start_alone
 
 VERSION = numbers_of(mujoco.__version__)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Box, Sphere, Vertices
-from dropspin.scenarios.mechanics import is_diagonal, principal_axes
+from dropspin.scenarios.bodies import Box, Sphere, Vertices
+from dropspin.scenarios.bodies.inertia import is_diagonal, principal_axes
 from dropspin.scenarios.transformations import heavy_neighbour
 
 Array = NDArray[np.float64]

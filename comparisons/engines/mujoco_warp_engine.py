@@ -16,7 +16,7 @@ from dropspin.comparisons.engines.mujoco_ports import Port, built, ported_model
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
 from dropspin.comparisons.engines.one_world import OneWorld
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Vertices
+from dropspin.scenarios.bodies import Vertices
 from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles

@@ -24,7 +24,7 @@ from dropspin.comparisons.engines.base import (
 from dropspin.comparisons.engines.newton_rounding import rounding_met
 from dropspin.comparisons.engines.one_world import OneWorld
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Box, Sphere
+from dropspin.scenarios.bodies import Box, Sphere
 from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 wp.config.log_level = wp.LOG_ERROR  # before the import that starts Warp, which prints devices and each module that it compiles

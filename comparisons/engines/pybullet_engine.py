@@ -31,7 +31,7 @@ from dropspin.comparisons.engines.pybullet_settings import (
 from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, Form, PyBulletSimulation
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.body import Box, Vertices
+from dropspin.scenarios.bodies import Box, Vertices
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
 FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision, and the body stops

@@ -22,7 +22,7 @@ from dropspin.comparisons.engines.pybullet_settings import (
     world_parameters,
 )
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.body import Box, Sphere, Vertices
+from dropspin.scenarios.bodies import Box, Sphere, Vertices
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
 from dropspin.scenarios.state import SPIN, VELOCITY
 from dropspin.scenarios.transformations import heavy_neighbour

@@ -19,8 +19,8 @@ from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, 
 from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
 from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Sphere
-from dropspin.scenarios.mechanics import principal_axes
+from dropspin.scenarios.bodies import Sphere
+from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.state import PARTS
 from dropspin.scenarios.transformations import heavy_neighbour
 

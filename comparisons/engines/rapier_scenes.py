@@ -4,7 +4,6 @@ import numpy as np
 
 from dropspin.comparisons.engines import base
 from dropspin.scenarios import Scenario, truth_for
-from dropspin.scenarios.body import Sphere
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION
 
@@ -22,7 +21,7 @@ def refusal(scene: Scenario, kind: str) -> str | None:
         return unfit
     if floor.restitution == 0.0:
         return None
-    if floor.friction != "none" and not (isinstance(body, Sphere) and floor.friction == "infinite"):
+    if floor.friction != "none" and not (body.is_ball and floor.friction == "infinite"):
         return "Rapier's friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
     truth = truth_for(scene)
     heights = [rotate(hit.before[ORIENTATION], body.vertices)[:, 1] for hit in truth.events] if truth else []

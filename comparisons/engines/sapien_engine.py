@@ -19,9 +19,10 @@ from dropspin.comparisons.engines.base import (
     may_tumble,
     version,
 )
-from dropspin.scenarios.body import Array, Body, Sphere
-from dropspin.scenarios.mechanics import principal_axes
+from dropspin.scenarios.bodies import Body, Sphere
+from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.state import Array
 
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message="Failed to find system libvulkan")  # of the renderer, which is not used

@@ -11,7 +11,7 @@ from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, E
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.body import Body, Box, Sphere, Vertices
+from dropspin.scenarios.bodies import Body, Box, Sphere, Vertices
 from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 

@@ -119,8 +119,3 @@ def changed_part(part: slice, change: Change) -> Reported:
 def axis_names(order: tuple[int, ...]) -> str:
     """Axes in an order, as text."""
     return ", ".join("xyz"[axis] for axis in order)
-
-
-def moments_of_inertia(scene: Scenario) -> tuple[float, ...]:
-    """Moments of inertia about the body's own axes, without products of inertia."""
-    return tuple(np.diag(scene.body.inertia_tensor).tolist())

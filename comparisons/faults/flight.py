@@ -6,7 +6,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, axis_names, changed_table, faults_of, moments_of_inertia
+from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, axis_names, changed_table, faults_of
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import Gravity
 
@@ -47,7 +47,7 @@ def _scaled_inertia(by: Callable[[float], float]) -> Simulated:
     """Moments of inertia times a function of the mass."""
 
     def scaled(scene: Scenario) -> Scenario:
-        return changed_table("body", inertia=tuple(by(scene.body.mass) * moment for moment in moments_of_inertia(scene)))(scene)
+        return changed_table("body", inertia=tuple(by(scene.body.mass) * moment for moment in scene.body.moments))(scene)
 
     return scaled
 

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dropspin.comparisons.faults.fault_model import Simulated, axis_names, changed_table, faults_of, moments_of_inertia
+from dropspin.comparisons.faults.fault_model import Simulated, axis_names, changed_table, faults_of
 from dropspin.comparisons.faults.flight import ORDERS
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Box
+from dropspin.scenarios.bodies import Box
 
 SLOW = 0.2  # m/s; Bullet drops restitution below it
 
@@ -26,7 +26,7 @@ def _permuted_extents(order: tuple[int, ...]) -> Simulated:
         if not isinstance(scene.body, Box):
             return scene
         extents = [scene.body.half_extents[axis] for axis in order]
-        return changed_table("body", half_extents=extents, inertia=moments_of_inertia(scene))(scene)
+        return changed_table("body", half_extents=extents, inertia=scene.body.moments)(scene)
 
     return permuted
 
@@ -38,7 +38,7 @@ def _scaled(size: str, by: float) -> Simulated:
         if scene.floor is None or size not in type(scene.body).model_fields:
             return scene
         larger = {size: lambda given: np.multiply(given, by).tolist()}
-        return changed_table("body", inertia=moments_of_inertia(scene), **larger)(scene)
+        return changed_table("body", inertia=scene.body.moments, **larger)(scene)
 
     return scaled
 

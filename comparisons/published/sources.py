@@ -10,9 +10,9 @@ from typing import Any
 from pydantic import Field
 
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Table
 from dropspin.scenarios.errors import UnknownName
 from dropspin.scenarios.loading import from_mapping, read_toml
+from dropspin.scenarios.tables import Table
 
 DATA = Path(__file__).parent / "data"
 

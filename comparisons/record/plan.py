@@ -10,8 +10,8 @@ from dropspin.comparisons.engines.mujoco_versions import numbers_of
 from dropspin.comparisons.engines.npm_packages import is_npm
 from dropspin.comparisons.results.folder import sha256
 from dropspin.scenarios import load
-from dropspin.scenarios.body import Table
 from dropspin.scenarios.loading import read_toml
+from dropspin.scenarios.tables import Table
 
 FILE = Path(__file__).with_name("plan.toml")
 NUMPY_1 = ["numpy<2", "pandas<3"]

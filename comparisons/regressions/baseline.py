@@ -27,9 +27,9 @@ from dropspin.comparisons.results.provenance import digest, versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
-from dropspin.scenarios.body import Table
 from dropspin.scenarios.loading import read_toml
 from dropspin.scenarios.model import current_label
+from dropspin.scenarios.tables import Table
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import shown, validated
 

@@ -21,8 +21,7 @@ from dropspin.comparisons.robustness.axis_values import (
 )
 from dropspin.comparisons.robustness.operating_point import OperatingPoint, falls, spin
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Sphere
-from dropspin.scenarios.mechanics import is_diagonal
+from dropspin.scenarios.bodies.inertia import is_diagonal
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Axis:
 
 
 def _has_principal_axes(scene: Scenario) -> bool:
-    return may_tumble(scene) and not isinstance(scene.body, Sphere) and is_diagonal(scene.body.inertia_tensor)
+    return may_tumble(scene) and not scene.body.is_ball and is_diagonal(scene.body.inertia_tensor)
 
 
 def _inertia_ratio(nominal: OperatingPoint) -> float:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.scenarios import Scenario, Trajectory, Truth
-from dropspin.scenarios.body import Sphere
 from dropspin.scenarios.mechanics import lowest_height, offset_of
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
@@ -102,7 +101,7 @@ def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
 
 def _may_gain(scene: Scenario) -> bool:
     floor = scene.floor
-    return floor is not None and floor.friction != "none" and floor.restitution > 0.0 and not isinstance(scene.body, Sphere)
+    return floor is not None and floor.friction != "none" and floor.restitution > 0.0 and not scene.body.is_ball
 
 
 def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.robustness.operating_point import OperatingPoint, fall_time, spin
-from dropspin.scenarios.transformations import body_times, changed, in_units, units_of_states
+from dropspin.scenarios.transformations import changed, in_units, units_of_states
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ def with_size(nominal: OperatingPoint, size: float) -> OperatingPoint:
     factor = size / scene.body.size
     x, y, z = scene.start.position
     content = {"position": (x, y - scene.clearance + factor * (scene.clearance + scene.body.size), z)}
-    smaller = changed(scene, body=body_times(scene, factor, 1.0), start=content)
+    smaller = changed(scene, body=scene.body.scaled(factor, 1.0), start=content)
     x, y, z = smaller.start.position
     return OperatingPoint(changed(smaller, start={"position": (x, y + scene.clearance - smaller.clearance, z)}), nominal.dt)
 

@@ -24,7 +24,7 @@ from dropspin.comparisons.sweeps.axes import Path, path_of, set_field, with_fiel
 from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
 from dropspin.comparisons.sweeps.outcomes import Outcomes, requested_metrics
 from dropspin.scenarios import Scenario, SceneError, Trajectory
-from dropspin.scenarios.body import Body
+from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.ensemble import clearances, spread_starts
 from dropspin.scenarios.model import TOUCHING, unit
 from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP

@@ -14,9 +14,9 @@ from dropspin.comparisons.sweeps.axes import Drawn, Listed, NoSuchField, Spaced,
 from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
-from dropspin.scenarios.body import Number, Positive, Table
 from dropspin.scenarios.errors import UnknownName
 from dropspin.scenarios.loading import TOO_LARGE, read_toml
+from dropspin.scenarios.tables import Number, Positive, Table
 from dropspin.scenarios.validation import shown, validated
 
 MOST_JOBS = 10**15

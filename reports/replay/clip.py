@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.results.folder import written_whole
-from dropspin.reports.replay.bodies import Outline, outline
 from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios import DropspinError
+from dropspin.scenarios.bodies.hull import Outline
 from dropspin.scenarios.rotations import rotate
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
     times = _frame_times(replay, speed)
     figure = Figure(figsize=(6.4, 4.8), dpi=100)
     axes = _add_axes(figure, replay)
-    shape = outline(replay.scene.body)
+    shape = replay.scene.body.outline
     title = figure.suptitle("")
     writer = PillowWriter(fps=FRAME_RATE)
     with written_whole(file) as unfinished:
@@ -109,7 +109,7 @@ def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: 
     position, orientation = motion.pose(time)
     if not replay.in_sight(position[None])[0]:
         return []
-    own = _faces(shape)
+    own = shape.polygons(MERIDIANS)
     faces = [_y_up(position + rotate(orientation, face)) for face in own]
     style: dict[str, Any] = {"facecolor": "none", "edgecolor": motion.colour or EXACT_COLOUR, "linestyle": "-" if motion.colour else "--"}
     if motion is replay.motions[0] and motion.colour:
@@ -121,18 +121,6 @@ def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: 
     trail = _y_up(np.vstack([motion.frames.position[motion.frames.t <= time], position]))
     [line] = axes.plot(*trail.T, color=motion.colour or EXACT_COLOUR, linewidth=0.8, alpha=0.6)
     return [axes.add_collection3d(Poly3DCollection(faces, linewidth=0.7, **style)), line]
-
-
-def _faces(shape: Outline) -> list[Array]:
-    """Polygons of a surface, in the body's frame [m]."""
-    if not shape.radius:
-        return [shape.vertices[list(face)] for face in shape.faces]
-    around, down = np.linspace(0.0, 2.0 * np.pi, MERIDIANS + 1), np.linspace(0.0, np.pi, MERIDIANS // 2 + 1)
-    grid = shape.radius * np.stack(
-        [np.outer(np.sin(down), np.cos(around)), np.outer(np.cos(down), np.ones_like(around)), np.outer(np.sin(down), np.sin(around))],
-        axis=-1,
-    )
-    return [grid[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]] for i in range(0, len(down) - 1, 2) for j in range(0, len(around) - 1, 4)]
 
 
 def _y_up(points: Array) -> Array:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.reports.plots.colours import EXACT
-from dropspin.reports.replay.bodies import outline
 from dropspin.reports.replay.motions import Motion, Replay, axis_and_angle
 from dropspin.scenarios.rotations import about
 
@@ -25,7 +24,7 @@ DIGITS = 5
 
 def as_data(replay: Replay) -> dict[str, Any]:
     """The data that the viewer needs, ready for JSON."""
-    shape = outline(replay.scene.body)
+    shape = replay.scene.body.outline
     return {
         "scene": replay.scene.name,
         "dt": replay.dt,

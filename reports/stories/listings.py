@@ -1,9 +1,8 @@
 """The output of `dropspin list`: the scenes, the engines, the metrics."""
 
-from dropspin.scenarios.catalogue_truths import CATALOGUE_TRUTHS
 from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.loading import load, names
-from dropspin.scenarios.problems import identifier
+from dropspin.scenarios.problems import problems
 
 Rows = list[dict[str, str]]
 LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs", "unit")}
@@ -12,11 +11,12 @@ LEFT_OUT_FIRST = {"scenes": ("tags", "truth"), "engines": (), "metrics": ("needs
 
 def scene_rows() -> Rows:
     """The scenes of the catalogue."""
+    known = {problem.scene: problem for problem in problems().values()}
     return [
         {
             "scene": scene.name,
-            "problem": identifier(scene),
-            "truth": CATALOGUE_TRUTHS.get(scene.name, ""),
+            "problem": known[scene.name].identifier,
+            "truth": known[scene.name].truth,
             "tags": ", ".join(scene.tags),
             "summary": scene.summary,
         }

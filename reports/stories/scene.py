@@ -7,8 +7,7 @@ from dropspin.scenarios.model import Scenario
 
 def modelled(scene: Scenario) -> list[str]:
     """The parts of a scene that are simulated."""
-    shape = "body with given vertices" if scene.body.shape == "vertices" else scene.body.shape
-    parts = [f"a {shape} of {scene.body.mass:g} kg"]
+    parts = [f"a {scene.body.description or scene.body.shape} of {scene.body.mass:g} kg"]
     if scene.gravity is not None:
         parts.append(f"gravity of {np.linalg.norm(scene.acceleration):g} m/s²")
     if scene.floor is not None:

@@ -15,15 +15,12 @@ straight down, no damping. Valid until a difference of one eps in a spin about t
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.scenarios.body import Sphere
 from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
 from dropspin.scenarios.truths.truth import Impact, Truth
-
-Array = NDArray[np.float64]
 
 MAX_BOUNCES = 100_000
 MIN_FLIGHT_SHARE = 1e-12
@@ -35,7 +32,7 @@ SPIN_ROUNDING = 1e-15
 
 def bounce_ladder(scene: Scenario) -> Truth | None:
     """The exact solution of a flat drop."""
-    if scene.floor is None or scene.damping is not None or not _falls_straight_down(scene) or not _stays_flat(scene):
+    if scene.floor is None or scene.damping is not None or not scene.falls_straight_down or not _stays_flat(scene):
         return None
     g = -float(scene.acceleration[1])
     start = scene.initial_state
@@ -99,21 +96,15 @@ def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Arra
     return speeds[bounces & (speeds > MIN_FLIGHT_SHARE * u0)]
 
 
-def _falls_straight_down(scene: Scenario) -> bool:
-    g = scene.acceleration
-    return g[1] < 0.0 and g[0] == 0.0 and g[2] == 0.0
-
-
 def _stays_flat(scene: Scenario) -> bool:
     """Whether every impact is a single upward impulse through the centre of mass."""
     assert scene.floor is not None
     start = scene.start
     if scene.floor.friction != "none" and (start.velocity[0] or start.velocity[2] or any(start.angular_velocity)):
         return False
-    if isinstance(scene.body, Sphere):
+    if scene.body.is_ball:
         return scene.body.inertia == "solid" or not any(start.angular_velocity)
-    corners = rotate(np.array(start.orientation), scene.body.vertices)
-    lowest = corners[corners[:, 1] <= corners[:, 1].min() + 1e-12 * scene.body.size]
+    lowest = scene.body.lowest(np.array(start.orientation), 1e-12)
     under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size
     return len(lowest) >= 3 and bool(under_centre) and _turns_about_the_vertical(scene)
 

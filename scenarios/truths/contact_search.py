@@ -27,10 +27,8 @@ from numpy.typing import NDArray
 
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import cross, rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.flight import Flight
-
-Array = NDArray[np.float64]
 
 ANGULAR_ACCELERATION = 1.0 / math.sqrt(3.0)  # largest |α| over Ω²
 FIRST_ANGLE = 0.5  # rad, between the times at which contacts are excluded first

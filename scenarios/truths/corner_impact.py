@@ -17,18 +17,14 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.scenarios.body import Sphere
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.contact_search import Contact, ContactSearch
 from dropspin.scenarios.truths.flight import TURNS_OVER, Flight, flight_states
 from dropspin.scenarios.truths.impact_laws import Law, law_of, velocities_after
 from dropspin.scenarios.truths.truth import Impact, Truth
-
-Array = NDArray[np.float64]
 
 CORNER_TOLERANCE = 1e-9  # of the body's size; corners at most this much higher than the lowest touch too
 MAX_IMPACTS = 100
@@ -72,7 +68,7 @@ def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
         return Truth("flight", "free flight above the floor", states, horizon=horizon, ends=ends)
     impulse = LAW_NAMES[law] if law != "note" else "eq 15" if floor.friction == "none" else "sticking impulse, eq 17"
     points = len(_touching(scene, events[0].before))
-    where = "ball" if isinstance(scene.body, Sphere) else {1: "corner", 2: "edge"}.get(points, "face")
+    where = "ball" if scene.body.is_ball else {1: "corner", 2: "edge"}.get(points, "face")
     count = "one" if len(events) == 1 else str(len(events))
     statement = f"free rotor and parabola, {count} {where} impact{'s' if len(events) > 1 else ''} ({impulse})"
     return Truth(f"{where}-impact", statement, states, events, horizon, ends)
@@ -191,9 +187,7 @@ def _descends(scene: Scenario, state: Array) -> bool:
 
 def _touching(scene: Scenario, state: Array) -> Array:
     """Offsets of the lowest points from the centre of mass, shape (n, 3)."""
-    offsets = rotate(state[ORIENTATION], scene.body.vertices)
-    lowest = offsets[offsets[:, 1] <= offsets[:, 1].min() + CORNER_TOLERANCE * scene.body.size]
-    return lowest - scene.body.rounding * UP
+    return scene.body.lowest(state[ORIENTATION], CORNER_TOLERANCE) - scene.body.rounding * UP
 
 
 def _leave(points: Array, state: Array) -> bool:

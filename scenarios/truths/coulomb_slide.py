@@ -15,16 +15,12 @@ effect, because no contact separates.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.scenarios.body import Sphere
+from dropspin.scenarios.bodies.hull import convex_hull
 from dropspin.scenarios.model import TOUCHING, Scenario
-from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import POSITION, SPIN, VELOCITY
+from dropspin.scenarios.state import POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.truths.dry_friction import dry_friction
 from dropspin.scenarios.truths.truth import Truth
-
-Array = NDArray[np.float64]
 
 LEVEL = np.array([1.0, 0.0, 1.0])
 
@@ -32,7 +28,7 @@ LEVEL = np.array([1.0, 0.0, 1.0])
 def coulomb_slide(scene: Scenario) -> Truth | None:
     """The exact solution of a flat slide, or of rest on a slope."""
     floor, start, g = scene.floor, scene.initial_state, scene.acceleration
-    if floor is None or floor.friction == "none" or scene.damping is not None or isinstance(scene.body, Sphere):
+    if floor is None or floor.friction == "none" or scene.damping is not None:
         return None
     if g[1] >= 0.0 or start[8] != 0.0 or start[SPIN].any():
         return None
@@ -61,17 +57,11 @@ def _stays_flat(scene: Scenario, velocity: Array, slope: Array, friction: float)
     Its distance from the centre of mass is height times friction coefficient, in the direction of the velocity, which turns from that of
     the start towards the slope; at rest it is height times slope.
     """
-    from scipy.spatial import ConvexHull, QhullError
-
-    offsets = rotate(np.array(scene.start.orientation), scene.body.vertices)
-    base = offsets[offsets[:, 1] <= offsets[:, 1].min() + TOUCHING * scene.body.size]
-    if abs(scene.clearance) > TOUCHING * scene.body.size or len(base) < 3:
+    base = scene.body.lowest(np.array(scene.start.orientation), TOUCHING)
+    hull = convex_hull(base[:, [0, 2]]) if scene.starts_on_floor and len(base) >= 3 else None
+    if hull is None:  # also where the base is a line
         return False
-    try:
-        hull = ConvexHull(base[:, [0, 2]])
-    except QhullError:  # collinear
-        return False
-    height, steepness = -float(offsets[:, 1].min()), float(np.linalg.norm(slope))
+    height, steepness = -float(base[:, 1].min()), float(np.linalg.norm(slope))
     outward, reach = hull.equations[:, :2], -hull.equations[:, 2]
     needed = outward @ slope[[0, 2]]
     if velocity.any() or friction < steepness:

@@ -24,31 +24,27 @@ restitution then has no effect, because no contact separates.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.scenarios.body import Box
+from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import TOUCHING, Scenario
-from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY
+from dropspin.scenarios.rotations import about, multiply, unrotate
+from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
 from dropspin.scenarios.truths.truth import Truth
-
-Array = NDArray[np.float64]
 
 
 def coulomb_turn(scene: Scenario) -> Truth | None:
     """The exact solution of a flat turn."""
-    floor, start, g = scene.floor, scene.initial_state, scene.acceleration
+    floor, start = scene.floor, scene.initial_state
     if floor is None or isinstance(floor.friction, str) or scene.damping is not None:
         return None
-    straight_down = g[1] < 0.0 and g[0] == 0.0 and g[2] == 0.0
-    if not straight_down or start[VELOCITY].any() or start[10] != 0.0 or start[12] != 0.0 or start[11] == 0.0:
+    if not scene.falls_straight_down or start[VELOCITY].any() or start[10] != 0.0 or start[12] != 0.0 or start[11] == 0.0:
         return None
     lever = _lever(scene)
     if lever is None or (floor.restitution > 0.0 and _flutters(scene, floor.friction / lever)):
         return None
     vertical = unrotate(start[ORIENTATION], UP)
     moment = float(vertical @ scene.body.inertia_tensor @ vertical)
-    spin, slowing = float(start[11]), floor.friction * scene.body.mass * -float(g[1]) * lever / moment
+    spin, slowing = float(start[11]), floor.friction * scene.body.mass * -float(scene.acceleration[1]) * lever / moment
 
     def states(t: Array) -> Array:
         rows = np.tile(start, (len(t), 1))
@@ -64,10 +60,9 @@ def coulomb_turn(scene: Scenario) -> Truth | None:
 
 def _lever(scene: Scenario) -> float | None:
     """Distance of the base's corners from the vertical through the centre of mass [m]; None if the box does not lie flat."""
-    if not isinstance(scene.body, Box) or abs(scene.clearance) > TOUCHING * scene.body.size:
+    if not isinstance(scene.body, Box) or not scene.starts_on_floor:
         return None
-    corners = rotate(np.array(scene.start.orientation), scene.body.vertices)
-    base = corners[corners[:, 1] <= corners[:, 1].min() + TOUCHING * scene.body.size]
+    base = scene.body.lowest(np.array(scene.start.orientation), TOUCHING)
     return float(np.hypot(base[:, 0], base[:, 2]).mean()) if len(base) == 4 else None
 
 

@@ -12,14 +12,11 @@ Valid for: no floor, no damping; eq 6 for any body, because it omits the gyrosco
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from dropspin.scenarios.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 
 def discrete_flight(scene: Scenario, dt: float, *, exact_rotation: bool = False) -> Trajectory:

@@ -17,9 +17,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
+
 Motion = Callable[[Array], tuple[Array, Array]]
 """A function from times [s], shape (n,), to velocities and their integrals, each of shape (n, 3)."""
 

@@ -7,9 +7,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 SMALLEST_SINE = 1e-100  # below it sn equals its argument, and the square of cn/sn would overflow
 CONVERGED = 1e-8  # each arithmetic-geometric mean squares the error, so one more reaches the last digit

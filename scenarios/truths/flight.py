@@ -20,14 +20,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dropspin.scenarios.model import Damping, Scenario
-from dropspin.scenarios.state import ORIENTATION, PARTS, SPIN
+from dropspin.scenarios.state import ORIENTATION, PARTS, SPIN, Array
 from dropspin.scenarios.truths.free_rotor import FreeRotor, free_rotor
 from dropspin.scenarios.truths.truth import Truth
-
-Array = NDArray[np.float64]
 
 UNDAMPED = Damping()
 TURNS_OVER = "rounding of the initial state determines when the body turns over"

@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.mechanics import is_diagonal, principal_axes
+from dropspin.scenarios.bodies.inertia import is_diagonal, principal_axes
 from dropspin.scenarios.rotations import about, cross, multiply
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.elliptic import Jacobi, argument, integral_of_sn2, jacobi, quarter_period
 from dropspin.scenarios.truths.rotor_horizon import EPS, horizon, spin_rounding
 
-Array = NDArray[np.float64]
 SMALLEST_M1 = 1e-290
 """Smallest value for which the squares of the elliptic functions do not underflow; below it, a body turns over only after more than 300
 e-foldings.

@@ -26,9 +26,9 @@ from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
+
 Restitution = Literal["newton", "poisson", "energy"]
 
 N = np.array([0.0, 1.0, 0.0])

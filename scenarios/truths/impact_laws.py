@@ -20,15 +20,12 @@ moments.
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.scenarios.body import Sphere
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.friction_impact import Restitution, cone_impulse, integrated_impulse
 
-Array = NDArray[np.float64]
 Law = Literal["note", "normal", "poisson", "clamped", "coulomb", "cone", "integrated-newton", "integrated-poisson", "integrated-energy"]
 LAWS: tuple[Law, ...] = get_args(Law)
 FRICTION_LAWS: tuple[Law, ...] = ("cone", "integrated-newton", "integrated-poisson", "integrated-energy")
@@ -43,7 +40,7 @@ def law_of(scene: Scenario) -> Law:
     assert scene.floor is not None
     if isinstance(scene.floor.friction, str):
         return "normal" if scene.floor.friction == "none" else "note"
-    is_round = isinstance(scene.body, Sphere) and float(np.ptp(np.linalg.eigvalsh(scene.body.inertia_tensor))) == 0.0
+    is_round = scene.body.is_ball and float(np.ptp(np.linalg.eigvalsh(scene.body.inertia_tensor))) == 0.0
     return "coulomb" if is_round else scene.floor.impact_law
 
 

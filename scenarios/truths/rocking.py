@@ -33,12 +33,10 @@ from numpy.typing import NDArray
 
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply
-from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
 from dropspin.scenarios.truths.elliptic import argument, jacobi
 from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.truth import Impact, Truth
-
-Array = NDArray[np.float64]
 
 PENDULUM = "inverted pendulum by Jacobi's elliptic functions (Whittaker, section 44)"
 MAX_LANDINGS = 100_000

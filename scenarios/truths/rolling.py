@@ -21,17 +21,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.scenarios.body import Sphere
-from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import about, multiply
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.coulomb_slide import LEVEL
 from dropspin.scenarios.truths.dry_friction import Motion, dry_friction
 from dropspin.scenarios.truths.truth import Truth
-
-Array = NDArray[np.float64]
 
 NO_SLIP = 1e-14
 """Speed of a contact point that counts as rest, relative to the ball's speed."""
@@ -46,18 +42,19 @@ STEP = 0.05
 def rolling(scene: Scenario) -> Truth | None:
     """The exact solution of a ball that slides and rolls."""
     floor, start, g, body = scene.floor, scene.initial_state, scene.acceleration, scene.body
-    if floor is None or scene.damping is not None or not isinstance(body, Sphere) or g[1] >= 0.0 or start[8] != 0.0:
+    if floor is None or scene.damping is not None or not body.is_ball or g[1] >= 0.0 or start[8] != 0.0:
         return None
     moments = np.diag(body.inertia_tensor)
-    if abs(scene.clearance) > TOUCHING * body.size or np.ptp(moments) > 0.0:
+    if not scene.starts_on_floor or np.ptp(moments) > 0.0:
         return None
     velocity, spin, pull = start[VELOCITY], start[SPIN], g * LEVEL
-    slip = velocity + body.radius * np.cross(UP, spin)
+    radius = body.rounding
+    slip = velocity + radius * np.cross(UP, spin)
     if np.linalg.norm(slip) <= NO_SLIP * np.linalg.norm(velocity):
         slip = np.zeros(3)
     if math.isinf(floor.coefficient) and slip.any():
         return None
-    share = 1.0 + body.mass * body.radius**2 / float(moments[0])  # k
+    share = 1.0 + body.mass * radius**2 / float(moments[0])  # k
     contact, stops = dry_friction(slip, pull, share * floor.coefficient * -float(g[1]))
 
     def lost(t: Array) -> tuple[Array, Array]:
@@ -66,7 +63,7 @@ def rolling(scene: Scenario) -> Truth | None:
         t = t[:, None]
         return (slip + pull * t - slipping) / share, (slip * t + 0.5 * pull * t**2 - way) / share
 
-    lever = (share - 1.0) / body.radius
+    lever = (share - 1.0) / radius
 
     def spun(free: Array, change: Array) -> Array:
         found: Array = free + lever * np.cross(UP, change)

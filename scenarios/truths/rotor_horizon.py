@@ -17,9 +17,8 @@ import math
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import Array
 
 TOLERANCE = 1e-9
 """Largest error of the orientation, relative to the angle turned, that one eps of the initial state may cause before the solution counts as

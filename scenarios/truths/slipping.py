@@ -21,15 +21,12 @@ from functools import partial
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import NDArray
 
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply
-from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY, Array
 from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.truth import Truth
-
-Array = NDArray[np.float64]
 
 MIN_DEGREE, MAX_DEGREE = 16, 512  # of the Chebyshev series
 NEGLIGIBLE_COEFFICIENT = 1e-15  # of the largest

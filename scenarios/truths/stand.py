@@ -8,13 +8,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dropspin.scenarios.bodies.hull import convex_hull
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP
-
-Array = NDArray[np.float64]
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, Array
 
 MIN_LEVEL = 1e-15
 """Smallest sin²(ψ/2) at rest; below it, rounding determines when the body falls, and to which side."""
@@ -89,7 +87,7 @@ def on_one_edge(scene: Scenario) -> Stand | None:
     of mass is between the two ends of every edge.
     """
     body, start, g = scene.body, scene.initial_state, scene.acceleration
-    if g[1] >= 0.0 or body.rounding or abs(scene.clearance) > TOUCHING * body.size:
+    if g[1] >= 0.0 or body.rounding or not scene.starts_on_floor:
         return None
     offsets = rotate(start[ORIENTATION], body.hull)
     lowest = offsets[offsets[:, 1] <= offsets[:, 1].min() + TOUCHING * body.size] * (1.0 - UP)
@@ -124,13 +122,13 @@ def _corners(offsets: Array, tolerance: float) -> Array | None:
         offsets: The vertices relative to the centre of mass: forward, up and along the edge [m], shape (m, 3).
         tolerance: Distance of two points that count as one [m].
     """
-    from scipy.spatial import ConvexHull, QhullError, cKDTree
+    from scipy.spatial import cKDTree
 
     section = offsets[:, :2]
-    try:
-        corners = section[ConvexHull(section).vertices]
-    except QhullError:  # a flat body
+    hull = convex_hull(section)
+    if hull is None:  # a flat body
         return None
+    corners = section[hull.vertices]
     corners = np.roll(corners, -int(np.argmin(corners[:, 1])), axis=0)
     distances, nearest = cKDTree(corners).query(section)
     at_corner = distances <= tolerance

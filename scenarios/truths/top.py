@@ -20,10 +20,8 @@ from numpy.typing import NDArray
 
 from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import multiply, rotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.truths.truth import Truth
-
-Array = NDArray[np.float64]
 
 EQUAL = 1e-12
 """Largest difference of moments of inertia, relative to the largest, up to which they count as equal."""
@@ -37,10 +35,10 @@ SAMPLES_PER_STEP = 16
 
 def top(scene: Scenario) -> Truth | None:
     """The exact solution of a top on a corner; None if the scene is no such top."""
-    floor, start, g, body = scene.floor, scene.initial_state, scene.acceleration, scene.body
-    if floor is None or floor.friction != "infinite" or scene.damping is not None or not (g[1] < 0.0 and g[0] == 0.0 and g[2] == 0.0):
+    floor, start, body = scene.floor, scene.initial_state, scene.body
+    if floor is None or floor.friction != "infinite" or scene.damping is not None or not scene.falls_straight_down:
         return None
-    if body.rounding or abs(scene.clearance) > TOUCHING * body.size or not start[SPIN].any():
+    if body.rounding or not scene.starts_on_floor or not start[SPIN].any():
         return None
     heights = rotate(start[ORIENTATION], body.vertices)[:, 1]
     lowest = np.flatnonzero(heights <= heights.min() + TOUCHING * body.size)

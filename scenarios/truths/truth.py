@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 States = Callable[[Array], Array]
 """A function from times [s], shape (n,), to states, shape (n, 13)."""
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from dropspin.scenarios import DropspinError, SceneError, load, truth_for
+from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.draw import draw, drawn_scene
 from dropspin.scenarios.families import FAMILIES, GRAVITY, LENGTH, MASS, RESTITUTION, Draws
-from dropspin.scenarios.mechanics import is_diagonal
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from dropspin.scenarios import Trajectory, load, rotations
-from dropspin.scenarios.mechanics import angular_momentum, energy, is_diagonal, kinetic_energy, lowest_height, principal_axes
+from dropspin.scenarios.bodies.inertia import is_diagonal, principal_axes
+from dropspin.scenarios.mechanics import angular_momentum, energy, kinetic_energy, lowest_height
 
 long_enough = arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1)
 quaternions = long_enough.map(lambda q: q / np.linalg.norm(q))

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dropspin.scenarios import load
-from dropspin.scenarios.body import hull_corners
+from dropspin.scenarios.bodies.hull import hull_corners
 from dropspin.scenarios.mechanics import lowest_height, offset_of
 from dropspin.scenarios.trajectory import Trajectory
 

@@ -24,7 +24,7 @@ from scipy.integrate import solve_ivp
 from dropspin import scenarios
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running.run import run
-from dropspin.scenarios.body import Box
+from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import Damping
 from dropspin.scenarios.rotations import about, conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY

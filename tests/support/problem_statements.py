@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropspin.scenarios.mechanics import is_diagonal
+from dropspin.scenarios.bodies.inertia import is_diagonal
 
 CONVENTIONS = """SI units. The world frame is right-handed with y up. x and v are the position and the velocity of the centre of
 mass, and ω is the angular velocity, all in the world frame. q = [x, y, z, w] is a unit quaternion with the scalar last that turns

@@ -6,7 +6,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.body import Box, Sphere
+from dropspin.scenarios.bodies import Box, Sphere
 
 
 @cache

@@ -22,7 +22,7 @@ def test_list_prints_the_same_as_a_table_and_as_json(what, tmp_path):
 
 
 def test_listed_exact_solutions_are_those_of_truth_for(tmp_path):
-    """The list reads them from `dropspin.scenarios.catalogue_truths`; a new scene of the catalogue needs a line there."""
+    """The list reads them from scenarios/problems.toml, where a new scene of the catalogue has a line."""
     truths = {name: truth_for(load(name)) for name in names()}
     listed = {row["scene"]: row["truth"] for row in json.loads(dropspin("list", "--json", cwd=tmp_path).stdout)}
     assert listed == {name: truth.name if truth else "" for name, truth in truths.items()}

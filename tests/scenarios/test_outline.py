@@ -1,4 +1,4 @@
-"""The surfaces of bodies in the replay: closed, with faces in order."""
+"""The surfaces of bodies: closed, with faces in order."""
 
 from itertools import pairwise
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import dropspin as ds
-from dropspin.reports.replay.bodies import outline
 from dropspin.scenarios.rotations import rotate
 
 SOLIDS = {
@@ -24,7 +23,7 @@ SOLIDS = {
 def test_faces_of_a_body_enclose_its_volume(name):
     """The faces, all counterclockwise seen from outside, enclose the volume of the body by the divergence theorem."""
     body, faces, volume = SOLIDS[name]
-    shape = outline(ds.load({"duration": 1.0, "body": body}).body)
+    shape = ds.load({"duration": 1.0, "body": body}).body.outline
     assert len(shape.faces) == faces
     held = 0.0
     for face in shape.faces:
@@ -37,7 +36,7 @@ def test_plane_body_is_one_face():
     """A square of points in a general orientation: one face of four corners, in order."""
     corners = np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [-1.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
     points = rotate(np.array([0.1, 0.2, 0.3, 0.4]) / np.sqrt(0.3), corners)
-    shape = outline(ds.load({"duration": 1.0, "body": {"shape": "vertices", "points": points.tolist(), "mass": 1.0}}).body)
+    shape = ds.load({"duration": 1.0, "body": {"shape": "vertices", "points": points.tolist(), "mass": 1.0}}).body.outline
     assert shape.is_flat
     [face] = shape.faces
     sides = np.linalg.norm(np.diff(shape.vertices[[*face, face[0]]], axis=0), axis=1)
@@ -58,7 +57,7 @@ THIN = {
 @pytest.mark.parametrize("name", THIN)
 def test_body_thinner_than_qhull_resolves_is_plane(name):
     body = ds.load({"duration": 1.0, "body": THIN[name]}).body
-    shape = outline(body)
+    shape = body.outline
     assert shape.is_flat
     [face] = shape.faces
     assert sorted(face) == list(range(len(shape.vertices)))

@@ -1,0 +1,104 @@
+"""Convex hulls of points: their corners, their lowest face, and the surface that is drawn."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dropspin.scenarios.state import Array
+
+FLAT = 1e-14
+"""Largest thickness of a set of points, relative to its size, that is attributed to rounding."""
+IN_ONE_PLANE = 1e-9
+"""Largest allowed distance of the points of a face from its plane, relative to the size of the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The surface of a body, in its own frame.
+
+    Attributes:
+        vertices: Positions relative to the centre of mass [m], shape (n, 3); a sphere has one vertex, at its centre.
+        faces: For each face, the indices of its vertices, counterclockwise as seen from outside; a sphere has no faces.
+        radius: Distance of the surface from the vertices [m].
+        is_flat: Whether the body is a plane polygon, visible from both sides.
+    """
+
+    vertices: Array
+    faces: Sequence[Sequence[int]]
+    radius: float = 0.0
+    is_flat: bool = False
+
+    def polygons(self, meridians: int) -> list[Array]:
+        """The faces as polygons [m], each of shape (m, 3); of a sphere, every other field of a grid of this many meridians."""
+        if not self.radius:
+            return [self.vertices[list(face)] for face in self.faces]
+        around, down = np.linspace(0.0, 2.0 * np.pi, meridians + 1), np.linspace(0.0, np.pi, meridians // 2 + 1)
+        grid = self.radius * np.stack(
+            [np.outer(np.sin(down), np.cos(around)), np.outer(np.cos(down), np.ones_like(around)), np.outer(np.sin(down), np.sin(around))],
+            axis=-1,
+        )
+        return [grid[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]] for i in range(0, len(down) - 1, 2) for j in range(0, len(around) - 1, 4)]
+
+
+def outline(points: Array, rounding: float, size: float) -> Outline:
+    """The surface of a body: the faces of the convex hull of its vertices, shape (n, 3), or a sphere if it has a rounding [m]."""
+    if rounding:
+        return Outline(points, [], rounding)
+    centre = points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(np.pad(points - centre, ((0, 1), (0, 0))), full_matrices=False)  # three, also of two points
+    hull = convex_hull(points) if spread[2] >= IN_ONE_PLANE * size * np.sqrt(len(points)) else None
+    if hull is None:
+        corners = _around(points, hull_corners((points - centre) @ axes[:2].T).tolist(), axes[2])
+        return Outline(points[corners], [list(range(len(corners)))], is_flat=True)
+    # Qhull splits faces into triangles; triangles of one plane form one face.
+    planes: dict[tuple[float, ...], set[int]] = {}
+    for plane, corners in zip(hull.equations, hull.simplices, strict=True):
+        key = tuple(np.round(plane / [1.0, 1.0, 1.0, size], 9) + 0.0)
+        planes.setdefault(key, set()).update(int(corner) for corner in corners)
+    used = {corner: number for number, corner in enumerate(sorted(set().union(*planes.values())))}
+    faces = [[used[corner] for corner in _around(points, sorted(corners), np.array(plane[:3]))] for plane, corners in planes.items()]
+    return Outline(points[list(used)], faces)
+
+
+def _around(points: Array, corners: list[int], normal: Array) -> list[int]:
+    """The corners of a face in order, counterclockwise about its outward normal."""
+    arms = points[corners] - points[corners].mean(axis=0)
+    across = np.cross(normal, arms[0])
+    angles = np.arctan2(arms @ across, arms @ arms[0] * np.linalg.norm(normal))
+    return [corners[place] for place in np.argsort(angles)]
+
+
+def hull_corners(points: Array) -> NDArray[np.intp]:
+    """Ascending indices of the points, shape (n, 3), that are corners of their convex hull, which may be flat, a line or a point."""
+    centred = points - points.mean(axis=0)
+    _, extents, directions = np.linalg.svd(centred, full_matrices=False)
+    spanned = directions[extents > FLAT * np.linalg.norm(points)]
+    if len(spanned) == 0:
+        return np.array([0])
+    if len(spanned) == 1:
+        along = centred @ spanned[0]
+        return np.unique([np.argmin(along), np.argmax(along)])
+    hull = convex_hull(points if len(spanned) == 3 else centred @ spanned.T)
+    return np.arange(len(points)) if hull is None else np.sort(hull.vertices).astype(np.intp)
+
+
+def lowest_face(points: Array, size: float) -> float:
+    """Distance of the origin from the nearest face of the convex hull of points, shape (n, 3) [m]; plane points can lie flat: 0."""
+    centred = points - points.mean(axis=0)
+    if np.linalg.matrix_rank(centred, tol=1e-9 * size) < 3:
+        return 0.0
+    hull = convex_hull(points)
+    return 0.0 if hull is None else float(np.min(np.abs(hull.equations[:, 3])))
+
+
+def convex_hull(points: Array) -> Any:
+    """SciPy's convex hull of points, shape (n, 2) or (n, 3); None if they are flatter than Qhull resolves."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return ConvexHull(points)
+    except QhullError:
+        return None

@@ -1,0 +1,165 @@
+"""What is known of a shape: its vertices, which may touch a floor, its mass, inertia and surface, and the shape in other units.
+
+Each shape is the convex hull of its vertices and all points within its rounding of it. A new shape is a file of its own beside this one,
+which gives `vertices`, `rounding`, `resting_height` and `tensor_of`; the rest follows from these unless the shape overrides it.
+"""
+
+from abc import abstractmethod
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from dropspin.scenarios.bodies.hull import Outline, outline
+from dropspin.scenarios.bodies.inertia import is_diagonal
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import Array
+from dropspin.scenarios.tables import Positive, Table
+
+INERTIA_ROUNDING = 1.001  # moments are often given with four digits
+
+
+class Shape(Table):
+    """The `[body]` table of a scene."""
+
+    lengths: ClassVar[tuple[str, ...]]
+    """The keys whose values are lengths: numbers, or vectors along the body's axes, or tuples of such vectors."""
+    description: ClassVar[str] = ""
+    """The shape in words, if not by the name of its table's key `shape`."""
+
+    mass: Positive
+    if TYPE_CHECKING:  # in this order, which the digest of a scene depends on, they are fields of each shape
+        shape: str
+        inertia: str | tuple[float, ...]
+
+    # By the given values only; pydantic would compare cached arrays too.
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Shape) and self._given == other._given
+
+    def __hash__(self) -> int:
+        return hash(self._given)
+
+    @property
+    def _given(self) -> tuple[Any, ...]:
+        return type(self), *(getattr(self, name) for name in type(self).model_fields)
+
+    @property
+    @abstractmethod
+    def vertices(self) -> Array:
+        """The points that may touch the floor, relative to the centre of mass [m], shape (n, 3)."""
+
+    @property
+    def rounding(self) -> float:
+        """Distance of the surface from the vertices [m]: the radius of a ball, which has one vertex; 0 for other bodies."""
+        return 0.0
+
+    @property
+    @abstractmethod
+    def resting_height(self) -> float:
+        """Lowest possible height of the centre of mass on a floor [m]."""
+
+    @abstractmethod
+    def tensor_of(self, distribution: str) -> Array:
+        """Inertia about the centre of mass of a distribution of the mass that `inertia` names, in the body frame [kg m²], shape (3, 3)."""
+
+    @property
+    def hull(self) -> Array:
+        """The corners of the convex hull of the vertices, in the order of the vertices [m], shape (m, 3)."""
+        return self.vertices
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether the surface is a sphere about the centre of mass."""
+        return len(self.vertices) == 1
+
+    @cached_property
+    def size(self) -> float:
+        """Largest distance of any part from the centre of mass [m]."""
+        return float(np.sqrt(np.max(np.sum(self.vertices**2, axis=1)))) + self.rounding
+
+    @property
+    def outline(self) -> Outline:
+        """The surface, to be drawn."""
+        return outline(self.vertices, self.rounding, self.size)
+
+    def lowest(self, orientation: Array, tolerance: float) -> Array:
+        """Offsets of the lowest vertices from the centre of mass at an orientation, shape (4,), in the world frame [m], shape (n, 3).
+
+        Vertices that are at most `tolerance` times the size of the body higher than the lowest one are among them.
+        """
+        offsets = rotate(orientation, self.vertices)
+        return offsets[offsets[:, 1] <= offsets[:, 1].min() + tolerance * self.size]
+
+    @cached_property
+    def inertia_tensor(self) -> Array:
+        """Inertia about the centre of mass, in the body frame [kg m²], shape (3, 3)."""
+        return np.diag(self.inertia) if isinstance(self.inertia, tuple) else self.tensor_of(self.inertia)
+
+    @property
+    def moments(self) -> tuple[float, ...]:
+        """Moments of inertia about the body's own axes [kg m²], without the products of inertia."""
+        return tuple(np.diag(self.inertia_tensor).tolist())
+
+    @cached_property
+    def largest_spread(self) -> Array:
+        """Bounds of the mean squares of x, y and z of the mass, in the body frame, if no mass is outside of the body [m²], shape (3,).
+
+        The mean of x² is at most a b for a mass between -a and b whose centre is at 0.
+
+        Source: R. Bhatia & C. Davis, A better bound on the variance, Amer. Math. Monthly 107 (2000).
+        """
+        squares: Array = (self.rounding + self.vertices.max(axis=0)) * (self.rounding - self.vertices.min(axis=0))
+        return squares
+
+    @property
+    def excess_inertia(self) -> str:
+        """Why the given moments of inertia are impossible for a body of this size; empty if they are possible."""
+        if isinstance(self.inertia, str):
+            return ""
+        spread, largest = (0.5 * sum(self.inertia) - np.array(self.inertia)) / self.mass, self.largest_spread  # mean squares of x, y and z
+        if not np.any(spread > INERTIA_ROUNDING * largest) and spread.sum() <= INERTIA_ROUNDING * self.size**2:
+            return ""
+        moments = self.mass * np.minimum(largest.sum() - largest, self.size**2)
+        return (
+            f"got {list(self.inertia)} kg m², which needs mass outside of the body: a root mean square of x, y and z of "
+            f"{_digits(np.sqrt(spread))} m, of which this shape allows {_digits(np.sqrt(largest))} m, and moments of inertia of up to "
+            f"{_digits(moments)} kg m² for {self.mass:g} kg. Correct the inertia, the mass or the size."
+        )
+
+    @property
+    def ambiguity(self) -> str:
+        """What the table leaves to a default that is probably not meant; usually empty."""
+        return ""
+
+    def scaled(self, length: float, mass: float) -> dict[str, Any]:
+        """The keys of the body with lengths and masses multiplied by factors."""
+        keys: dict[str, Any] = {"mass": mass * self.mass, **{name: times(length, getattr(self, name)) for name in self.lengths}}
+        has_unit_masses = self.inertia == "note" and is_diagonal(self.inertia_tensor)  # for a body of any mass
+        if has_unit_masses or not isinstance(self.inertia, str):
+            keys["inertia"] = times(mass * length**2, self.moments)
+        return keys
+
+    def mirrored(self) -> dict[str, Any]:
+        """The keys of the body that differ in its mirror image at the plane x = 0."""
+        return {}
+
+    def with_axes(self, order: tuple[int, ...]) -> dict[str, Any]:
+        """The keys of the body with its axes in another order."""
+        by_axis = [*self.lengths, *([] if isinstance(self.inertia, str) else ["inertia"])]
+        return {name: _permuted(order, getattr(self, name)) for name in by_axis}
+
+
+def times(factor: float, values: Any) -> Any:
+    """A number, or each number of nested tuples, times a factor."""
+    return tuple(times(factor, value) for value in values) if isinstance(values, tuple) else factor * values
+
+
+def _permuted(order: tuple[int, ...], values: Any) -> Any:
+    """The components of a vector, or of each vector of a tuple, in another order; a number unchanged."""
+    if not isinstance(values, tuple):
+        return values
+    return tuple(_permuted(order, value) for value in values) if isinstance(values[0], tuple) else tuple(values[axis] for axis in order)
+
+
+def _digits(values: Array) -> str:
+    return f"[{', '.join(f'{value:.3g}' for value in values)}]"

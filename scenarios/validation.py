@@ -69,7 +69,7 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _key(path: Sequence[str | int], root: str) -> str:
+def key_of(path: Sequence[str | int], root: str = "") -> str:
     """A key of a file, such as body.mass, or, with a root, that of a mapping, such as scene['body']['mass']."""
     if root:
         return root + "".join(f"[{part!r}]" for part in path)
@@ -79,7 +79,7 @@ def _key(path: Sequence[str | int], root: str) -> str:
 def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternatives, root: str) -> str:
     """One problem as 'key: got value; what is allowed.'."""
     path, table = _located(kind, problem)
-    key = _key(path, root)
+    key = key_of(path, root)
     prefix = f"{key}: " if key else ""
     given = shown(problem["input"])
     match problem["type"]:
@@ -93,10 +93,10 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
             field = next(part for part in reversed(path) if isinstance(part, str))
             tags = ", ".join(map(repr, _tagged(table, field, name)))
             found = "missing" if fault == "union_tag_not_found" else f"got {shown(problem['input'][name])}"
-            return f"{_key([*path, name], root)}: {found}; must be one of {tags}."
+            return f"{key_of([*path, name], root)}: {found}; must be one of {tags}."
         case "value_error" if isinstance(problem["input"], dict):  # of a whole table: the text names keys and values
             named = NAMED_KEY.fullmatch(str(problem["ctx"]["error"])) if not path else None
-            return f"{prefix}{problem['ctx']['error']}." if named is None else f"{_key(named[1].split('.'), root)}: {named[2]}."
+            return f"{prefix}{problem['ctx']['error']}." if named is None else f"{key_of(named[1].split('.'), root)}: {named[2]}."
         case "value_error":
             return f"{prefix}got {given}; {problem['ctx']['error']}."
         case "too_short" | "too_long" as fault:
@@ -107,7 +107,7 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
             return f"{prefix}got {given}; must be a {'mapping' if root else 'table'}{example}."
     message = re.sub("a (tuple|array)", "a list", problem["msg"].replace("Input should", "must").replace("valid ", ""))
     message = message.replace(f"{Decimal(repr(LARGEST)):f}", f"{LARGEST:g}")  # pydantic writes all of its zeros
-    dotted = _key(path, "")
+    dotted = key_of(path)
     return f"{prefix}got {given}; {message}{alternatives.get((dotted, problem['type']), alternatives.get((dotted, '*'), ''))}."
 
 

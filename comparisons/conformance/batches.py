@@ -20,7 +20,7 @@ from dropspin.comparisons.running.verification import BuildMismatch, verified_ba
 from dropspin.comparisons.symmetries.findings import STEP_MULTIPLE, Finding, judged
 from dropspin.comparisons.symmetries.study import batch_member, effects_of_rounding
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.transformations import whole_steps
+from dropspin.scenarios.variations import whole_steps
 
 Array = NDArray[np.float64]
 

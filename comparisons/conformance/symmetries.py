@@ -10,7 +10,7 @@ from dropspin.comparisons.running.recording import record
 from dropspin.comparisons.symmetries.findings import Finding
 from dropspin.comparisons.symmetries.study import findings_of
 from dropspin.scenarios.text import counted
-from dropspin.scenarios.transformations import whole_steps
+from dropspin.scenarios.variations import whole_steps
 
 
 def check_symmetries(engine: Engine, check: str) -> CheckResult:

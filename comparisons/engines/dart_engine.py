@@ -11,7 +11,7 @@ from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.rotations import cross, rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, Array
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 REASONS = {
     "deactivation": "never falls asleep; else a block that tips over more slowly than 0.05 rad/s stops halfway",

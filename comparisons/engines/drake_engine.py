@@ -16,7 +16,7 @@ from dropspin.comparisons.engines import base
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.state import ORIENTATION, Array
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 

@@ -13,7 +13,7 @@ from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal, principal_axes
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 Array = NDArray[np.float64]
 

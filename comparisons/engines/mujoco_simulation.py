@@ -16,7 +16,7 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import initial_states
 from dropspin.scenarios.rotations import conjugate, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)

@@ -25,7 +25,7 @@ from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.bodies import Box, Sphere, Vertices
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
 from dropspin.scenarios.state import SPIN, VELOCITY
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 ALMOST = 0.999
 NO_PUSH = 1e-6  # relative to what gravity adds in a step

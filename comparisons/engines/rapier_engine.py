@@ -22,7 +22,7 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.state import PARTS
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 LARGEST = float(np.finfo(np.float32).max)
 FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapier's threads, which all worlds share

@@ -19,7 +19,7 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.state import PARTS
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 NUMBERS = count()
 """Of the worlds in Node.js."""

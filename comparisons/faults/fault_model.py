@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dropspin.scenarios import DropspinError, Scenario, truth_for
 from dropspin.scenarios.state import ORIENTATION
+from dropspin.scenarios.variations import with_values
 
 Array = NDArray[np.float64]
 Simulated = Callable[[Scenario], Scenario]
@@ -87,17 +88,9 @@ def faults_of(about: str, *faults: tuple[str, Simulated]) -> list[FaultModel]:
     return [FaultModel(message, simulated, about=about) for message, simulated in faults]
 
 
-def changed_table(part: str, **values: Any) -> Simulated:
+def changed_table(table: str, **values: Any) -> Simulated:
     """The scene with some values of a table changed, if it has that table; a callable is applied to the old value."""
-
-    def changed(scene: Scenario) -> Scenario:
-        table = getattr(scene, part)
-        if table is None:
-            return scene
-        given = table.model_dump() | {key: value(getattr(table, key)) if callable(value) else value for key, value in values.items()}
-        return scene.model_copy(update={part: type(table).model_validate(given)})
-
-    return changed
+    return lambda scene: with_values(scene, table, **values)
 
 
 def changed_start(change: Reported) -> Simulated:

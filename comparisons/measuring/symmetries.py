@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import about, conjugate
 from dropspin.scenarios.state import POSITION, UP, VELOCITY
-from dropspin.scenarios.transformations import (
+from dropspin.scenarios.variations import (
     AWAY,
     REFLECTED,
     in_units,

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.robustness.operating_point import OperatingPoint, fall_time, spin
-from dropspin.scenarios.transformations import changed, in_units, units_of_states
+from dropspin.scenarios import variations
+from dropspin.scenarios.variations import changed, in_units, units_of_states
 
 Array = NDArray[np.float64]
 
@@ -30,27 +31,14 @@ def with_spin(nominal: OperatingPoint, speed: float) -> OperatingPoint:
 def with_height(nominal: OperatingPoint, height: float) -> OperatingPoint:
     """Another height above the floor [m]; the duration is the same multiple of the time of the fall."""
     scene = nominal.scene
-    x, y, z = scene.start.position
-    higher = changed(scene, start={"position": (x, y + height - scene.clearance, z)})
+    higher = variations.with_height(scene, height)
     duration = scene.duration * fall_time(higher) / fall_time(scene)
     return OperatingPoint(changed(higher, max(duration, LEAST_STEPS * nominal.dt)), nominal.dt)
 
 
 def with_inertia_ratio(nominal: OperatingPoint, ratio: float) -> OperatingPoint:
-    """Another ratio of the largest to the least moment of inertia.
-
-    The shape, the largest moment and its axis are kept, and the relative position of the middle moment between its smallest and largest
-    possible value.
-    """
-    scene = nominal.scene
-    least, middle, largest = np.sort(np.diag(scene.body.inertia_tensor))
-    lowest = max(least, largest - least)  # the triangle inequality of moments of inertia
-    share = (middle - lowest) / (largest - lowest) if largest > lowest else 0.5
-    new_least = largest / ratio
-    new_lowest = max(new_least, largest - new_least)
-    new = np.array([new_least, min(new_lowest + share * (largest - new_lowest), largest), largest])
-    order = np.argsort(np.argsort(np.diag(scene.body.inertia_tensor), kind="stable"), kind="stable")
-    return OperatingPoint(changed(scene, body={"inertia": tuple(float(moment) for moment in new[order])}), nominal.dt)
+    """Another ratio of the largest to the least moment of inertia, for the same shape and largest moment."""
+    return OperatingPoint(variations.with_inertia_ratio(nominal.scene, ratio), nominal.dt)
 
 
 def with_mass(nominal: OperatingPoint, mass: float) -> OperatingPoint:
@@ -70,13 +58,7 @@ def with_duration(nominal: OperatingPoint, duration: float) -> OperatingPoint:
 
 def with_size(nominal: OperatingPoint, size: float) -> OperatingPoint:
     """Another size of the body [m], at the same height above the floor."""
-    scene = nominal.scene
-    factor = size / scene.body.size
-    x, y, z = scene.start.position
-    content = {"position": (x, y - scene.clearance + factor * (scene.clearance + scene.body.size), z)}
-    smaller = changed(scene, body=scene.body.scaled(factor, 1.0), start=content)
-    x, y, z = smaller.start.position
-    return OperatingPoint(changed(smaller, start={"position": (x, y + scene.clearance - smaller.clearance, z)}), nominal.dt)
+    return OperatingPoint(variations.with_size(nominal.scene, size), nominal.dt)
 
 
 def with_scale(nominal: OperatingPoint, factor: float) -> OperatingPoint:

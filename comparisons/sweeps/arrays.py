@@ -20,7 +20,6 @@ from dropspin.comparisons.measuring.batch import BATCH_BYTES, motions_side_by_si
 from dropspin.comparisons.measuring.motions import Setup
 from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
-from dropspin.comparisons.sweeps.axes import Path, path_of, set_field, with_fields
 from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
 from dropspin.comparisons.sweeps.outcomes import Outcomes, requested_metrics
 from dropspin.scenarios import Scenario, SceneError, Trajectory
@@ -28,6 +27,7 @@ from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.ensemble import clearances, spread_starts
 from dropspin.scenarios.model import TOUCHING, unit
 from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP
+from dropspin.scenarios.variations import Path, path_of, set_field, with_fields
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

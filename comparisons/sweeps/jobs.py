@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from pydantic_core import to_json
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis, content_of, path_of, set_field, with_fields
+from dropspin.comparisons.sweeps.axes import Drawn, Indices, SweepAxis
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.ensemble import spread_start
 from dropspin.scenarios.validation import shown
+from dropspin.scenarios.variations import content_of, path_of, set_field, with_fields
 
 OPTION = "engine."
 KEY_DIGITS = 20

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import verify_time_step
-from dropspin.comparisons.sweeps.axes import Drawn, Listed, NoSuchField, Spaced, Spacing, SweepAxis, verify_field, with_fields
+from dropspin.comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, SweepAxis
 from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
@@ -18,6 +18,7 @@ from dropspin.scenarios.errors import UnknownName
 from dropspin.scenarios.loading import TOO_LARGE, read_toml
 from dropspin.scenarios.tables import Number, Positive, Table
 from dropspin.scenarios.validation import shown, validated
+from dropspin.scenarios.variations import NoSuchField, verify_field, with_fields
 
 MOST_JOBS = 10**15
 WHOLE_NUMBERS = frozenset({"ensemble.size", "ensemble.seed"})

@@ -23,7 +23,7 @@ from dropspin.comparisons.symmetries.findings import Effects, Finding, Pairs, ju
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.state import POSITION, RATES
-from dropspin.scenarios.transformations import AWAY, whole_steps, with_other_numbers
+from dropspin.scenarios.variations import AWAY, whole_steps, with_other_numbers
 
 Array = NDArray[np.float64]
 

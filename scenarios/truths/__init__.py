@@ -1,11 +1,12 @@
 """Exact solutions ("truths"). Each file solves one problem and states its formula, its source and its range of validity."""
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
 from dropspin.scenarios.errors import DropspinError
-from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.state import VELOCITY
 from dropspin.scenarios.truths.bounce import bounce_ladder
 from dropspin.scenarios.truths.corner_impact import corner_impact
@@ -21,6 +22,19 @@ from dropspin.scenarios.truths.truth import Impact, Truth
 
 __all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "truth_for"]
 
+ON_FLOOR: tuple[Callable[[Scenario, Floor], Truth | None], ...] = (
+    bounce_ladder,
+    rocking,
+    slipping,
+    top,
+    corner_impact,
+    coulomb_slide,
+    rolling,
+    coulomb_turn,
+)
+"""The solutions of scenes with a floor and without damping; each is None for a scene that is not of its kind, and the first that is not
+counts.
+"""
 SAME_IMPULSE = 1e-6
 """Largest difference of two impulses, over the momentum, that is due to rounding: 1e-13 in the integration, which impacts amplify."""
 
@@ -43,13 +57,14 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     """
     if not isinstance(scene, Scenario):
         raise DropspinError(f"scene: got {scene!r} ({type(scene).__name__}); give a Scenario, as load() returns it.")
+    floor = scene.floor
+    if floor is None:
+        return flight(scene) if law is None else None
+    if scene.damping is not None:
+        return None
     if law is not None:
-        return corner_impact(scene, law)
-    for problem in (flight, bounce_ladder, rocking, slipping, top, corner_impact, coulomb_slide, rolling, coulomb_turn):
-        truth = problem(scene)
-        if truth is not None:
-            return truth
-    return None
+        return corner_impact(scene, floor, law)
+    return next(filter(None, (problem(scene, floor) for problem in ON_FLOOR)), None)
 
 
 def other_laws(scene: Scenario) -> dict[Law, Truth]:

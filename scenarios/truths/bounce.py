@@ -20,7 +20,7 @@ from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
-from dropspin.scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.truths.truth import Truth, impacts_of, piece
 
 MAX_BOUNCES = 100_000
 MIN_FLIGHT_SHARE = 1e-12
@@ -30,9 +30,9 @@ SPIN_ROUNDING = 1e-15
 """Largest horizontal part of an angular velocity about the vertical that counts as rounding, relative to the angular velocity."""
 
 
-def bounce_ladder(scene: Scenario) -> Truth | None:
+def bounce_ladder(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a flat drop."""
-    if scene.floor is None or scene.damping is not None or not scene.falls_straight_down or not _stays_flat(scene):
+    if not scene.falls_straight_down or not _stays_flat(scene, floor):
         return None
     g = -float(scene.acceleration[1])
     start = scene.initial_state
@@ -41,7 +41,7 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
     clearance = scene.clearance if scene.clearance > TOUCHING * scene.body.size else 0.0
     u0 = math.sqrt(upward**2 + 2.0 * g * clearance)
     t0 = (upward + u0) / g
-    leaving = _leaving_speeds(u0, g, scene.floor, scene.duration - t0)
+    leaving = _leaving_speeds(u0, g, floor, scene.duration - t0)
     if leaving is None:
         return None
     starts = np.concatenate([[0.0, t0], t0 + np.cumsum(2.0 / g * leaving)])
@@ -52,8 +52,7 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
     sideways_and_spin = flight_states(start, scene.body.inertia_tensor, np.zeros(3))
 
     def states(t: Array) -> Array:
-        # The time of an impact belongs to the flight before it.
-        flight = np.maximum(np.searchsorted(starts, t, side="left") - 1, 0)
+        flight = piece(starts, t)
         since, speed = t - starts[flight], speeds[flight]
         pull = np.where(flight == len(speeds) - 1, 0.0, g)
         rows = sideways_and_spin(t)
@@ -66,11 +65,10 @@ def bounce_ladder(scene: Scenario) -> Truth | None:
     before, after = states(times), states(times)
     before[:, 1] = after[:, 1] = floor_height
     after[:, 8] = speeds[1 : len(times) + 1]
-    events = tuple(Impact(float(time), *pair) for time, *pair in zip(times, before, after, strict=True))
     statement = "bounce ladder h_k = e^(2k) H with impact times by geometric sums (Newton's restitution)"
     if u0 == 0.0:
         statement = "rest on the floor, angular velocity about the vertical constant, angle ωt"
-    return Truth("bounce-ladder", statement, states, events, until, TURNS_OVER if until < scene.duration else "")
+    return Truth("bounce-ladder", statement, states, impacts_of(times, before, after), until, TURNS_OVER if until < scene.duration else "")
 
 
 def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Array | None:
@@ -96,11 +94,10 @@ def _leaving_speeds(u0: float, g: float, floor: Floor, remaining: float) -> Arra
     return speeds[bounces & (speeds > MIN_FLIGHT_SHARE * u0)]
 
 
-def _stays_flat(scene: Scenario) -> bool:
+def _stays_flat(scene: Scenario, floor: Floor) -> bool:
     """Whether every impact is a single upward impulse through the centre of mass."""
-    assert scene.floor is not None
     start = scene.start
-    if scene.floor.friction != "none" and (start.velocity[0] or start.velocity[2] or any(start.angular_velocity)):
+    if floor.friction != "none" and (start.velocity[0] or start.velocity[2] or any(start.angular_velocity)):
         return False
     if scene.body.is_ball:
         return scene.body.inertia == "solid" or not any(start.angular_velocity)

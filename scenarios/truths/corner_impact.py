@@ -18,13 +18,13 @@ from itertools import islice
 
 import numpy as np
 
-from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.contact_search import Contact, ContactSearch
 from dropspin.scenarios.truths.flight import TURNS_OVER, Flight, flight_states
 from dropspin.scenarios.truths.impact_laws import Law, law_of, velocities_after
-from dropspin.scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.truths.truth import Impact, Truth, piece
 
 CORNER_TOLERANCE = 1e-9  # of the body's size; corners at most this much higher than the lowest touch too
 MAX_IMPACTS = 100
@@ -47,31 +47,36 @@ LAW_NAMES = {
 }
 
 
-def corner_impact(scene: Scenario, law: Law | None = None) -> Truth | None:
+def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Truth | None:
     """The exact solution of a drop on a corner, an edge or as a ball, up to the time at which a disturbance has grown too much.
 
     Args:
-        scene: The scene.
+        scene: The scene, without damping.
+        floor: Its floor.
         law: The impact law; by default the floor's.
     """
-    floor = scene.floor
-    if floor is None or scene.damping is not None:
-        return None
     law = law or law_of(scene)
-    flights = _until_sensitive(scene, law)
+    flights = _until_sensitive(scene, floor, law)
     events = tuple(flight.impact for flight in flights if flight.impact is not None)
-    horizon, ends = flights[-1].end, flights[-1].reason
-    if horizon == 0.0 or (not events and flights[0].is_other_impact):
+    begins, last = np.array([0.0, *(event.time for event in events)]), flights[-1]
+    if last.end == 0.0 or (not events and last.is_other_impact):
         return None  # the body stays in contact from the start, or the first impact is not of this kind
-    states = _States(tuple(flight.motion for flight in flights), tuple(event.time for event in events))
+
+    def states(t: Array) -> Array:
+        which, rows = piece(begins, t), np.empty((len(t), 13))
+        for number, flight in enumerate(flights):
+            mine = which == number
+            rows[mine] = flight.motion(t[mine] - begins[number])
+        return rows
+
     if not events:
-        return Truth("flight", "free flight above the floor", states, horizon=horizon, ends=ends)
+        return Truth("flight", "free flight above the floor", states, horizon=last.end, ends=last.reason)
     impulse = LAW_NAMES[law] if law != "note" else "eq 15" if floor.friction == "none" else "sticking impulse, eq 17"
     points = len(_touching(scene, events[0].before))
     where = "ball" if scene.body.is_ball else {1: "corner", 2: "edge"}.get(points, "face")
     count = "one" if len(events) == 1 else str(len(events))
     statement = f"free rotor and parabola, {count} {where} impact{'s' if len(events) > 1 else ''} ({impulse})"
-    return Truth(f"{where}-impact", statement, states, events, horizon, ends)
+    return Truth(f"{where}-impact", statement, states, events, last.end, last.reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,26 +90,8 @@ class _Flight:
     is_other_impact: bool = False  # one that the formula does not cover
 
 
-@dataclass(frozen=True, eq=False)
-class _States:
-    """The states at times [s]; the time of an impact belongs to the flight before it."""
-
-    flights: tuple[Flight, ...]
-    impacts: tuple[float, ...]
-
-    def __call__(self, t: Array) -> Array:
-        begins = np.array([0.0, *self.impacts])
-        which = np.maximum(np.searchsorted(begins, t, side="left") - 1, 0)
-        rows = np.empty((len(t), 13))
-        for number, flight in enumerate(self.flights):
-            mine = which == number
-            rows[mine] = flight(t[mine] - begins[number])
-        return rows
-
-
-def _flights(scene: Scenario, start: Array, law: Law) -> Iterator[_Flight]:
+def _flights(scene: Scenario, floor: Floor, start: Array, law: Law) -> Iterator[_Flight]:
     """The flights from a state, until the scene ends, the body stays on the floor, or an impact is not covered by the formula."""
-    assert scene.floor is not None
     inertia, g = scene.body.inertia_tensor, scene.acceleration
     motion, now, longest = flight_states(start, inertia, g), 0.0, 0.0
     for number in range(MAX_IMPACTS + 1):
@@ -113,44 +100,51 @@ def _flights(scene: Scenario, start: Array, law: Law) -> Iterator[_Flight]:
         if contact is None:
             yield _Flight(motion, until, reason="" if until == scene.duration else TURNS_OVER)
             return
-        end = now + contact.time
+        now += contact.time
+        reason = ""
         if not contact.is_decided:
-            yield _Flight(motion, end, reason="rounding determines whether the body touches the floor")
+            reason = "rounding determines whether the body touches the floor"
+        elif contact.time < SHORTEST_FLIGHT * longest:
+            reason = "impacts follow one another ever faster"
+        elif number == MAX_IMPACTS:
+            reason = f"impact {MAX_IMPACTS + 1} follows"
+        if reason:
+            yield _Flight(motion, now, reason=reason)
             return
-        if contact.time < SHORTEST_FLIGHT * longest:
-            yield _Flight(motion, end, reason="impacts follow one another ever faster")
-            return
-        if number == MAX_IMPACTS:
-            yield _Flight(motion, end, reason=f"impact {MAX_IMPACTS + 1} follows")
-            return
-        now, longest, before = end, max(longest, contact.time), motion(np.array([contact.time]))[0]
+        longest, before = max(longest, contact.time), motion(np.array([contact.time]))[0]
         touching = _touching(scene, before)
-        rates = velocities_after(before, touching.mean(axis=0), scene.body.mass, inertia, scene.floor, law)
-        if rates is None:
-            yield _Flight(motion, now, reason="the impact law has no solution, or several", is_other_impact=True)
+        impact = _impact(scene, floor, law, touching, now, before)
+        if isinstance(impact, str):
+            yield _Flight(motion, now, reason=impact, is_other_impact=True)
             return
-        after = before.copy()
-        after[RATES] = rates
-        if after[VELOCITY] @ UP <= before[VELOCITY] @ UP:
-            yield _Flight(motion, now, reason="the impact law would have the floor pull", is_other_impact=True)
-            return
-        if not (_have_one_velocity(touching, before) and _have_one_velocity(touching, after)):
-            yield _Flight(motion, now, reason="several points strike the floor at once", is_other_impact=True)
-            return
-        yield _Flight(motion, now, Impact(now, before, after))
-        motion = flight_states(after, inertia, g)
-        if not _leave(touching, after):
+        yield _Flight(motion, now, impact)
+        motion = flight_states(impact.after, inertia, g)
+        if not _leave(touching, impact.after):
             yield _Flight(motion, now, reason="the body stays on the floor")
             return
 
 
-def _until_sensitive(scene: Scenario, law: Law) -> list[_Flight]:
+def _impact(scene: Scenario, floor: Floor, law: Law, touching: Array, time: float, before: Array) -> Impact | str:
+    """The impact of the touching points, or why the formula does not cover it."""
+    rates = velocities_after(before, touching.mean(axis=0), scene.body.mass, scene.body.inertia_tensor, floor, law)
+    if rates is None:
+        return "the impact law has no solution, or several"
+    after = before.copy()
+    after[RATES] = rates
+    if after[VELOCITY] @ UP <= before[VELOCITY] @ UP:
+        return "the impact law would have the floor pull"
+    if not (_have_one_velocity(touching, before) and _have_one_velocity(touching, after)):
+        return "several points strike the floor at once"
+    return Impact(time, before, after)
+
+
+def _until_sensitive(scene: Scenario, floor: Floor, law: Law) -> list[_Flight]:
     """The flights up to the impact after which a disturbance of the initial state has grown by more than `MAX_GROWTH`."""
     per_radian = np.array([scene.body.size] * 3 + [1.0] * 3)  # speeds, m/s, to rates of rotation
     flights: list[_Flight] = []
-    disturbed = _flights(scene, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION, law)
+    disturbed = _flights(scene, floor, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION, law)
     others: list[_Flight] = []
-    for number, flight in enumerate(_flights(scene, scene.initial_state, law)):
+    for number, flight in enumerate(_flights(scene, floor, scene.initial_state, law)):
         flights.append(flight)
         if number == 0 or flight.impact is None:
             continue

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from dropspin.scenarios.bodies.hull import convex_hull
-from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.state import POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.truths.dry_friction import dry_friction
 from dropspin.scenarios.truths.truth import Truth
@@ -25,12 +25,10 @@ from dropspin.scenarios.truths.truth import Truth
 LEVEL = np.array([1.0, 0.0, 1.0])
 
 
-def coulomb_slide(scene: Scenario) -> Truth | None:
+def coulomb_slide(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a flat slide, or of rest on a slope."""
-    floor, start, g = scene.floor, scene.initial_state, scene.acceleration
-    if floor is None or floor.friction == "none" or scene.damping is not None:
-        return None
-    if g[1] >= 0.0 or start[8] != 0.0 or start[SPIN].any():
+    start, g = scene.initial_state, scene.acceleration
+    if floor.friction == "none" or g[1] >= 0.0 or start[8] != 0.0 or start[SPIN].any():
         return None
     pull, into = g * LEVEL, -float(g[1])
     velocity = start[VELOCITY]

@@ -26,18 +26,18 @@ import math
 import numpy as np
 
 from dropspin.scenarios.bodies import Box
-from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import about, multiply, unrotate
 from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
 from dropspin.scenarios.truths.truth import Truth
 
 
-def coulomb_turn(scene: Scenario) -> Truth | None:
+def coulomb_turn(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a flat turn."""
-    floor, start = scene.floor, scene.initial_state
-    if floor is None or isinstance(floor.friction, str) or scene.damping is not None:
+    start = scene.initial_state
+    if isinstance(floor.friction, str) or not scene.falls_straight_down:
         return None
-    if not scene.falls_straight_down or start[VELOCITY].any() or start[10] != 0.0 or start[12] != 0.0 or start[11] == 0.0:
+    if start[VELOCITY].any() or start[10] != 0.0 or start[12] != 0.0 or start[11] == 0.0:
         return None
     lever = _lever(scene)
     if lever is None or (floor.restitution > 0.0 and _flutters(scene, floor.friction / lever)):

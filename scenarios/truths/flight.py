@@ -76,10 +76,8 @@ def flight_states(state: Array, inertia: Array, acceleration: Array, damping: Da
     return Flight(state, acceleration, free_rotor(inertia, state[ORIENTATION], state[SPIN]), damping)
 
 
-def flight(scene: Scenario) -> Truth | None:
+def flight(scene: Scenario) -> Truth:
     """The exact solution of a scene without a floor."""
-    if scene.floor is not None:
-        return None
     states = flight_states(scene.initial_state, scene.body.inertia_tensor, scene.acceleration, scene.damping or UNDAMPED)
     parabola = "" if scene.gravity is None else "x = x0 + v0 t + g t²/2; "
     if not states.rotor.is_steady:

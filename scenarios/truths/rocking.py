@@ -31,12 +31,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
 from dropspin.scenarios.truths.elliptic import argument, jacobi
 from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
-from dropspin.scenarios.truths.truth import Impact, Truth
+from dropspin.scenarios.truths.truth import Impact, Truth, impacts_of, piece
 
 PENDULUM = "inverted pendulum by Jacobi's elliptic functions (Whittaker, section 44)"
 MAX_LANDINGS = 100_000
@@ -85,12 +85,9 @@ class _Ladder(NamedTuple):
     ends: str = ""
 
 
-def rocking(scene: Scenario) -> Truth | None:
+def rocking(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a body that falls about an edge."""
-    floor = scene.floor
-    if floor is None or floor.friction != "infinite" or scene.damping is not None:
-        return None
-    stand = on_one_edge(scene)
+    stand = on_one_edge(scene) if floor.friction == "infinite" else None
     if stand is None or not _pivots(scene, stand):
         return None
     ladder = _ladder(stand, scene.duration)
@@ -103,8 +100,7 @@ def rocking(scene: Scenario) -> Truth | None:
     edges = np.array([pose.edge for pose in ladder.poses])
 
     def states(t: Array) -> Array:
-        # The time of a landing belongs to the motion before it.
-        number = np.clip(np.searchsorted(begins, t, side="left") - 1, 0, len(falls) - (not ladder.rests))
+        number = np.minimum(piece(begins, t), len(falls) - (not ladder.rests))
         lies = number == len(falls)
         which = np.minimum(number, len(falls) - 1)
         half_sine, speed = _pendulum(_rate(stand, edges[which]), t - centres[which], levels[which])
@@ -269,4 +265,4 @@ def _impacts(scene: Scenario, stand: Stand, ladder: _Ladder) -> tuple[Impact, ..
     falls = [fall for fall in ladder.falls if fall.lands <= scene.duration]
     poses = zip(*(fall.landing for fall in falls), strict=True), zip(*ladder.poses[1 : len(falls) + 1], strict=True)
     before, after = (_states(scene, stand, *map(np.array, columns)) for columns in poses)
-    return tuple(Impact(fall.lands, *pair) for fall, *pair in zip(falls, before, after, strict=True))
+    return impacts_of(np.array([fall.lands for fall in falls]), before, after)

@@ -22,12 +22,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.coulomb_slide import LEVEL
 from dropspin.scenarios.truths.dry_friction import Motion, dry_friction
-from dropspin.scenarios.truths.truth import Truth
+from dropspin.scenarios.truths.truth import Truth, piece
 
 NO_SLIP = 1e-14
 """Speed of a contact point that counts as rest, relative to the ball's speed."""
@@ -39,13 +39,10 @@ STEP = 0.05
 """Largest rotation in a step of the numerical integration [rad]."""
 
 
-def rolling(scene: Scenario) -> Truth | None:
+def rolling(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a ball that slides and rolls."""
-    floor, start, g, body = scene.floor, scene.initial_state, scene.acceleration, scene.body
-    if floor is None or scene.damping is not None or not body.is_ball or g[1] >= 0.0 or start[8] != 0.0:
-        return None
-    moments = np.diag(body.inertia_tensor)
-    if not scene.starts_on_floor or np.ptp(moments) > 0.0:
+    start, g, body = scene.initial_state, scene.acceleration, scene.body
+    if not (body.is_ball and scene.starts_on_floor and g[1] < 0.0 and start[8] == 0.0 and len(set(body.moments)) == 1):
         return None
     velocity, spin, pull = start[VELOCITY], start[SPIN], g * LEVEL
     radius = body.rounding
@@ -54,7 +51,7 @@ def rolling(scene: Scenario) -> Truth | None:
         slip = np.zeros(3)
     if math.isinf(floor.coefficient) and slip.any():
         return None
-    share = 1.0 + body.mass * radius**2 / float(moments[0])  # k
+    share = 1.0 + body.mass * radius**2 / body.moments[0]  # k
     contact, stops = dry_friction(slip, pull, share * floor.coefficient * -float(g[1]))
 
     def lost(t: Array) -> tuple[Array, Array]:
@@ -108,7 +105,7 @@ def _integrated(start: Array, spins: Motion, kink: float, end: float) -> Callabl
     at_nodes = np.array(orientations)
 
     def orientations_at(t: Array) -> Array:
-        before = np.clip(np.searchsorted(nodes, t, side="left") - 1, 0, len(nodes) - 2)
+        before = np.minimum(piece(nodes, t), len(nodes) - 2)
         return multiply(_turns(spins, nodes[before], t), at_nodes[before])
 
     return orientations_at

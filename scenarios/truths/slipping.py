@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY, Array
 from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
@@ -33,12 +33,9 @@ NEGLIGIBLE_COEFFICIENT = 1e-15  # of the largest
 GUESS_POINTS = 500  # of the cubic, whose error of 1e-9 Newton's method squares
 
 
-def slipping(scene: Scenario) -> Truth | None:
+def slipping(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a body whose edge slips."""
-    floor = scene.floor
-    if floor is None or floor.friction != "none" or scene.damping is not None:
-        return None
-    stand = on_one_edge(scene)
+    stand = on_one_edge(scene) if floor.friction == "none" else None
     if stand is None or stand.slope != 0.0:
         return None
     falling = stand.speed * stand.radius * math.sin(stand.angle)

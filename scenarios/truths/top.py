@@ -18,7 +18,7 @@ it.
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.model import TOUCHING, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.truths.truth import Truth
@@ -33,10 +33,10 @@ SAMPLES_PER_STEP = 16
 """Times in a step of the integrator at which the contact is verified."""
 
 
-def top(scene: Scenario) -> Truth | None:
+def top(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a top on a corner; None if the scene is no such top."""
-    floor, start, body = scene.floor, scene.initial_state, scene.body
-    if floor is None or floor.friction != "infinite" or scene.damping is not None or not scene.falls_straight_down:
+    start, body = scene.initial_state, scene.body
+    if floor.friction != "infinite" or not scene.falls_straight_down:
         return None
     if body.rounding or not scene.starts_on_floor or not start[SPIN].any():
         return None

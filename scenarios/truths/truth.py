@@ -28,6 +28,16 @@ class Impact:
     after: Array
 
 
+def impacts_of(times: Array, before: Array, after: Array) -> tuple[Impact, ...]:
+    """The impacts at times [s], shape (n,), with the states before and after them, shapes (n, 13)."""
+    return tuple(Impact(float(time), *states) for time, *states in zip(times, before, after, strict=True))
+
+
+def piece(begins: Array, t: Array) -> NDArray[np.intp]:
+    """The number of the piece of a motion at each time; the time at which a piece begins belongs to the one before it."""
+    return np.maximum(np.searchsorted(begins, t, side="left") - 1, 0)
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
     """The exact motion of a scene.

@@ -8,8 +8,8 @@ from dropspin.scenarios.mechanics import angular_momentum, energy, lowest_height
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, VELOCITY
 from dropspin.scenarios.trajectory import Trajectory
-from dropspin.scenarios.transformations import in_units
 from dropspin.scenarios.truths.flight import flight_states
+from dropspin.scenarios.variations import in_units
 
 UP = np.array([0.0, 1.0, 0.0])
 

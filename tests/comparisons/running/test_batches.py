@@ -12,7 +12,7 @@ from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.recording import record, record_batch
 from dropspin.scenarios import load
 from dropspin.scenarios.model import differ_in_start_alone
-from dropspin.scenarios.transformations import with_other_numbers
+from dropspin.scenarios.variations import with_other_numbers
 
 DT = 1e-3
 SCENES = (

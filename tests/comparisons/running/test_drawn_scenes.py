@@ -5,7 +5,7 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from dropspin.scenarios import transformations
+from dropspin.scenarios import variations
 
 pytestmark = pytest.mark.usefixtures("few_start_phases")
 
@@ -44,7 +44,7 @@ def with_hard_coded_gravity(scene):
 def with_hard_coded_mass(scene):
     """Of 1 kg; the moments are those of the scene."""
     moments = np.diag(scene.body.inertia_tensor).tolist()
-    return transformations.changed(scene, body={"mass": 1.0, "inertia": moments})  # which no body of this size may have
+    return variations.changed(scene, body={"mass": 1.0, "inertia": moments})  # which no body of this size may have
 
 
 def without_products_of_inertia(scene):

@@ -10,7 +10,7 @@ from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.recording import simulate
 from dropspin.comparisons.symmetries.study import symmetries
 from dropspin.scenarios import DropspinError, load
-from dropspin.scenarios.transformations import heavy_neighbour
+from dropspin.scenarios.variations import heavy_neighbour
 
 DT = 4e-3
 

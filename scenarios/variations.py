@@ -1,17 +1,25 @@
-"""Transformations of a scene to another with the same motion, seen from elsewhere or in other units; and other changes of its tables."""
+"""A scene with some quantity changed.
+
+By its tables and fields; one quantity with all that goes with it; and the same motion in other units, from another place, or by other axes.
+"""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from dropspin.scenarios.bodies.shape import times
-from dropspin.scenarios.loading import from_mapping
+from dropspin.scenarios.errors import DropspinError, did_you_mean
+from dropspin.scenarios.loading import FEATURES, from_mapping, from_table
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import conjugate, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.validation import key_of
 
+TABLES = ("body", *(name for name in FEATURES if name != "expect"))
 AWAY = np.array([0.8, 0.0, 0.6])
 """A horizontal direction that is no axis."""
 NEXT_AXES = np.array([0.5, 0.5, 0.5, 0.5])
@@ -26,6 +34,111 @@ def changed(scene: Scenario, duration: float | None = None, **tables: Mapping[st
     for table, keys in tables.items():
         content[table] = {**content[table], **keys}
     return from_mapping({**content, "duration": scene.duration if duration is None else duration})
+
+
+def with_values(scene: Scenario, table: str, **values: Any) -> Scenario:
+    """The scene with some values of one table, if it has that table; a callable is applied to the old value.
+
+    The table is validated, but not the scene: the body may start below the floor.
+    """
+    old = getattr(scene, table)
+    if old is None:
+        return scene
+    new = {key: value(getattr(old, key)) if callable(value) else value for key, value in values.items()}
+    return scene.model_copy(update={table: type(old).model_validate(old.model_dump() | new)})
+
+
+Path = tuple[str | int, ...]
+"""The keys and indices of a field."""
+
+
+class NoSuchField(DropspinError):
+    """A field that a scene does not have."""
+
+
+def path_of(name: str) -> Path:
+    """The keys and indices of a dotted name, such as `floor.restitution` or `start.position[1]`."""
+    if not re.fullmatch(r"[a-z_]+((\.[a-z_]+)|(\[(0|[1-9][0-9]{0,5})\]))*", name):
+        raise NoSuchField(f"{name!r} is not a valid field name; write it as floor.restitution or start.position[1].")
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[a-z_]+|[0-9]+", name))
+
+
+def content_of(scene: Scenario) -> dict[str, Any]:
+    """The part of a scene's file that describes its physics, as a mapping without absent tables."""
+    content = scene.model_dump(include={"duration", *TABLES}, exclude_none=True)
+    if scene.floor is not None and scene.floor.impact_law == "cone":
+        del content["floor"]["impact_law"]  # the keys of jobs that had no other law stay the same
+    return content
+
+
+def verify_field(scene: Scenario, name: str) -> None:
+    """Raise `NoSuchField` unless the scene has a field that may be set."""
+    path = path_of(name)
+    if path[0] not in ("duration", *TABLES) or (path[0] != "duration" and len(path) == 1):
+        raise NoSuchField(f"no such field.{did_you_mean(str(path[0]), TABLES)} Allowed: duration, or a field of {', '.join(TABLES)}.")
+    found: Any = content_of(scene)
+    for depth, key in enumerate(path):
+        if isinstance(key, int):
+            if not isinstance(found, tuple) or key >= len(found):
+                raise NoSuchField(f"{key_of(path[:depth])} is {found!r}, which has no entry {key}.")
+        elif not isinstance(found, Mapping) or (key not in found and depth == 0):
+            raise NoSuchField(f"scene {scene.name!r} has no [{path[0]}]; an absent table is not modelled.")
+        elif key not in found:
+            return  # an optional key, which the schema of the scene accepts or refuses
+        found = found[key]
+
+
+def with_fields(scene: Scenario, values: Iterable[tuple[str, Any]]) -> Scenario:
+    """The scene with some fields set.
+
+    Raises:
+        SceneError: The result is not a valid scene.
+    """
+    content = content_of(scene)
+    for name, value in values:
+        set_field(content, path_of(name), value)
+    return from_table(scene.name, "", content)
+
+
+def set_field(content: dict[str, Any], path: Path, value: Any) -> None:
+    """Set a field of a nested mapping; tuples along its path become lists."""
+    found: Any = content
+    for key, following in pairwise(path):
+        if isinstance(following, int):
+            found[key] = list(found[key])
+        found = found[key]
+    found[path[-1]] = value
+
+
+def with_height(scene: Scenario, height: float) -> Scenario:
+    """The scene with another height of the body's lowest point above the floor [m]."""
+    x, y, z = scene.start.position
+    return changed(scene, start={"position": (x, y + height - scene.clearance, z)})
+
+
+def with_size(scene: Scenario, size: float) -> Scenario:
+    """The scene with another size of the body [m], at the same height above the floor."""
+    factor = size / scene.body.size
+    x, y, z = scene.start.position
+    start = {"position": (x, y - scene.clearance + factor * (scene.clearance + scene.body.size), z)}
+    return with_height(changed(scene, body=scene.body.scaled(factor, 1.0), start=start), scene.clearance)
+
+
+def with_inertia_ratio(scene: Scenario, ratio: float) -> Scenario:
+    """The scene with another ratio of the largest to the least moment of inertia.
+
+    The shape, the largest moment and its axis are kept, and the relative position of the middle moment between its smallest and largest
+    possible value.
+    """
+    moments = np.array(scene.body.moments)
+    least, middle, largest = np.sort(moments)
+    lowest = max(least, largest - least)  # the triangle inequality of moments of inertia
+    share = (middle - lowest) / (largest - lowest) if largest > lowest else 0.5
+    new_least = largest / ratio
+    new_lowest = max(new_least, largest - new_least)
+    new = np.array([new_least, min(new_lowest + share * (largest - new_lowest), largest), largest])
+    order = np.argsort(np.argsort(moments, kind="stable"), kind="stable")
+    return changed(scene, body={"inertia": tuple(new[order].tolist())})
 
 
 def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Scenario:

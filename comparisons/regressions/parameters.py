@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.model import Damping
 from dropspin.scenarios.rotations import about, rotate
+from dropspin.scenarios.variations import with_values
 
 Change = Callable[[Scenario, float], Scenario | None]
 """From a scene and the size of an error to the scene with it: the scene itself if it does not have the parameter, None if no scene can have
@@ -23,16 +25,17 @@ class Parameter(NamedTuple):
     change: Change
 
 
-def _restitution(scene: Scenario, share: float) -> Scenario:
-    if scene.floor is None or not scene.floor.restitution:
-        return scene
-    return scene.model_copy(update={"floor": scene.floor.model_copy(update={"restitution": (1.0 + share) * scene.floor.restitution})})
+def _scaled(table: str, name: str) -> Change:
+    """A number of a table times 1 + share, also beyond the values that a scene may have."""
 
+    def change(scene: Scenario, share: float) -> Scenario:
+        old = getattr(scene, table)
+        value = getattr(old, name, None)
+        if not value or isinstance(value, str):
+            return scene
+        return scene.model_copy(update={table: old.model_copy(update={name: (1.0 + share) * value})})
 
-def _friction(scene: Scenario, share: float) -> Scenario:
-    if scene.floor is None or isinstance(scene.floor.friction, str) or not scene.floor.friction:
-        return scene
-    return scene.model_copy(update={"floor": scene.floor.model_copy(update={"friction": (1.0 + share) * scene.floor.friction})})
+    return change
 
 
 def _with_gravity(scene: Scenario, acceleration: NDArray[np.float64]) -> Scenario:
@@ -45,15 +48,6 @@ def _tilted(axis: tuple[float, float, float]) -> Change:
     return lambda scene, angle: _with_gravity(scene, rotate(about(np.array(axis), np.array(angle)), scene.acceleration))
 
 
-def _damping(which: str) -> Change:
-    def change(scene: Scenario, share: float) -> Scenario:
-        if scene.damping is None or not getattr(scene.damping, which):
-            return scene
-        return scene.model_copy(update={"damping": scene.damping.model_copy(update={which: (1.0 + share) * getattr(scene.damping, which)})})
-
-    return change
-
-
 def _added_damping(which: str) -> Change:
     def change(scene: Scenario, rate: float) -> Scenario | None:
         if scene.floor is not None or rate < 0.0 or (scene.damping is not None and getattr(scene.damping, which)):
@@ -64,33 +58,27 @@ def _added_damping(which: str) -> Change:
 
 
 def _mass(scene: Scenario, share: float) -> Scenario:
-    moments = tuple(map(float, np.diag(scene.body.inertia_tensor)))
-    body = type(scene.body)(**scene.body.model_dump() | {"mass": (1.0 + share) * scene.body.mass, "inertia": moments})
-    return scene.model_copy(update={"body": body})
+    return with_values(scene, "body", mass=lambda mass: (1.0 + share) * mass, inertia=scene.body.moments)
 
 
 def _moments(*wrong: int) -> Change:
     def change(scene: Scenario, share: float) -> Scenario | None:
-        tensor = scene.body.inertia_tensor
-        if np.count_nonzero(tensor - np.diag(np.diag(tensor))):
+        moments = np.array(scene.body.moments) * (1.0 + share * np.isin(np.arange(3), wrong))
+        if not is_diagonal(scene.body.inertia_tensor) or 2.0 * moments.max() > moments.sum():  # no body has these moments
             return None
-        moments = np.diag(tensor) * (1.0 + share * np.isin(np.arange(3), wrong))
-        if 2.0 * moments.max() > moments.sum():  # no body has these moments
-            return None
-        body = type(scene.body)(**scene.body.model_dump() | {"inertia": tuple(map(float, moments))})
-        return scene.model_copy(update={"body": body})
+        return with_values(scene, "body", inertia=tuple(moments.tolist()))
 
     return change
 
 
 PARAMETERS = (
-    Parameter("restitution", "1", _restitution),
-    Parameter("Coulomb coefficient", "1", _friction),
+    Parameter("restitution", "1", _scaled("floor", "restitution")),
+    Parameter("Coulomb coefficient", "1", _scaled("floor", "friction")),
     Parameter("gravity", "1", lambda scene, share: _with_gravity(scene, (1.0 + share) * scene.acceleration)),
     Parameter("direction of gravity", "rad", _tilted((1.0, 0.0, 0.0))),
     Parameter("direction of gravity", "rad", _tilted((0.0, 0.0, 1.0))),
-    Parameter("linear damping", "1", _damping("linear")),
-    Parameter("angular damping", "1", _damping("angular")),
+    Parameter("linear damping", "1", _scaled("damping", "linear")),
+    Parameter("angular damping", "1", _scaled("damping", "angular")),
     Parameter("linear damping", "1/s", _added_damping("linear")),
     Parameter("angular damping", "1/s", _added_damping("angular")),
     Parameter("mass", "1", _mass),

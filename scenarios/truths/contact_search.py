@@ -53,19 +53,20 @@ class Contact:
     is_decided: bool
 
 
-@dataclass(frozen=True, eq=False)
 class ContactSearch:
     """The search in one flight.
 
-    Attributes:
+    Args:
         flight: The flight.
         points: Corners of the body's convex hull, from the centre of mass in the body [m], shape (n, 3).
         rounding: Rounding radius of the corners [m].
     """
 
-    flight: Flight
-    points: Array
-    rounding: float
+    def __init__(self, flight: Flight, points: Array, rounding: float) -> None:
+        self.flight, self.points, self.rounding = flight, points, rounding
+        self._gravity = float(flight.acceleration[1])
+        self._reach = float(np.linalg.norm(points, axis=1).max())
+        self._size = self._reach + rounding
 
     def next_contact(self, duration: float) -> Contact | None:
         """The next time at which a corner passes through the floor downwards; None if there is none within `duration` [s].
@@ -98,18 +99,6 @@ class ContactSearch:
             bound: Array = math.hypot(spin[0], spin[2]) * np.linalg.norm(moving, axis=1)
             return bound
         return (1.0 + ANGULAR_ACCELERATION) * rotor.largest_spin**2 * np.linalg.norm(self.points, axis=1)
-
-    @cached_property
-    def _reach(self) -> float:
-        return float(np.linalg.norm(self.points, axis=1).max())
-
-    @cached_property
-    def _size(self) -> float:
-        return self._reach + self.rounding
-
-    @cached_property
-    def _gravity(self) -> float:
-        return float(self.flight.acceleration[1])
 
     def _within_reach(self, duration: float) -> list[tuple[float, float]]:
         """The intervals [s] in which the centre of mass is low enough for a corner to touch the floor."""

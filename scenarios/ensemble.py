@@ -1,16 +1,17 @@
 """The random initial states of an ensemble, for scenes whose single trajectories are too sensitive to be compared."""
 
+import hashlib
 import math
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.drawing import uniform
 from dropspin.scenarios.model import Ensemble, Scenario, unit
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, RATES, Array
 
+DRAWS_PER_BLOCK = 1024  # generated together, however many of them are requested
 GRID_SIZE = 4001  # angles at which the distribution is tabulated
 SERIES_BELOW = 0.1  # rad; below it θ - sin θ is computed by its series
 RATE_DRAWS = tuple(f"{kind} {axis}" for kind in ("velocity", "angular velocity") for axis in "xyz")
@@ -121,3 +122,19 @@ def _at_clearance_of(member: Scenario, scene: Scenario) -> Array:
     start = member.initial_state
     start[1] += scene.clearance - member.clearance
     return start
+
+
+def uniform(seed: int, purpose: str, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The draws with these numbers, uniform over [0, 1), shape (len(numbers),).
+
+    A draw depends on the seed, on the purpose of the draws and on its number, but not on how many there are. They come from a counter-based
+    generator (Philox-4x64; J. K. Salmon et al., SC 2011), which computes any draw without the previous ones.
+    """
+    key = int.from_bytes(hashlib.sha256(f"{seed} {purpose}".encode()).digest()[:16], "little")
+    drawn = np.empty(len(numbers))
+    for block in np.unique(numbers // DRAWS_PER_BLOCK):
+        counting = np.random.Philox(key=key)
+        counting.advance(int(block) * DRAWS_PER_BLOCK // 4)  # four draws to a count
+        here = numbers // DRAWS_PER_BLOCK == block
+        drawn[here] = np.random.Generator(counting).random(DRAWS_PER_BLOCK)[numbers[here] - block * DRAWS_PER_BLOCK]
+    return drawn

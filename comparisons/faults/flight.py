@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, axis_names, changed_table, faults_of
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.model import Gravity
+from dropspin.scenarios.variations import with_values
 
 Array = NDArray[np.float64]
 
@@ -17,11 +19,8 @@ ORDERS = [order for order in permutations(range(3)) if order != (0, 1, 2)]
 
 
 def _gravity(change: Callable[[Array], Array]) -> Simulated:
-    def changed(scene: Scenario) -> Scenario:
-        acceleration = tuple(float(value) for value in change(scene.acceleration))
-        return scene.model_copy(update={"gravity": Gravity(acceleration=acceleration)})
-
-    return changed
+    """The scene with a function of its gravity, also if it has none."""
+    return lambda scene: scene.model_copy(update={"gravity": Gravity(acceleration=tuple(map(float, change(scene.acceleration))))})
 
 
 def _standard_gravity(*direction: float) -> Simulated:
@@ -33,23 +32,16 @@ def _gravity_along(*direction: float) -> Simulated:
 
 
 def _gravity_by_mass(power: float) -> Simulated:
-    def changed(scene: Scenario) -> Scenario:
-        return _gravity(lambda g: g * scene.body.mass**power)(scene)
-
-    return changed
+    return lambda scene: _gravity(lambda g: g * scene.body.mass**power)(scene)
 
 
 def _angular_like_linear(scene: Scenario) -> Scenario:
-    return scene if scene.damping is None else changed_table("damping", angular=scene.damping.linear)(scene)
+    return with_values(scene, "damping", angular=scene.damping and scene.damping.linear)
 
 
 def _scaled_inertia(by: Callable[[float], float]) -> Simulated:
     """Moments of inertia times a function of the mass."""
-
-    def scaled(scene: Scenario) -> Scenario:
-        return changed_table("body", inertia=tuple(by(scene.body.mass) * moment for moment in scene.body.moments))(scene)
-
-    return scaled
+    return lambda scene: with_values(scene, "body", inertia=times(by(scene.body.mass), scene.body.moments))
 
 
 def _permuted_moments(order: tuple[int, ...]) -> Simulated:
@@ -61,7 +53,7 @@ def _as_a_ball(scene: Scenario) -> Scenario:
     if scene.floor is not None:
         return scene
     mean = float(np.trace(scene.body.inertia_tensor)) / 3.0
-    return changed_table("body", inertia=(mean, mean, mean))(scene)
+    return with_values(scene, "body", inertia=(mean, mean, mean))
 
 
 FLIGHT = (

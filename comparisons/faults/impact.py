@@ -8,6 +8,7 @@ from dropspin.comparisons.faults.fault_model import Simulated, axis_names, chang
 from dropspin.comparisons.faults.flight import ORDERS
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box
+from dropspin.scenarios.variations import with_values
 
 SLOW = 0.2  # m/s; Bullet drops restitution below it
 
@@ -26,7 +27,7 @@ def _permuted_extents(order: tuple[int, ...]) -> Simulated:
         if not isinstance(scene.body, Box):
             return scene
         extents = [scene.body.half_extents[axis] for axis in order]
-        return changed_table("body", half_extents=extents, inertia=scene.body.moments)(scene)
+        return with_values(scene, "body", half_extents=extents, inertia=scene.body.moments)
 
     return permuted
 
@@ -38,7 +39,7 @@ def _scaled(size: str, by: float) -> Simulated:
         if scene.floor is None or size not in type(scene.body).model_fields:
             return scene
         larger = {size: lambda given: np.multiply(given, by).tolist()}
-        return changed_table("body", inertia=scene.body.moments, **larger)(scene)
+        return with_values(scene, "body", inertia=scene.body.moments, **larger)
 
     return scaled
 

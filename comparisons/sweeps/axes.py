@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.drawing import uniform
+from dropspin.scenarios.ensemble import uniform
 
 Indices = NDArray[np.int64]
 Spacing = Literal["linear", "log"]

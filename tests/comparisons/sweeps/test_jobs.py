@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from dropspin.comparisons.sweeps.axes import Drawn, Spaced
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.scenarios import DropspinError, load
-from dropspin.scenarios.drawing import uniform
-from dropspin.scenarios.ensemble import spread_start, spread_starts
+from dropspin.scenarios.ensemble import spread_start, spread_starts, uniform
 from dropspin.scenarios.loading import CATALOGUE
 from dropspin.scenarios.state import ORIENTATION, RATES
 

@@ -33,9 +33,9 @@ SWEEP = {
 
 STAGES = {
     "timing of steps": [("run", "_timings")],
-    "exact motions": [("scene_run", "phases_at"), ("studies", "phases_at")],
-    "metrics": [(module, name) for module in ("scene_run", "studies") for name in ("compare", "measure")],
-    "judging over time steps": [("studies", "study_convergence")],
+    "exact motions": [(module, "phases_at") for module in ("scene_run", "engine_study")],
+    "metrics": [("engine_study", "compare"), ("engine_study", "measure"), ("scene_run", "compare")],
+    "judging over time steps": [("engine_study", "convergence")],
 }
 """Functions of `dropspin.comparisons.running`, by the stage of a run whose time they take."""
 

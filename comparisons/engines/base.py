@@ -253,6 +253,11 @@ def refusal_of_floor(scene: Scenario, kind: str) -> str | None:
     return f"the floor is a {kind} of {2 * FLOOR_HALF_SIZE:g} m, and the body may leave it"
 
 
+def engine_name(label: str) -> str:
+    """The name of an engine without the options in its label."""
+    return label.partition("[")[0]
+
+
 def calibrated_label(label: str) -> str | None:
     """The label of the calibrated profile of an engine whose label has profile=default; None for any other label."""
     name, _, listed = label.removesuffix("]").partition("[")

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dropspin.comparisons.judging.horizon import with_horizon
-from dropspin.comparisons.judging.verdicts import Basis, Judgement
-from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.judging.judge import joined, remark_on_horizon
+from dropspin.comparisons.judging.verdicts import Basis, Judgement, Verdict
+from dropspin.comparisons.measuring.comparison import BeyondHorizon, Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.scenarios import Scenario, Trajectory, Truth
@@ -38,13 +38,13 @@ def judge_agreement(
     for metric in METRICS.values():
         if not (metric.agreement and metric.applies(scene, truth or _as_truth(second[0].motion))):
             continue
-        unresolved: Unresolved | None = None
         try:
-            judgement = Judgement(metric.average(pairs).value, "measured", reason=reason, basis=basis)
+            value, remark = metric.average(pairs).value, remark_on_horizon(scene, truth, metric)
+            judgement = Judgement(value, "measured", reason=joined(reason, remark), basis=basis)
         except Unresolved as error:
-            unresolved = error
-            judgement = Judgement(np.nan, "measured", cause="unresolved", reason="; ".join(filter(None, [reason, str(error)])), basis=basis)
-        yield metric, with_horizon(judgement, scene, metric, truth, unresolved)
+            verdict: Verdict = "no_truth" if isinstance(error, BeyondHorizon) else "measured"
+            judgement = Judgement(np.nan, verdict, cause="unresolved", reason=joined(reason, str(error)), basis=basis)
+        yield metric, judgement
 
 
 def _paired(truth: Truth | None, one: Comparison, other: Comparison) -> Comparison:

@@ -1,8 +1,6 @@
-"""Convergence over several time steps: the observed order, the asymptotic error as dt → 0, and the cause of each error.
+"""Convergence over several time steps: the error budget of a metric, corrected by that of its components.
 
-Two checks apply to every engine, in addition to the expectations of the scene: the interval of the asymptotic error must contain 0, and
-the interval of the observed order must reach the claimed order. If the scene expects a fault of this engine by name, the result is
-`known` as long as the asymptotic error is within the expected bounds.
+The error at each step is the average over start phases that is largest at the finest step.
 """
 
 import math
@@ -15,7 +13,7 @@ from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.judging.error_budget import ErrorBudget, error_budget, is_sufficient, vector_budget
-from dropspin.comparisons.judging.verdicts import Cause, Judgement, Verdict, judge_asymptotic_error, with_limitations
+from dropspin.comparisons.measuring.comparison import Unresolved
 from dropspin.comparisons.measuring.metric import Average, Metric
 from dropspin.comparisons.measuring.tolerances import negligible, rounding
 from dropspin.scenarios import Scenario
@@ -50,63 +48,77 @@ class Claim(NamedTuple):
 
 
 class SeriesPoint(NamedTuple):
-    """A metric at one time step: dt [s], number of steps, averages of metric and components over start phases, tolerance."""
+    """A metric at one time step.
+
+    Attributes:
+        dt: The time step [s].
+        steps: Number of steps.
+        average: Averages of the metric over start phases; NaN if it is unresolved.
+        components: Averages of its components; None for a metric that is not the length of a vector, or is unresolved.
+        tolerance: The largest difference between two runs that does not count as a change; NaN in a quick run.
+        noise: How far the few starts of a quick run may move the value; 0 otherwise.
+        rounded: The distance from a bound that rounding in single precision may cause; 0 in double precision.
+        unresolved: Why the time step does not resolve the metric.
+    """
 
     dt: float
     steps: int
     average: Average
     components: Average | None
     tolerance: float
+    noise: float = 0.0
+    rounded: float = 0.0
+    unresolved: Unresolved | None = None
 
 
 @dataclass(frozen=True)
-class ConvergenceStudy:
-    """The convergence of one metric: the cause of its errors, and the judgements of its order and asymptotic error, if there are any."""
+class Convergence:
+    """The error budget of a metric over several time steps.
 
-    cause: Cause
-    order: Judgement | None
-    asymptotic_error: Judgement | None
+    Attributes:
+        budget: The cause, the order and the asymptotic error.
+        finest: The finest time step [s].
+        order_tolerance: The change of the order if each error to which it is fitted changes by its tolerance.
+        is_open: Whether more time steps may decide the cause.
+        remark: Which time steps or options were added to the requested ones.
+    """
+
+    budget: ErrorBudget
+    finest: float
+    order_tolerance: float = math.nan
     is_open: bool = False
-    """Whether more time steps may decide the cause."""
-
-    @property
-    def fails(self) -> bool:
-        """Whether the asymptotic error fails as a model error."""
-        return self.cause == "model" and self.asymptotic_error is not None and self.asymptotic_error.verdict == "failed"
+    remark: str = ""
 
 
-def study_convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> ConvergenceStudy:
-    """The observed order and the asymptotic error of one metric of an engine, judged.
+def convergence(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint], remark: str = "") -> Convergence:
+    """The error budget of one metric of an engine.
 
     Args:
         scene: The scene.
         claim: The properties that the engine declares.
         metric: The metric.
         series: The metric at each time step.
+        remark: Which time steps were added.
     """
     dts, errors, resolutions, rounded = _worst_part(scene, claim, metric, series)
     if metric.name in JUMPING:  # the step changes it by chance, as far as it has changed it at all
         resolutions = np.maximum(resolutions, np.nanmax(errors, initial=-math.inf) - np.nanmin(errors, initial=math.inf))
     floor = negligible(scene, metric.unit)
-    found = error_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, rounded, signed=metric.signed, negligible=floor)
+    length = error_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, rounded, signed=metric.signed, negligible=floor)
     vector = _budget_of_components(scene, claim, metric, series, np.isfinite(errors), rounded)
-    if vector is not None:
-        found = _with_components(found, vector, finest=abs(float(errors[np.argmin(dts)])))
-    order, limit = _judge_order(claim, metric, found), None
-    if order is not None and found.dts:
-        order = replace(order, tolerance=_order_tolerance(found, dts, errors, np.array([point.tolerance for point in series])))
-    if not math.isnan(found.asymptotic_error):
-        # What the steps leave open is not compared with another run's.
-        tolerance = math.nan if found.cause == "unresolved" else found.upper - found.lower
-        limit = Judgement(found.asymptotic_error, "measured", found.lower, found.upper, found.cause, found.reason, tolerance)
-        limit = judge_asymptotic_error(scene, claim.label, float(np.min(dts)), metric, limit)
-        limit = with_limitations(limit, metric.name, claim.limitations, least=max(found.lower, -found.upper))
+    found = length if vector is None else _corrected(length, vector, finest=abs(float(errors[np.argmin(dts)])))
+    order_tolerance = math.nan
+    if found.dts and metric.name not in JUMPING:
+        used = np.isin(dts, found.dts)
+        logs = np.log(dts[used]) - np.mean(np.log(dts[used]))
+        shares = np.array([point.tolerance for point in series])[used] / np.abs(errors[used])
+        order_tolerance = float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
     is_undecided = found.cause == "unresolved" or (found.cause == "discretisation" and vector is not None and vector.cause == "unresolved")
     is_open = is_undecided and not math.isnan(found.asymptotic_error) and float(np.nanmax(np.abs(errors))) > floor
-    return ConvergenceStudy(found.cause, order, limit, is_open)
+    return Convergence(found, float(np.min(dts)), order_tolerance, is_open, remark)
 
 
-def _with_components(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
+def _corrected(length: ErrorBudget, vector: ErrorBudget, finest: float) -> ErrorBudget:
     """The error budget of a length, corrected by that of its components; `finest` is the error at the finest time step."""
     if vector.cause == "model" and length.cause in ("discretisation", "unresolved"):
         # The length is largest at another time than that of the components, so it may be larger than they are.
@@ -117,46 +129,6 @@ def _with_components(length: ErrorBudget, vector: ErrorBudget, finest: float) ->
         return ErrorBudget("unresolved", reason, length.asymptotic_error, 0.0, max(length.upper, vector.upper))
     # The length is at least that of the components at their time.
     return length if length.cause == "model" else replace(length, upper=max(length.upper, vector.upper))
-
-
-def attributed_to_setting(study: ConvergenceStudy, calibrated: ConvergenceStudy | None) -> ConvergenceStudy:
-    """The convergence with default settings; a model error that calibrated settings exclude is a setting error."""
-    if study.cause != "model" or study.asymptotic_error is None or calibrated is None or calibrated.asymptotic_error is None:
-        return study
-    own, other = study.asymptotic_error, calibrated.asymptotic_error
-    if max(-other.lower, other.upper) >= max(own.lower, -own.upper):
-        return study
-    cured = ", but the calibrated profile has none or a smaller one: it is a setting" if own.verdict == "failed" else ""
-    order = None if study.order is None else replace(study.order, cause="setting")
-    return ConvergenceStudy("setting", order, replace(own, cause="setting", reason=own.reason + cured))
-
-
-def attributed_to_accuracy(study: ConvergenceStudy, refined: ConvergenceStudy | None, options: str, path: str) -> ConvergenceStudy:
-    """The convergence over time steps.
-
-    An error that vanishes only if accuracy options are refined too is attributed to these options.
-
-    Args:
-        study: The convergence over time steps alone.
-        refined: The convergence over time steps that were refined together with the options.
-        options: Names of the options.
-        path: The values of the options and the time steps, as text.
-    """
-    if study.cause not in ("model", "unresolved") or study.asymptotic_error is None:
-        return study
-    limit = None if refined is None else refined.asymptotic_error
-    if limit is None:
-        limit, cause, reason = study.asymptotic_error, "unresolved", f"too few usable time steps with finer {options}"
-    elif limit.cause in ("model", "unresolved"):
-        cause, reason = limit.cause, limit.reason
-    else:
-        cause, reason = options, f"vanishes with finer {options}"
-    if cause == "model":
-        return study
-    verdict: Verdict = "measured" if cause == "unresolved" else "passed"
-    return replace(
-        study, cause=cause, order=None, asymptotic_error=replace(limit, verdict=verdict, cause=cause, reason=f"{reason} ({path})")
-    )
 
 
 def _worst_part(scene: Scenario, claim: Claim, metric: Metric, series: Sequence[SeriesPoint]) -> tuple[Array, Array, Array, Array]:
@@ -196,22 +168,3 @@ def _budget_of_components(
     errors, resolutions = (np.array([components[field][longest] for _, components, _ in kept]) for field in range(2))
     dts, largest = (np.array([one[field] for one in kept]) for field in (0, 2))
     return vector_budget(dts, errors, claim.order, STANDARD_DEVIATIONS * resolutions, largest, negligible(scene, metric.unit))
-
-
-def _order_tolerance(found: ErrorBudget, dts: Array, errors: Array, tolerances: Array) -> float:
-    """The change of the order if each error to which it is fitted changes by its tolerance."""
-    used = np.isin(dts, found.dts)
-    logs = np.log(dts[used]) - np.mean(np.log(dts[used]))
-    shares = tolerances[used] / np.abs(errors[used])
-    return float(np.sum(np.abs(logs) * shares) / np.sum(logs**2))
-
-
-def _judge_order(claim: Claim, metric: Metric, found: ErrorBudget) -> Judgement | None:
-    claimed = claim.order if found.cause == "discretisation" else None
-    if metric.name in JUMPING or (math.isnan(found.order) and claimed != math.inf):
-        return None
-    verdict: Verdict = "measured" if claimed is None else "passed" if found.order_upper >= claimed else "failed"
-    steps = ", ".join(f"{dt:g}" for dt in found.dts)
-    claim_text = "" if claimed is None else f"; claimed {'exactness' if claimed == math.inf else f'{claimed:g}'}"
-    reason = f"fitted at {steps} s{claim_text}" if steps else f"{found.reason}{claim_text}"
-    return Judgement(found.order, verdict, found.order_lower, found.order_upper, found.cause, reason)

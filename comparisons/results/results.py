@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, SEVERITY, WORDS
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, MARKS, VERDICTS, WORDS
 from dropspin.comparisons.measuring.metrics import leading_metric
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.ensembles import EnsembleOutcome
@@ -122,14 +122,14 @@ class Results:
         is_small = (verdicts == "known") & ~(table["value"].abs() > SMALLEST_STATED)
         explains_nothing = (verdicts == "limited") & (table["metric"] == "")
         of_rows = {
-            "severity": verdicts.map(SEVERITY.index).where(~(is_small | explains_nothing)),
+            "severity": verdicts.map(VERDICTS.index).where(~(is_small | explains_nothing)),
             "of_model": (verdicts == "known") & (table["cause"] == "model"),
             "studied": table["kind"] == "asymptotic_error",
             "undecided": is_undecided(table) & ~table["metric"].isin(JUMPING),
         }
         by_pair = table[["scene", "engine"]].assign(**of_rows).groupby(["scene", "engine"])
         found = {
-            (str(scene), str(engine)): _status(SEVERITY[int(severity)], *flags)
+            (str(scene), str(engine)): _status(VERDICTS[int(severity)], *flags)
             for (scene, engine), severity, *flags in by_pair.agg({"severity": "min"} | dict.fromkeys(list(of_rows)[1:], "any")).itertuples()
         }
         absent = Status("missing", "missing")

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.stand_in import code_of
-from dropspin.comparisons.judging.verdicts import verify_expectations
+from dropspin.comparisons.judging.judge import verify_expectations
 from dropspin.comparisons.measuring.batch import compile_states
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import metrics_for

@@ -12,7 +12,7 @@ import numpy as np
 from dropspin.comparisons.engines.base import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 from dropspin.comparisons.results.results import SMALLEST_STATED, UNDECIDED, Results, Status, is_undecided, relative_sizes
 from dropspin.reports.stories.leading_errors import step_times
 from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, quantity
@@ -229,7 +229,7 @@ def _convergence(results: Results, engine: str, statuses: Mapping[str, Status], 
     """The number of scenes in which an engine converges, the number with each other status, and the largest known or remaining error."""
     mine = results.table[results.table["engine"] == engine]
     kinds: Counter[str] = Counter()
-    for scene, status in sorted(statuses.items(), key=lambda item: -SEVERITY.index(item[1].verdict)):
+    for scene, status in sorted(statuses.items(), key=lambda item: -VERDICTS.index(item[1].verdict)):
         kinds["setting error" if scene in remain and status.verdict in CONVERGING else status.words] += 1
     declined = kinds.pop("declined", 0)
     others = [f"{kind} in {count}" for kind, count in kinds.items() if kind != "converges"] + [f"declines {declined}"] * bool(declined)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, SEVERITY
+from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 from dropspin.comparisons.results.results import UNDECIDED, Results, Status
 from dropspin.reports.stories.leading_errors import leading_errors
 from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
@@ -56,7 +56,7 @@ def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
     """The meaning of each mark, least severe first; one mark stands for known model errors and other known faults."""
     shown = [status for by_engine in statuses.values() for status in by_engine.values()]
     meant = {(status.verdict, status.mark, "known error" if status.verdict == "known" else status.words) for status in shown}
-    marks = sorted(((SEVERITY.index(verdict), mark, words) for verdict, mark, words in meant), reverse=True)
+    marks = sorted(((VERDICTS.index(verdict), mark, words) for verdict, mark, words in meant), reverse=True)
     words: dict[str, dict[str, None]] = {}
     for _, mark, status in marks:
         words.setdefault(mark, {})[status] = None
@@ -68,7 +68,7 @@ def _shown(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str
     if len(statuses) <= MOST_SCENES:
         return list(statuses), ""
     found = [scene for scene, by_engine in statuses.items() if any(map(_is_finding, by_engine.values()))]
-    worst = sorted(found, key=lambda scene: min(SEVERITY.index(status.verdict) for status in statuses[scene].values()))[:MOST_SCENES]
+    worst = sorted(found, key=lambda scene: min(VERDICTS.index(status.verdict) for status in statuses[scene].values()))[:MOST_SCENES]
     fine, more = len(statuses) - len(found), len(found) - len(worst)
     left_out = [f"{fine} in which no engine has a finding"] * bool(fine) + [f"{more} with less severe findings"] * bool(more)
     return [scene for scene in statuses if scene in worst], f"Scenes not shown: {', '.join(left_out)}."

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dropspin.comparisons.engines.base import EngineBroken
-from dropspin.comparisons.judging.verdicts import verify_expectations
+from dropspin.comparisons.judging.judge import verify_expectations
 from dropspin.reports.stories.numbers import bound
 from dropspin.reports.stories.scene import left_out, modelled
 from dropspin.scenarios import Scenario, Truth, truth_for

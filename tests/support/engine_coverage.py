@@ -12,7 +12,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.registry import engine as engine_named
-from dropspin.comparisons.judging.convergence import ARTEFACTS, DESYNCHRONISED, JUMPING, SATURATION, Claim, SeriesPoint, study_convergence
+from dropspin.comparisons.judging.convergence import ARTEFACTS, DESYNCHRONISED, JUMPING, SATURATION, Claim, SeriesPoint, convergence
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.metrics import metrics_for
@@ -135,11 +135,10 @@ def _judged(scene: Scenario, engine: Engine, metric: Metric, points: list[Series
         largest = DESYNCHRONISED * scene.clearance
     if not negligible(scene, metric.unit) < abs(m) < largest:
         return
-    study = study_convergence(scene, Claim(engine.label, engine.order_in(scene), engine.precision), metric, points)
-    if study.asymptotic_error is None:
+    found = convergence(scene, Claim(engine.label, engine.order_in(scene), engine.precision), metric, points).budget
+    if math.isnan(found.asymptotic_error):
         return
-    found = study.asymptotic_error
     width = (found.upper - found.lower) / abs(float(errors[-1])) if errors[-1] else math.nan
     is_covered = found.lower <= m <= found.upper
-    name = f"{scene.name} {engine.label} {metric.name} {errors} m={m:.6g} [{found.lower:.6g}, {found.upper:.6g}] {study.cause}"
-    yield name, Outcome(m, is_covered, study.cause, width, abs(m) > LARGE * abs(float(errors[0])))
+    name = f"{scene.name} {engine.label} {metric.name} {errors} m={m:.6g} [{found.lower:.6g}, {found.upper:.6g}] {found.cause}"
+    yield name, Outcome(m, is_covered, found.cause, width, abs(m) > LARGE * abs(float(errors[0])))

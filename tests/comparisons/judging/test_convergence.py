@@ -7,7 +7,8 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from dropspin.comparisons.judging.convergence import Claim, SeriesPoint, study_convergence
+from dropspin.comparisons.judging.convergence import Claim, SeriesPoint, convergence
+from dropspin.comparisons.judging.judge import judge_asymptotic_error, judge_order
 from dropspin.comparisons.measuring.metric import Average
 
 STEPS = [8e-3, 4e-3, 2e-3]
@@ -66,9 +67,10 @@ def test_irregular_convergence_is_no_model_error():
     series = [
         SeriesPoint(dt, scene.steps(dt), average([length]), average([components]), 3e-8) for dt, (length, *components) in measured.items()
     ]
-    found = study_convergence(scene, Claim("pybullet", None, np.float64), ds.METRICS["orientation_error"], series)
-    assert (found.cause, found.asymptotic_error.verdict) == ("unresolved", "measured")
-    assert "no component grows" in found.asymptotic_error.reason
+    claim, metric = Claim("pybullet", None, np.float64), ds.METRICS["orientation_error"]
+    error = judge_asymptotic_error(scene, claim, metric, convergence(scene, claim, metric, series))
+    assert (error.cause, error.verdict) == ("unresolved", "measured")
+    assert "no component grows" in error.reason
 
 
 def average(parts):
@@ -176,9 +178,10 @@ def test_claim_of_exactness_fails_where_an_error_has_no_order():
     """It vanishes and changes its sign, so that no power of the time step can be fitted."""
     parts = [np.array([[value]]) for value in (1e-2, 1e-5, -1e-6)]
     series = [SeriesPoint(dt, 100, Average(part, 0.0 * part, 0.0 * part), None, 0.0) for dt, part in zip(STEPS, parts, strict=True)]
-    found = study_convergence(ds.load("spin-principal"), Claim("made", math.inf, np.float64), ds.METRICS["energy_error"], series)
-    assert found.order.verdict == "failed"
-    assert math.isnan(found.order.tolerance)
+    claim, metric = Claim("made", math.inf, np.float64), ds.METRICS["energy_error"]
+    order = judge_order(claim, metric, convergence(ds.load("spin-principal"), claim, metric, series))
+    assert order.verdict == "failed"
+    assert math.isnan(order.tolerance)
 
 
 def test_exact_engine_has_rounding_errors_only():

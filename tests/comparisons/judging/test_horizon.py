@@ -6,9 +6,10 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from dropspin.comparisons.judging.horizon import with_horizon
-from dropspin.comparisons.judging.verdicts import Judgement
+from dropspin.comparisons.judging.convergence import Claim, SeriesPoint
+from dropspin.comparisons.judging.judge import judge
 from dropspin.comparisons.measuring.comparison import BeyondHorizon, Unresolved
+from dropspin.comparisons.measuring.metric import Average
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.scenarios import truth_for
 
@@ -57,14 +58,16 @@ def test_solution_of_too_few_steps_leaves_rows_without_a_truth():
 
 
 @pytest.mark.parametrize(
-    ("verdict", "unresolved", "expected"),
+    ("expected", "unresolved", "verdict"),
     [
-        ("measured", BeyondHorizon("short"), "no_truth"),
-        ("failed", BeyondHorizon("short"), "failed"),  # an expectation is not lost
-        ("measured", Unresolved("coarse"), "measured"),
+        ([], BeyondHorizon("short"), "no_truth"),
+        ([{"metric": "position_error", "below": 1.0, "reason": "why"}], BeyondHorizon("short"), "failed"),  # an expectation is not lost
+        ([], Unresolved("coarse"), "measured"),
     ],
 )
-def test_only_a_value_that_the_horizon_hides_has_no_truth(verdict, unresolved, expected):
-    scene = spinning()
-    judgement = with_horizon(Judgement(np.nan, verdict, reason="why"), scene, METRICS["position_error"], truth_for(scene), unresolved)
-    assert (judgement.verdict, judgement.reason) == (expected, "why")
+def test_only_a_value_that_the_horizon_hides_has_no_truth(expected, unresolved, verdict):
+    scene = spinning(expect=expected)
+    point = SeriesPoint(0.01, 1200, Average(*np.full((3, 1), np.nan)), None, 0.0, unresolved=unresolved)
+    judgement = judge(scene, truth_for(scene), Claim("mine", None, np.float64), METRICS["position_error"], point)
+    assert (judgement.verdict, judgement.cause) == (verdict, "unresolved")
+    assert "compared up to" not in judgement.reason

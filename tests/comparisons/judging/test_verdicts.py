@@ -2,17 +2,15 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from dropspin import scenarios
 from dropspin.comparisons.engines.base import KnownLimitation
-from dropspin.comparisons.judging.verdicts import (
-    Judgement,
-    judge,
-    judge_asymptotic_error,
-    verify_expectations,
-    with_limitations,
-)
+from dropspin.comparisons.judging.convergence import Claim, Convergence, SeriesPoint
+from dropspin.comparisons.judging.error_budget import ErrorBudget
+from dropspin.comparisons.judging.judge import compared_with_expectations, judge, judge_asymptotic_error, verify_expectations
+from dropspin.comparisons.measuring.metric import Average
 from dropspin.comparisons.measuring.metrics import METRICS
 
 
@@ -22,7 +20,7 @@ def scene_that_expects(*expectations):
 
 
 def verdict(scene, value, metric="energy_error", engine="mine", dt=1e-3):
-    return judge(scene, engine, dt, METRICS[metric], value).verdict
+    return compared_with_expectations(scene, engine, dt, METRICS[metric], value).verdict
 
 
 def test_below_bounds_a_signed_metric_on_both_sides():
@@ -30,7 +28,7 @@ def test_below_bounds_a_signed_metric_on_both_sides():
     scene = scene_that_expects({"metric": "energy_error", "below": 0.1})
     values = {0.1: "passed", -0.1: "passed", 0.11: "failed", -0.11: "failed", math.nan: "failed", math.inf: "failed"}
     assert {value: verdict(scene, value) for value in values} == values
-    judgement = judge(scene, "mine", 1e-3, METRICS["energy_error"], 0.0)
+    judgement = compared_with_expectations(scene, "mine", 1e-3, METRICS["energy_error"], 0.0)
     assert (judgement.lower, judgement.upper, judgement.reason) == (-0.1, 0.1, "why")
 
 
@@ -59,7 +57,7 @@ def test_narrowest_expectation_binds(engine, dt, limit):
         {"metric": "energy_error", "below": 2, "engine": "known"},
         {"metric": "energy_error", "below": 1, "engine": "known", "dt": [1e-3, 5e-4]},
     )
-    assert judge(scene, engine, dt, METRICS["energy_error"], 0.0).upper == limit
+    assert compared_with_expectations(scene, engine, dt, METRICS["energy_error"], 0.0).upper == limit
 
 
 FAULT = {"metric": "energy_error", "within": [0.2, 0.3], "engine": "faulty"}
@@ -84,10 +82,10 @@ def test_fault_that_is_expected_by_name_is_known_and_never_passes(value, engine,
 
 
 def test_known_fault_that_does_not_show_is_reported():
-    judgement = judge(scene_that_expects(FAULT, FOR_ALL), "faulty", 1e-3, METRICS["energy_error"], 0.001)
+    judgement = compared_with_expectations(scene_that_expects(FAULT, FOR_ALL), "faulty", 1e-3, METRICS["energy_error"], 0.001)
     assert judgement.basis == "fault_absent"
     assert judgement.reason == "the known fault does not occur; its expectation can be removed: why"
-    alone = judge(scene_that_expects(FAULT), "faulty", 1e-3, METRICS["energy_error"], 1e-9)
+    alone = compared_with_expectations(scene_that_expects(FAULT), "faulty", 1e-3, METRICS["energy_error"], 1e-9)
     assert (alone.verdict, alone.basis) == ("passed", "fault_absent")
 
 
@@ -110,32 +108,38 @@ def test_stricter_expectation_of_one_engine_is_a_check_and_no_fault(named):
     ],
 )
 def test_model_error_is_known_if_its_interval_meets_the_expected_one(cause, interval, expected):
-    limit = Judgement(sum(interval) / 2, "measured", *interval, cause, "extrapolated")
-    found = judge_asymptotic_error(scene_that_expects(FAULT, FOR_ALL), "faulty", 1e-3, METRICS["energy_error"], limit)
+    limit = Convergence(ErrorBudget(cause, "extrapolated", sum(interval) / 2, *interval), 1e-3)
+
+    def judged(scene, engine):
+        return judge_asymptotic_error(scene, Claim(engine, None, np.float64), METRICS["energy_error"], limit)
+
+    found = judged(scene_that_expects(FAULT, FOR_ALL), "faulty")
     assert found.verdict == expected
     assert found.basis == ""  # a discretisation error that is a known fault occurs at every time step
-    assert judge_asymptotic_error(scene_that_expects(FAULT), "mine", 1e-3, METRICS["energy_error"], limit).verdict != "known"
+    assert judged(scene_that_expects(FAULT), "mine").verdict != "known"
 
 
 def test_equally_narrow_expectations_both_bind():
     """The tighter bound of each side counts."""
     scene = scene_that_expects({"metric": "energy_error", "below": 4}, {"metric": "energy_error", "within": [-9, 1]})
-    judgement = judge(scene, "mine", 1e-3, METRICS["energy_error"], 0.0)
+    judgement = compared_with_expectations(scene, "mine", 1e-3, METRICS["energy_error"], 0.0)
     assert (judgement.lower, judgement.upper) == (-4, 1)
 
 
 def test_known_limitation_excuses_failures_of_its_metric_and_size_only():
     """A failed value within the explained error is limited; a larger one, another metric and NaN stay failed."""
-    limitation = KnownLimitation("contacts slip", {"position_error": 0.02})
+    claim = Claim("mine", None, np.float64, (KnownLimitation("contacts slip", {"energy_error": 0.02}),))
+    bounds = [{"metric": name, "below": 1e-3, "reason": "too large"} for name in ("energy_error", "penetration")]
+    scene = scene_that_expects(*bounds)
 
-    def excused(value, metric="position_error", verdict="failed"):
-        return with_limitations(Judgement(value, verdict, reason="too large"), metric, [limitation])
+    def excused(value, metric="energy_error"):
+        return judge(scene, None, claim, METRICS[metric], SeriesPoint(1e-3, 1000, Average(*np.full((3, 1), value)), None, 0.0))
 
     assert (excused(-0.02).verdict, excused(0.02).reason) == ("limited", "contacts slip; too large")
-    assert [excused(0.021).verdict, excused(math.nan).verdict, excused(0.01, "energy_error").verdict] == ["failed"] * 3
-    assert excused(0.01, verdict="passed").reason == "too large"
-    uncertain = Judgement(0.021, "failed", 0.0195, 0.0225)
-    assert with_limitations(uncertain, "position_error", [limitation], least=uncertain.lower).verdict == "limited"
+    assert [excused(0.021).verdict, excused(math.nan).verdict, excused(0.01, "penetration").verdict] == ["failed"] * 3
+    assert (excused(1e-4).verdict, excused(1e-4).reason) == ("passed", "too large")
+    uncertain = Convergence(ErrorBudget("model", "extrapolated", 0.021, 0.0195, 0.0225), 1e-3)
+    assert judge_asymptotic_error(scene, claim, METRICS["energy_error"], uncertain).verdict == "limited"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,232 @@
+"""One engine in one scene: its runs at each time step, the causes of its errors, and its rows with their verdicts.
+
+`EngineStudy.cause` decides a cause, and has the order of the rules; the verdicts are those of `judging.judge`.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.judging.convergence import ADDED_STEPS, ARTEFACTS, Claim, Convergence, SeriesPoint, convergence
+from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, judge_order
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metric import Metric
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.states import States
+from dropspin.comparisons.results.provenance import motion_digest
+from dropspin.comparisons.results.table import Case, Measurement
+from dropspin.comparisons.running.engine_run import EngineRun, Timing
+from dropspin.comparisons.running.entries import engine_entry
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.measured import breakdown_of, compare, measure, phases_at
+from dropspin.comparisons.running.processes import EngineProcesses
+from dropspin.comparisons.running.progress import OnProgress, Progress, reporter
+from dropspin.comparisons.running.start_phases import StartPhase
+
+FEWEST_STEPS = 8
+"""A run of fewer steps is not worth adding."""
+
+
+class Outcome(NamedTuple):
+    """What an engine gave at one time step.
+
+    Attributes:
+        case: The columns that its rows have in common.
+        per_step: Wall time of a native step [s].
+        given: Its motion and what it states of itself, without the motions from the start phases; its breakdown if it has no metrics.
+        points: Its metrics, by name.
+        digest: The hash of all its motions.
+    """
+
+    case: Case
+    per_step: float
+    given: EngineRun
+    points: Mapping[str, SeriesPoint]
+    digest: str
+
+
+@dataclass(eq=False)
+class EngineStudy:
+    """One engine in one scene.
+
+    Attributes:
+        own: The scene, and its exact solution.
+        entry: The engine.
+        processes: The engines' processes.
+        on_progress: Called before, while and after the engine works.
+        outcomes: What it gave at each of the requested time steps.
+        calibrated: The study of this engine with calibrated settings, if this one has default settings.
+        causes: The causes that were decided, by metric.
+        added: The metrics at other time steps or with other options that were needed for this, by label and time step.
+    """
+
+    own: StartPhase
+    entry: EngineEntry
+    processes: EngineProcesses
+    on_progress: OnProgress
+    outcomes: list[Outcome] = field(default_factory=list)
+    calibrated: "EngineStudy | None" = None
+    causes: dict[str, Convergence] = field(default_factory=dict)
+    added: dict[tuple[str, float], Mapping[str, SeriesPoint]] = field(default_factory=dict)
+
+    def run_at(self, dt: float, phases: Sequence[StartPhase], exact: Sequence[States | None], timing: Timing) -> list[Comparison]:
+        """Run the engine at a requested time step; its motions from all start phases, compared with the exact ones, if it has any."""
+        progress = Progress(self.own.scene.name, self.entry.label, dt)
+        self.on_progress(progress)
+        outcome, cases = self._measured(self.entry, phases, exact, progress, timing)
+        self.outcomes.append(outcome)
+        self.on_progress(progress._replace(finished=True))
+        return cases
+
+    def _measured(
+        self, entry: EngineEntry, phases: Sequence[StartPhase], exact: Sequence[States | None], progress: Progress, timing: Timing
+    ) -> tuple[Outcome, list[Comparison]]:
+        """Simulate the scene from all start phases, and measure every metric."""
+        scene, dt, given = self.own.scene, progress.dt, EngineRun(entry.label)
+        if not timing.ended:
+            starts = [phase.scene for phase in phases]
+            given = self.processes.run_engine(entry, scene, dt, starts, reporter(progress, self.on_progress), quick=self.own.quick)
+        given.breakdown = given.breakdown or timing.breakdown or breakdown_of(given)
+        cases = [] if given.breakdown else compare(given.phases, phases, exact)
+        points = measure(self.own, dt, given, phases, exact, cases) if cases else {}
+        digest = "" if given.motion is None else motion_digest([given.motion, *given.phases])
+        case = Case(scene.name, entry.label, dt, scene.steps(dt))
+        return Outcome(case, timing.per_step, replace(given, phases=[], perturbed=[]), points, digest), cases
+
+    def rows(self, *, is_extrapolated: bool) -> Iterator[Measurement]:
+        """All rows of the engine: at each time step, and its orders and asymptotic errors if there are enough time steps."""
+        scene, truth, _, _ = self.own
+        causes = {name: self.cause(name) for name in self.series} if is_extrapolated else {}
+        truths = {"truth": "" if truth is None else truth.name, "invariant": ""}
+        for case, per_step, given, points, _ in self.outcomes:
+            timed = replace(case, time_per_step=per_step)
+            if given.breakdown is not None:
+                yield timed.remark(given.breakdown.verdict, given.breakdown.reason)
+                continue
+            yield from (timed.remark("limited", one.message) for one in given.limitations if not one.is_minor)
+            for name, point in points.items():
+                metric = METRICS[name]
+                judgement = judge(scene, truth, _claim([given]), metric, point, causes.get(name))
+                yield timed.measurement(metric.kind, name, metric.unit, judgement, truths[metric.kind])
+            if truth is None:
+                yield timed.remark("no_truth", "no closed form is known for this scene")
+        extrapolated = Case(scene.name, self.entry.label)
+        for name, found in causes.items():
+            metric = METRICS[name]
+            if (order := judge_order(self.claim, metric, found)) is not None:
+                yield extrapolated.measurement("order", name, "1", order, truths[metric.kind])
+            if (error := judge_asymptotic_error(scene, self.claim, metric, found)) is not None:
+                yield extrapolated.measurement("asymptotic_error", name, metric.unit, error, truths[metric.kind])
+
+    @cached_property
+    def claim(self) -> Claim:
+        """The properties that the engine declares, and the limitations that it met at any time step."""
+        return _claim([outcome.given for outcome in self.outcomes if outcome.given.motion is not None])
+
+    @cached_property
+    def series(self) -> Mapping[str, list[SeriesPoint]]:
+        """The errors at each time step, by metric."""
+        found: dict[str, list[SeriesPoint]] = {}
+        for outcome in self.outcomes:
+            for name, point in outcome.points.items():
+                if name not in ARTEFACTS:
+                    found.setdefault(name, []).append(point)
+        return found
+
+    def cause(self, name: str) -> Convergence:
+        """Decide the cause of the errors of a metric.
+
+        The rules apply in this order. Each may replace the result before it, and simulates only what it needs:
+
+            1. requested    the error budget of the requested time steps: `convergence`
+            2. coarser      if these leave the cause open, coarser steps are added. Their result counts if the cause was unresolved, or if
+                            the model is the cause now
+            3. finer        before a model error in contact fails, a finer step is added, because a contact solver can be unstable above
+                            some time step, which looks like an error that no time step removes. Its result counts unless the model is
+                            still the cause
+            4. refined      an error that does not vanish with the time step alone, but together with the options that set the accuracy of
+                            the engine, is attributed to these options
+            5. calibrated   a model error is a setting error if the engine with calibrated settings has none or a smaller one
+
+        Returns:
+            The convergence that counts, with its cause.
+        """
+        if name in self.causes:
+            return self.causes[name]
+        scene, engine, metric, series = self.own.scene, self.entry.adapter, METRICS[name], self.series[name]
+        dts = [point.dt for point in series]
+        found = convergence(scene, self.claim, metric, series)
+        if found.is_open:
+            longer = self._longer(metric, [factor * max(dts) for factor in ADDED_STEPS])
+            if longer is not None and (found.budget.cause == "unresolved" or longer.budget.cause == "model"):
+                found = longer
+        if found.budget.cause == "model" and scene.floor is not None:
+            error = judge_asymptotic_error(scene, self.claim, metric, found)
+            longer = self._longer(metric, [min(dts) / 2.0]) if error is not None and error.verdict == "failed" else None
+            if longer is not None and longer.budget.cause != "model":
+                found = longer
+        if engine.accuracy and found.budget.cause in ("model", "unresolved") and not math.isnan(found.budget.asymptotic_error):
+            found = self._attributed_to_options(metric, found, engine.refined(dts))
+        if found.budget.cause == "model" and self.calibrated is not None and name in self.calibrated.series:
+            calibrated = self.calibrated.cause(name).budget
+            if max(-calibrated.lower, calibrated.upper) < max(found.budget.lower, -found.budget.upper):
+                found = replace(found, budget=replace(found.budget, cause="setting"))
+        self.causes[name] = found
+        return found
+
+    def _longer(self, metric: Metric, added: Sequence[float]) -> Convergence | None:
+        """The convergence over the requested and other time steps; None if the engine gives no result at these."""
+        points = self._points(metric, [(dt, self.entry) for dt in added])
+        remark = f"with {' and '.join(f'{point.dt:g}' for point in points)} s added"
+        return convergence(self.own.scene, self.claim, metric, [*points, *self.series[metric.name]], remark) if points else None
+
+    def _attributed_to_options(self, metric: Metric, found: Convergence, refined: Sequence[tuple[float, Engine]]) -> Convergence:
+        """The convergence, of which the cause may be the options that set the accuracy: they are refined together with the time step."""
+        options = self.entry.adapter.accuracy
+        names = " and ".join(options)
+        values = [", ".join(_short(finer.option(option)) for _, finer in refined) for option in options]
+        path = f"{'; '.join(values)}, with dt = {', '.join(f'{dt:g}' for dt, _ in refined)} s"
+        points = self._points(metric, [(dt, engine_entry(finer)) for dt, finer in refined])
+        budget = replace(found.budget, cause="unresolved", reason=f"too few usable time steps with finer {names}")
+        if len(points) == len(refined):
+            finest = convergence(self.own.scene, self.claim._replace(order=None), metric, points).budget
+            if not math.isnan(finest.asymptotic_error):
+                budget = finest
+                if finest.cause not in ("model", "unresolved"):
+                    budget = replace(finest, cause=names, reason=f"vanishes with finer {names}")
+        return found if budget.cause == "model" else replace(found, budget=replace(budget, order=math.nan), remark=path)
+
+    def _points(self, metric: Metric, wanted: Sequence[tuple[float, EngineEntry]]) -> list[SeriesPoint]:
+        """A metric at time steps that were not requested, without those at which the engine breaks down."""
+        points = []
+        for dt, entry in wanted:
+            if self.own.scene.steps(dt) >= FEWEST_STEPS and (entry.label, dt) not in self.added:
+                progress = Progress(self.own.scene.name, entry.label, dt, added=True)
+                outcome, _ = self._measured(entry, *phases_at(self.own, dt), progress, Timing())
+                self.added[entry.label, dt] = outcome.points
+            points.append(self.added.get((entry.label, dt), {}).get(metric.name))
+        return [point for point in points if point is not None]
+
+    def is_default_of(self, other: "EngineStudy") -> bool:
+        """Whether another engine is this one with calibrated instead of default settings."""
+        engine, calibrated = self.entry.engine, other.entry.engine
+        if engine is None or calibrated is None or engine.name != calibrated.name or "profile" in calibrated.options:
+            return False
+        return engine.options == {**calibrated.options, "profile": "default"}
+
+
+def _claim(given: Sequence[EngineRun]) -> Claim:
+    """The properties that an engine declares, and the limitations that it met in some runs."""
+    last = given[-1]
+    return Claim(last.label, last.order, last.precision, tuple(one for run in given for one in run.limitations))
+
+
+def _short(value: str) -> str:
+    """An option's value; numbers with six digits."""
+    try:
+        return f"{float(value):g}"
+    except ValueError:
+        return value

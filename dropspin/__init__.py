@@ -34,12 +34,12 @@ if TYPE_CHECKING:
     from dropspin.comparisons.measuring.contacts import contacts as contacts
     from dropspin.comparisons.measuring.metrics import METRICS as METRICS
     from dropspin.comparisons.regressions.baseline import Baseline as Baseline
-    from dropspin.comparisons.regressions.baseline import accept as accept
     from dropspin.comparisons.regressions.baseline import load_baseline as load_baseline
     from dropspin.comparisons.regressions.baseline import write_baseline as write_baseline
+    from dropspin.comparisons.regressions.checking import accept as accept
     from dropspin.comparisons.regressions.checking import check as check
     from dropspin.comparisons.regressions.comparing import compare as compare
-    from dropspin.comparisons.regressions.history import history as history
+    from dropspin.comparisons.regressions.comparing import history as history
     from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS as ENSEMBLE_METRICS
     from dropspin.comparisons.results.results import Results as Results
     from dropspin.comparisons.results.store import load_results as load_results
@@ -94,10 +94,9 @@ _HOMES = {
     "dropspin.comparisons.judging.error_budget": ("ErrorBudget", "error_budget"),
     "dropspin.comparisons.measuring.contacts": ("contacts",),
     "dropspin.comparisons.measuring.metrics": ("METRICS",),
-    "dropspin.comparisons.regressions.baseline": ("Baseline", "accept", "load_baseline", "write_baseline"),
-    "dropspin.comparisons.regressions.checking": ("check",),
-    "dropspin.comparisons.regressions.comparing": ("compare",),
-    "dropspin.comparisons.regressions.history": ("history",),
+    "dropspin.comparisons.regressions.baseline": ("Baseline", "load_baseline", "write_baseline"),
+    "dropspin.comparisons.regressions.checking": ("accept", "check"),
+    "dropspin.comparisons.regressions.comparing": ("compare", "history"),
     "dropspin.comparisons.results.ensembles": ("ENSEMBLE_METRICS",),
     "dropspin.comparisons.results.table": ("Measurement",),
     "dropspin.comparisons.results.results": ("Results",),

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from dropspin.comparisons.regressions.history import History
+from dropspin.comparisons.regressions.comparing import History
 from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
 from dropspin.reports.document import Charts, Document
 from dropspin.reports.markdown import markdown

@@ -4,8 +4,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dropspin.comparisons.engines.base import engine_name
 from dropspin.comparisons.engines.registry import BUILT_IN
-from dropspin.comparisons.regressions.motions import Motion
+from dropspin.comparisons.regressions.changes import Motion
 from dropspin.comparisons.results.provenance import MEASURING
 from dropspin.scenarios.text import printable
 
@@ -42,30 +43,26 @@ class Attribution:
 
 def surroundings(old: Stamp, new: Stamp) -> dict[str, str]:
     """The differences that affect all engines, as text by name, in what both record."""
-
-    def differs(one: Any, other: Any) -> bool:
-        return None not in (one, other) and one != other
-
-    versions = {package: (old["versions"].get(package), new["versions"].get(package)) for package in MEASURING}
-    found = {package: f"{package} {one} → {other}" for package, (one, other) in versions.items() if differs(one, other)}
-    if differs(old.get("code"), new["code"]):
-        found["code"] = OWN_CODE
-    return found | {key: f"{word} {old[key]} → {new[key]}" for key, word in MACHINE.items() if differs(old.get(key), new[key])}
+    versions = {name: (name, old["versions"].get(name), new["versions"].get(name)) for name in MEASURING}
+    machine = {key: (word, old.get(key), new[key]) for key, word in MACHINE.items()}
+    pairs = versions | {"code": (OWN_CODE, old.get("code"), new["code"])} | machine
+    differing = {key: pair for key, pair in pairs.items() if None not in pair and pair[1] != pair[2]}
+    return {key: word if key == "code" else f"{word} {one} → {other}" for key, (word, one, other) in differing.items()}
 
 
 def of_engine(old: Stamp, new: Stamp, engine: str) -> dict[Origin, str]:
     """The differences of the engine itself, the most likely cause first."""
     found: dict[Origin, str] = {}
-    before, after = (stamp["settings"].get(engine, {}) for stamp in (old, new))
-    versions = [
-        {printable(str(settings["version"])) for settings in stamped.values() if "version" in settings} for stamped in (before, after)
-    ]
-    name = engine.split("[", maxsplit=1)[0]
+    name, stamped = engine_name(engine), [stamp["settings"].get(engine, {}) for stamp in (old, new)]
+    versions = [sorted({printable(str(one["version"])) for one in cases.values() if "version" in one}) for cases in stamped]
     if versions[0] != versions[1] and all(versions):
-        found["engine"] = f"{name} {_listed(versions[0])} → {_listed(versions[1])}"
+        found["engine"] = f"{name} {' → '.join(map(', '.join, versions))}"
     if engine in old["adapters"] and old["adapters"][engine] != new["adapters"].get(engine):
         found["adapter"] = f"the code of {name}'s adapter"
-    changed = _changed_settings(before, after)
+    before, after = stamped
+    pairs = [(before[case], after[case]) for case in before if case in after]
+    settings = dict.fromkeys(setting for pair in pairs for given in pair for setting in given if setting not in ("version", "numba"))
+    changed = [printable(setting) for setting in settings if any(one.get(setting) != other.get(setting) for one, other in pairs)]
     if changed:
         found["settings"] = f"its settings ({', '.join(changed)})"
     return found
@@ -85,7 +82,7 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
     if absent:
         return Attribution("absent", f"it has no measurements in the {absent[0]} run: it broke down, declined, or is missing")
     own, around = of_engine(old, new, engine), surroundings(old, new)
-    listed, name = ", ".join([*own.values(), *around.values()]), engine.split("[", maxsplit=1)[0]
+    listed, name = ", ".join([*own.values(), *around.values()]), engine_name(engine)
     if motions == "same" and around.keys() & OF_DROPSPIN:
         corrected = ", ".join(text for part, text in around.items() if part in OF_DROPSPIN)
         return Attribution("dropspin", f"{CORRECTION}, whose motions are the same bit for bit: {corrected}", is_correction=True)
@@ -109,15 +106,3 @@ def attribute(old: Stamp, new: Stamp, engine: str, unmoved: Collection[str], mot
             first, f"{message}; {', '.join(around.values())} differ too, but the results of {', '.join(sorted(unmoved))} are the same"
         )
     return Attribution("either", f"{listed}; the cause cannot be isolated, because the results of every engine changed")
-
-
-def _changed_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Names of the settings, without versions, that differ at a scene and time step of both runs."""
-    pairs = [(before[case], after[case]) for case in before if case in after]
-    names = dict.fromkeys(name for pair in pairs for settings in pair for name in settings)
-    differ = [name for name in names if any(one.get(name) != other.get(name) for one, other in pairs)]
-    return [printable(name) for name in differ if name not in ("version", "numba")]
-
-
-def _listed(versions: Collection[Any]) -> str:
-    return ", ".join(sorted(map(str, versions)))

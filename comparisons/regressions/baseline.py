@@ -6,27 +6,26 @@ intended changes. Each line can be read alone, so that two branches can be merge
 
 import datetime
 import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pandas as pd
 import tomlkit
 from pydantic import Field
-from tomlkit.items import InlineTable, Item
+from tomlkit.items import Item
 
+from dropspin.comparisons.engines.base import engine_name
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.regressions.motions import Digests, digests_of, flat
-from dropspin.comparisons.regressions.result_names import assert_steps, metric_and_kind, name_of
-from dropspin.comparisons.regressions.values import KEY, asked_for, broke_down, changes, comparable_results, verify_comparable
+from dropspin.comparisons.measuring.symmetries import kind_of
+from dropspin.comparisons.regressions.changes import KEY, Digests, leaves
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 from dropspin.comparisons.results.folder import written_whole
-from dropspin.comparisons.results.provenance import digest, versions_behind
-from dropspin.comparisons.results.results import Results
+from dropspin.comparisons.results.provenance import digest
 from dropspin.comparisons.results.table import OF_SYMMETRIES
 from dropspin.scenarios import DropspinError
+from dropspin.scenarios.errors import did_you_mean
 from dropspin.scenarios.loading import read_toml
 from dropspin.scenarios.model import current_label
 from dropspin.scenarios.tables import Table
@@ -40,6 +39,8 @@ EXTRA_DIGITS = 3
 """Number of additional digits with which a value is written, so that its rounding error is at most 1/200 of the tolerance."""
 LARGEST_RATIO = 1e17
 """Largest ratio of a value to its tolerance that adds digits: a double has no more."""
+SUFFIXES = {"_order": "order", "_asymptotic_error": "asymptotic_error"}
+"""Suffixes of the names of results that are fitted to several time steps, and the kinds of such results."""
 KEY_LENGTH = 7
 """Number of digits of the hash that identifies an acceptance."""
 HEADER = (
@@ -65,7 +66,7 @@ class Acceptance(Table):
 
     def stamp_of(self, engine: str) -> dict[str, Any]:
         """What it has of the provenance of the run, for `attribution.attribute`; baselines of earlier versions have no hashes of code."""
-        version = self.versions.get(engine.split("[", maxsplit=1)[0])
+        version = self.versions.get(engine_name(engine))
         settings = {engine: {"accepted": {} if version is None else {"version": version}}}
         return self.model_dump() | {"python": self.versions.get("python"), "settings": settings}
 
@@ -138,42 +139,54 @@ def load_baseline(path: str | Path) -> Baseline:
         )
     written = validated(_File, where, content)
     acceptances = {key: validated(Acceptance, f"{where}: accepted.{key}", content) for key, content in written.accepted.items()}
-    lines = [_read_line(where, key, content, acceptances) for key, content in _listed(where, written)]
-    motions = {
-        by: {(scene, current_label(engine), step): digest for (scene, engine, step), digest in flat(nested).items()}
-        for by, nested in written.motions.items()
-    }
-    for scene, engine, step in chain.from_iterable(motions.values()):
-        assert_steps(f"{where}: motions of {scene}, {engine}", step)
-    engines = {current_label(label): name for label, name in written.engines.items()}
-    return Baseline(acceptances, engines, written.scenes, motions, _table(lines))
-
-
-def _listed(where: str, written: _File) -> Iterator[tuple[tuple[str, str, str, str], Any]]:
-    """The results of a file, each with scene, engine, time steps, name and the content of the line."""
-    for scene, engines in written.results.items():
+    for scene, of_scene in written.results.items():
         if scene not in written.scenes:
             raise DropspinError(f"{where}: scenes: {scene!r} has results, but no digest; accept them again.")
-        if len({*map(current_label, engines)}) < len(engines):
+        if len({*map(current_label, of_scene)}) < len(of_scene):
             raise DropspinError(f"{where}: results of {scene}: an engine is listed by two names; remove the lines of the earlier one.")
-        for engine, steps in engines.items():
-            for step, named in steps.items():
-                assert_steps(f"{where}: results of {scene}, {engine}", step)
-                for name, content in named.items():
-                    yield (scene, current_label(engine), step, name), content
+    rows = [_row(where, keys, content, acceptances) for keys, content in leaves(written.results, 4)]
+    motions: dict[str, dict[tuple[str, str, str], str]] = {}
+    for (by, scene, engine, step), digest_of_motions in leaves(written.motions, 4):
+        _verify_steps(f"{where}: motions of {scene}, {engine}", step)
+        motions.setdefault(by, {})[scene, current_label(engine), step] = digest_of_motions
+    engines = {current_label(label): name for label, name in written.engines.items()}
+    return Baseline(acceptances, engines, written.scenes, motions, _table(rows))
 
 
-def _read_line(where: str, key: tuple[str, str, str, str], content: Any, acceptances: Mapping[str, Acceptance]) -> dict[str, Any]:
+def _row(where: str, keys: tuple[str, ...], content: Any, acceptances: Mapping[str, Acceptance]) -> dict[str, Any]:
     """A result of a file as a row of a table."""
-    scene, engine, steps, name = key
-    here = f"{where}: results of {scene}, {engine}, {steps}: {name}"
-    metric, kind = metric_and_kind(here, name)
+    scene, engine, steps, name = keys
+    _verify_steps(f"{where}: results of {scene}, {engine}", steps)
+    here = f"{where}: results of {scene}, {current_label(engine)}, {steps}: {name}"
+    metric, kind = _metric_and_kind(here, name)
     line = validated(_Line, here, content)
     if line.by not in acceptances:
         raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
     unit = "1" if kind in ("order", *OF_SYMMETRIES) else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
-    identity = {"scene": scene, "engine": engine, "steps": steps, "metric": metric, "kind": kind}
+    identity = dict(zip(KEY, (scene, current_label(engine), steps, metric, kind), strict=True))
     return identity | line.model_dump() | {"unit": unit}
+
+
+def _metric_and_kind(where: str, name: str) -> tuple[str, str]:
+    """The metric and the kind of a result, from its name in the file."""
+    kinds = {name: metric.kind for name, metric in METRICS.items()} | dict.fromkeys(ENSEMBLE_METRICS, "ensemble")
+    kind = kinds.get(name) or kind_of(name)
+    if kind is not None:
+        return name, kind
+    for ending, kind in SUFFIXES.items():
+        if name.endswith(ending) and name.removesuffix(ending) in METRICS:
+            return name.removesuffix(ending), kind
+    raise DropspinError(f"{where}: no such result.{did_you_mean(name, kinds)}")
+
+
+def _verify_steps(where: str, steps: str) -> None:
+    """Raise `DropspinError` unless a text is a time step [s], or several, as `changes.step_names` writes it."""
+    try:
+        written = ", ".join(repr(float(step)) for step in steps.split(","))
+    except ValueError:
+        raise DropspinError(f"{where}: {steps!r} is not a time step or a list of them; write seconds, such as '0.004'.") from None
+    if written != steps:
+        raise DropspinError(f"{where}: {steps!r}: write it as {written!r}, or runs at this step will not find it.")
 
 
 def _writer(content: Mapping[str, Any]) -> str:
@@ -183,55 +196,6 @@ def _writer(content: Mapping[str, Any]) -> str:
     except (AttributeError, KeyError, TypeError):
         versions = set()
     return ", ".join(sorted(versions)) or "another version of dropspin"
-
-
-def accept(
-    results: Results, earlier: Baseline, reason: str, date: datetime.date, *, known_failures: bool = False
-) -> tuple[Baseline, pd.DataFrame]:
-    """Accept the results of a run into a baseline.
-
-    Accepted results stay if the run does not cover them, if they changed by no more than their tolerance, or if the engine broke down in
-    the scene or is missing. All results of a scene that has changed are replaced.
-
-    Args:
-        results: The run.
-        earlier: The earlier baseline; `Baseline()` if there is none.
-        reason: The reason why these results are accepted, which is stored with them.
-        date: Date of the acceptance.
-        known_failures: Whether to accept failing checks as known failures.
-
-    Returns:
-        The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
-        `before` in `unit`, and the `change`: new, worse, moved, better, same or gone.
-
-    Raises:
-        DropspinError: The run is quick.
-    """
-    verify_comparable(results)
-    mine = comparable_results(results)
-    mine["known_failure"] = (mine["verdict"] == "failed") & known_failures
-    old = asked_for(earlier.results, results)
-    scenes = {name: scene.digest for name, scene in results.scenes.items()}
-    same_scene = old["scene"].map(lambda name: earlier.scenes[name] == scenes[name]).astype(bool)
-    found = changes(old[same_scene], mine)
-    lost = (found["change"] == "gone") & broke_down(found, results)
-    kept = old[same_scene].merge(found.loc[(found["change"] == "same") | lost, KEY], on=KEY)
-    if known_failures:
-        flags = kept[KEY].merge(mine[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
-        kept = kept.assign(known_failure=flags.where(flags.notna(), kept["known_failure"].to_numpy()).astype(bool).to_numpy())
-    stamp = results.provenance
-    adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (mine["engine"] == engine).any()}
-    acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(stamp), code=stamp["code"], adapters=adapters)
-    moved = mine.merge(kept[KEY], on=KEY, how="left", indicator=True)
-    moved = moved[moved["_merge"] == "left_only"].assign(by=acceptance.key)
-    outside = earlier.results.drop(old.index)
-    outdated = outside["scene"].map(lambda name: earlier.scenes[name] != scenes.get(name, earlier.scenes[name])).astype(bool)
-    everything = pd.concat([outside[~outdated], kept, moved], ignore_index=True)[list(COLUMNS)]
-    used = set(everything["by"])
-    acceptances = {key: one for key, one in {acceptance.key: acceptance, **earlier.acceptances}.items() if key in used}
-    names = {label: name for label, name in stamp["names"].items() if name != label}
-    motions = {**earlier.motions, acceptance.key: {**earlier.motions.get(acceptance.key, {}), **digests_of(stamp)}}
-    return Baseline(acceptances, {**earlier.engines, **names}, {**earlier.scenes, **scenes}, motions, everything), found[~lost]
 
 
 def write_baseline(baseline: Baseline, path: str | Path) -> None:
@@ -254,34 +218,37 @@ def _text(baseline: Baseline) -> str:
     engines, scenes = set(held["engine"]), set(held["scene"])
     lines = [*(f"# {line}" for line in HEADER), "", f"format = {FORMAT}", ""]
     for key, one in sorted(baseline.acceptances.items(), key=lambda item: (item[1].date, item[0])):
-        content = {"date": one.date, "reason": one.reason, "versions": _inline(one.versions)}
-        content |= {"code": one.code} if one.code else {}
-        content |= {"adapters": _inline(one.adapters)} if one.adapters else {}
-        lines.append(_assigned(["accepted", key], _inline(content)))
+        lines.append(_assigned(["accepted", key], {name: content for name, content in one.model_dump().items() if content}))
     lines.append("")
     for table, named, used in (("engines", baseline.engines, engines), ("scenes", baseline.scenes, scenes)):
-        lines += [_assigned([table, name], tomlkit.string(text)) for name, text in sorted(named.items()) if name in used]
+        lines += [_assigned([table, name], text) for name, text in sorted(named.items()) if name in used]
     cases = {(row["by"], row["scene"], row["engine"], step) for row in held.to_dict("records") for step in row["steps"].split(", ")}
     measured = {(by, *case): digest for by, digests in baseline.motions.items() for case, digest in digests.items()}
-    lines += [_assigned(["motions", *key], tomlkit.string(measured[key])) for key in sorted(cases & measured.keys())]
+    lines += [_assigned(["motions", *key], measured[key]) for key in sorted(cases & measured.keys())]
+    suffixes = {kind: ending for ending, kind in SUFFIXES.items()}
     for _, rows in held.groupby(["scene", "engine", "steps"], sort=False):
         lines.append("")
         for row in rows.to_dict("records"):
-            lines.append(_assigned(["results", row["scene"], row["engine"], row["steps"], name_of(row)], _inline(_line(row))))
+            name = row["metric"] + suffixes.get(row["kind"], "")
+            lines.append(_assigned(["results", row["scene"], row["engine"], row["steps"], name], _line(row)))
     return "\n".join(lines) + "\n"
 
 
-def _assigned(path: Sequence[str], content: Item) -> str:
-    return f"{tomlkit.key(path).as_string()} = {content.as_string()}"
+def _assigned(path: Sequence[str], content: Mapping[str, Any] | str) -> str:
+    return f"{tomlkit.key(path).as_string()} = {_item(content).as_string()}"
 
 
-def _inline(content: Mapping[str, Any]) -> InlineTable:
+def _item(content: Any) -> Item:
+    """A value of a file; a mapping in one line."""
+    if not isinstance(content, Mapping):
+        return tomlkit.item(content)
     table = tomlkit.inline_table()
-    table.update(content)
+    table.update({name: _item(inner) for name, inner in content.items()})
     return table
 
 
 def _line(row: Mapping[Hashable, Any]) -> dict[str, Any]:
+    """What the file has of a result."""
     value, tolerance = float(row["value"]), float(f"{row['tolerance']:.2g}")
     ratio = min(max(abs(value) / tolerance, 1.0), LARGEST_RATIO)
     digits = EXTRA_DIGITS + math.ceil(math.log10(ratio))

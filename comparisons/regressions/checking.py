@@ -1,5 +1,9 @@
-"""The comparison of a run with a baseline, in which each accepted result gets a row of kind `baseline` with a verdict."""
+"""Accepted results: a run is checked against them, or replaces them.
 
+A check adds a row of kind `baseline` with a verdict for each accepted result, and attributes the changes that fail.
+"""
+
+import datetime
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,18 +15,22 @@ import pandas as pd
 from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.judging.verdicts import FAILURES, Verdict
 from dropspin.comparisons.regressions.attribution import CORRECTION, Attribution, attribute
-from dropspin.comparisons.regressions.baseline import Baseline
-from dropspin.comparisons.regressions.motions import Motion, compared_digests, digests_of
-from dropspin.comparisons.regressions.values import (
+from dropspin.comparisons.regressions.baseline import COLUMNS, Acceptance, Baseline
+from dropspin.comparisons.regressions.changes import (
     KEY,
+    Motion,
     asked_for,
+    broke_down,
     changes,
     comparable_results,
+    compared_digests,
+    digests_of,
     most_changed_first,
     regressed,
     step_names,
     verify_comparable,
 )
+from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.scenarios import DropspinError
@@ -42,7 +50,7 @@ class Checked:
 
     Attributes:
         results: The run, with a row of kind `baseline` for each accepted result, the largest changes first.
-        changes: The results of the run compared with the accepted ones: the table that `values.changes` returns, largest change first;
+        changes: The results of the run compared with the accepted ones: the table that `changes.changes` returns, largest change first;
             empty without a baseline.
         not_run: Accepted results that the run does not cover, because it has other scenes, engines or time steps.
         attributions: For each engine with failing accepted results, the causes to which they are attributed, and how many to each.
@@ -52,6 +60,55 @@ class Checked:
     changes: pd.DataFrame
     not_run: pd.DataFrame
     attributions: Mapping[tuple[str, Attribution], int] = field(default_factory=dict)
+
+
+def accept(
+    results: Results, earlier: Baseline, reason: str, date: datetime.date, *, known_failures: bool = False
+) -> tuple[Baseline, pd.DataFrame]:
+    """Accept the results of a run into a baseline.
+
+    Accepted results stay if the run does not cover them, if they changed by no more than their tolerance, or if the engine broke down in
+    the scene or is missing. All results of a scene that has changed are replaced.
+
+    Args:
+        results: The run.
+        earlier: The earlier baseline; `Baseline()` if there is none.
+        reason: The reason why these results are accepted, which is stored with them.
+        date: Date of the acceptance.
+        known_failures: Whether to accept failing checks as known failures.
+
+    Returns:
+        The new baseline, and a table of the differences from the earlier one. The table has a row for each result, with `value` and
+        `before` in `unit`, and the `change`: new, worse, moved, better, same or gone.
+
+    Raises:
+        DropspinError: The run is quick.
+    """
+    verify_comparable(results)
+    measured, covered = comparable_results(results), asked_for(earlier.results, results)
+    measured["known_failure"] = (measured["verdict"] == "failed") & known_failures
+    comparable = covered[~_has_other_scene(covered, earlier, results)]
+    found = changes(comparable, measured)
+    lost = (found["change"] == "gone") & broke_down(found, results)
+    kept = comparable.merge(found.loc[(found["change"] == "same") | lost, KEY], on=KEY)
+    if known_failures:
+        flags = kept[KEY].merge(measured[[*KEY, "known_failure"]], on=KEY, how="left")["known_failure"]
+        kept["known_failure"] = flags.where(flags.notna(), kept["known_failure"]).astype(bool)
+    stamp = results.provenance
+    adapters = {engine: code for engine, code in stamp["adapters"].items() if code is not None and (measured["engine"] == engine).any()}
+    acceptance = Acceptance(date=date, reason=reason, versions=versions_behind(stamp), code=stamp["code"], adapters=adapters)
+    moved = measured[~_keys(measured).isin(_keys(kept))].assign(by=acceptance.key)
+    outside = earlier.results.drop(covered.index)
+    table = pd.concat([outside[~_has_other_scene(outside, earlier, results)], kept, moved], ignore_index=True)[list(COLUMNS)]
+    every = {acceptance.key: acceptance, **earlier.acceptances}
+    accepted = Baseline(
+        {key: one for key, one in every.items() if key in set(table["by"])},
+        {**earlier.engines, **{label: name for label, name in stamp["names"].items() if name != label}},
+        {**earlier.scenes, **{name: scene.digest for name, scene in results.scenes.items()}},
+        {**earlier.motions, acceptance.key: {**earlier.motions.get(acceptance.key, {}), **digests_of(stamp)}},
+        table,
+    )
+    return accepted, found[~lost]
 
 
 def check(results: Results, baseline: Baseline | None = None) -> Checked:
@@ -83,36 +140,60 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
             f"none of the {len(baseline.results):,} accepted results is covered by this run's scenes, engines and time steps; "
             "run the accepted scenes, engines and time steps, or accept this run."
         )
-    digests = {name: scene.digest for name, scene in results.scenes.items()}
-    another = accepted["scene"].map(lambda name: baseline.scenes[name] != digests[name]).astype(bool)
-    mine = comparable_results(results)
-    comparable = mine[~mine["scene"].isin(accepted.loc[another, "scene"])]
-    found = changes(accepted[~another], comparable).merge(accepted[[*KEY, "by", "known_failure"]], on=KEY, how="left")
+    of_other_scenes = _has_other_scene(accepted, baseline, results)
+    measured = comparable_results(results)
+    comparable = measured[~measured["scene"].isin(accepted.loc[of_other_scenes, "scene"])]
+    found = changes(accepted[~of_other_scenes], comparable).merge(accepted[[*KEY, "by", "known_failure"]], on=KEY, how="left")
     found = most_changed_first(found)
     causes = _causes(found, baseline, results)
-    corrections = {number for number, cause in causes.items() if cause.is_correction}
-    found = found.assign(note=[f"; {CORRECTION}" if number in corrections else "" for number in found.index])
-    rows = [_scene_changed(scene, engine) for scene, engine in accepted.loc[another, ["scene", "engine"]].drop_duplicates().to_numpy()]
-    rows += _lost_rows(results, found[found["change"] == "gone"])
-    rows += [_judged(row, baseline) for row in found[~found["change"].isin(["new", "gone"])].to_dict("records")]
+    noted = found.assign(note=[f"; {CORRECTION}" if number in causes and causes[number].is_correction else "" for number in found.index])
+    rows = [
+        Measurement(
+            scene=scene,
+            engine=engine,
+            kind="baseline",
+            truth="accepted",
+            verdict="failed",
+            reason="the scene has changed since its results were accepted; accept them again",
+            basis="scene_changed",
+        )
+        for scene, engine in accepted.loc[of_other_scenes, ["scene", "engine"]].drop_duplicates().to_numpy()
+    ]
+    rows += _lost_rows(results, noted[noted["change"] == "gone"])
+    for row in noted[~noted["change"].isin(["new", "gone"])].to_dict("records"):
+        by = baseline.acceptances[row["by"]]
+        away = "" if row["change"] == "same" else f"; {row['change']} by {row['in_tolerances']:,.3g} times its tolerance"
+        reason = f"accepted {row['before']:.6g} ± {row['tolerance']:.2g} on {by.date}, {by.reason}{away}{row['note']}"
+        lower, upper = (row[name] if np.isfinite(row[name]) else np.nan for name in ("lower", "upper"))
+        rows.append(_row(row, VERDICTS[row["change"]], reason, value=row["value"], lower=lower, upper=upper))
     table = pd.concat([_with_known_failures(results, found), as_table(rows)], ignore_index=True)
     attributions = Counter((found["engine"][number], cause) for number, cause in causes.items())
-    return Checked(replace(results, table=table), found.drop(columns="note"), baseline.results.drop(accepted.index), attributions)
+    return Checked(replace(results, table=table), found, baseline.results.drop(accepted.index), attributions)
+
+
+def _has_other_scene(rows: pd.DataFrame, baseline: Baseline, results: Results) -> "pd.Series[bool]":
+    """Whether each accepted result is of a scene that is another one in a run."""
+    digests = {name: scene.digest for name, scene in results.scenes.items()}
+    return rows["scene"].map(lambda name: baseline.scenes[name] != digests.get(name, baseline.scenes[name])).astype(bool)
+
+
+def _keys(rows: pd.DataFrame) -> pd.MultiIndex:
+    return pd.MultiIndex.from_frame(rows[KEY])
 
 
 def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[int, Attribution]:
     """By the number of its row, the cause to which each failing accepted result is attributed."""
-    failing, stamp, digests = regressed(found), results.provenance, digests_of(results.provenance)
+    stamp, digests = results.provenance, digests_of(results.provenance)
     unmoved = [str(engine) for engine, changes in found.groupby("engine")["change"] if set(changes) == {"same"}]
     known: dict[tuple[str, str, Motion], Attribution] = {}
     causes = {}
+    failing = regressed(found)
     for number, row in zip(failing.index, failing.to_dict("records"), strict=True):
         engine, by = row["engine"], row["by"]
-        of_row = compared_digests(row, baseline.motions.get(by, {}), digests)
-        if (engine, by, of_row) not in known:
-            earlier = baseline.acceptances[by].stamp_of(engine)
-            known[engine, by, of_row] = attribute(earlier, stamp, engine, unmoved, of_row)
-        causes[number] = known[engine, by, of_row]
+        motions = compared_digests(row, baseline.motions.get(by, {}), digests)
+        if (engine, by, motions) not in known:
+            known[engine, by, motions] = attribute(baseline.acceptances[by].stamp_of(engine), stamp, engine, unmoved, motions)
+        causes[number] = known[engine, by, motions]
     return causes
 
 
@@ -124,21 +205,12 @@ def _with_current_names(baseline: Baseline, results: Results) -> pd.DataFrame:
     return baseline.results.assign(engine=baseline.results["engine"].replace(renamed))
 
 
-def _judged(found: dict[Any, Any], baseline: Baseline) -> Measurement:
-    """The row of an accepted result that the run also measured."""
-    by = baseline.acceptances[found["by"]]
-    away = "" if found["change"] == "same" else f"; {found['change']} by {found['in_tolerances']:,.3g} times its tolerance"
-    reason = f"accepted {found['before']:.6g} ± {found['tolerance']:.2g} on {by.date}, {by.reason}{away}{found['note']}"
-    lower, upper = (found[name] if np.isfinite(found[name]) else np.nan for name in ("lower", "upper"))
-    return replace(_row(found), lower=lower, upper=upper, value=found["value"], verdict=VERDICTS[found["change"]], reason=reason)
-
-
-def _row(found: dict[Any, Any]) -> Measurement:
-    """A failed row of kind `baseline`, without a value."""
+def _row(found: Mapping[Any, Any], verdict: Verdict, reason: str, **others: Any) -> Measurement:
+    """A row of kind `baseline` about an accepted result; without a value unless one is given."""
+    identity = {name: found[name] for name in ("scene", "engine", "metric", "unit")} | others
     dt = np.nan if "," in found["steps"] else float(found["steps"])
     truth = ACCEPTED.get(found["kind"], "accepted")
-    identity = {name: found[name] for name in ("scene", "engine", "metric", "unit")}
-    return Measurement(**identity, dt=dt, kind="baseline", truth=truth, verdict="failed")
+    return Measurement(**identity, dt=dt, kind="baseline", truth=truth, verdict=verdict, reason=reason)
 
 
 def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
@@ -151,35 +223,23 @@ def _lost_rows(results: Results, gone: pd.DataFrame) -> list[Measurement]:
     remarks = remarks[~remarks["verdict"].isin(["limited", "no_truth"])]
     reasons = {(row.scene, row.engine, row.steps): f"{row.verdict}: {row.reason}" for row in remarks.itertuples()}
     rows: list[Measurement] = []
-    for _, lost in gone.groupby(["scene", "engine", "steps"], sort=False):
-        first = lost.iloc[0].to_dict()
-        where = first["scene"], first["engine"], first["steps"]
+    for where, lost in gone.groupby(["scene", "engine", "steps"], sort=False):
+        records = lost.to_dict("records")
         if where in reasons:
-            reason = f"{len(lost)} accepted results are gone, {reasons[where]}"
-            rows.append(replace(_row(first), metric="", unit="", reason=reason))
+            rows.append(_row(records[0], "failed", f"{len(lost)} accepted results are gone, {reasons[where]}", metric="", unit=""))
             continue
-        for row in lost.to_dict("records"):
-            if row["kind"] in STUDIES:
-                rows.append(replace(_row(row), verdict="measured", reason=f"accepted {row['before']:.6g}, undefined now"))
-            else:
-                rows.append(replace(_row(row), reason=f"accepted {row['before']:.6g}, not measured now{row['note']}"))
+        for row in records:
+            verdict: Verdict = "measured" if row["kind"] in STUDIES else "failed"
+            now = "undefined now" if row["kind"] in STUDIES else f"not measured now{row['note']}"
+            rows.append(_row(row, verdict, f"accepted {row['before']:.6g}, {now}"))
     return rows
-
-
-def _scene_changed(scene: str, engine: str) -> Measurement:
-    reason = "the scene has changed since its results were accepted; accept them again"
-    return Measurement(
-        scene=scene, engine=engine, kind="baseline", truth="accepted", verdict="failed", reason=reason, basis="scene_changed"
-    )
 
 
 def _with_known_failures(results: Results, found: pd.DataFrame) -> pd.DataFrame:
     """The run's table, in which failures that were accepted as known and are not worse have the verdict `known`."""
     known = found[found["known_failure"].fillna(value=False).astype(bool) & (found["change"].map(VERDICTS) == "passed")]
-    keys = pd.MultiIndex.from_frame(results.table.assign(steps=step_names(results))[KEY])
-    rows = keys.isin(pd.MultiIndex.from_frame(known[KEY])) & results.table["verdict"].isin(FAILURES).to_numpy()
     table = results.table.copy()
+    rows = _keys(table.assign(steps=step_names(results))).isin(_keys(known)) & table["verdict"].isin(FAILURES).to_numpy()
     table.loc[rows, "reason"] = "accepted as a known failure; " + table.loc[rows, "reason"]
-    table.loc[rows, "basis"] = "accepted_failure"
-    table.loc[rows, "verdict"] = "known"
+    table.loc[rows, ["basis", "verdict"]] = ["accepted_failure", "known"]
     return table

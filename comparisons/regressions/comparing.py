@@ -1,14 +1,28 @@
-"""The comparison of two runs: the changes, and the causes to which they are attributed."""
+"""Two runs compared, and histories of runs: the results that changed, and the causes to which the changes are attributed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 
 from dropspin.comparisons.regressions.attribution import Attribution, attribute, surroundings
-from dropspin.comparisons.regressions.motions import EqualMotions, digests_of, equal_motions, taken_together
-from dropspin.comparisons.regressions.speed import SpeedChange, speed_changes
-from dropspin.comparisons.regressions.values import asked_for, changes, comparable_results, most_changed_first, regressed, verify_comparable
+from dropspin.comparisons.regressions.changes import (
+    KEY,
+    EqualMotions,
+    Motion,
+    SpeedChange,
+    asked_for,
+    changes,
+    comparable_results,
+    compared_digests,
+    digests_of,
+    equal_motions,
+    most_changed_first,
+    regressed,
+    speed_changes,
+    verify_comparable,
+)
+from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import DropspinError
 
@@ -18,7 +32,7 @@ class Changes:
     """The differences between two runs.
 
     Attributes:
-        results: The table of comparable results that `values.changes` returns, largest change first.
+        results: The table of comparable results that `changes.changes` returns, largest change first.
         attributions: The cause to which the changes of an engine are attributed, by engine.
         surroundings: The differences that affect all engines, as text.
         other_scenes: Scenes that are different in the later run, so that their results are not compared.
@@ -62,25 +76,27 @@ def compare(old: Results, new: Results) -> Changes:
     Raises:
         DropspinError: The runs have no scene, engine and time step in common, or one is quick.
     """
-    other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
     verify_comparable(old, new)
-    before, after = comparable_results(old), comparable_results(new)
-    found = changes(*(held[~held["scene"].isin(other)] for held in (asked_for(before, new), asked_for(after, old))))
-    if found.empty and other:
-        raise DropspinError(f"the runs have no result in common: {', '.join(other)} changed between them.")
+    other = [name for name, scene in new.scenes.items() if name in old.scenes and old.scenes[name].digest != scene.digest]
+    before, after = asked_for(comparable_results(old), new), asked_for(comparable_results(new), old)
+    found = most_changed_first(changes(*(rows[~rows["scene"].isin(other)] for rows in (before, after))))
     if found.empty:
-        raise DropspinError("the runs have no result in common: no scene, engine and time step was requested in both.")
-    found = most_changed_first(found)
-    changed = found.groupby("engine")["change"].agg(lambda change: bool((change != "same").any()))
-    unmoved = [str(engine) for engine, moved in changed.items() if not moved]
+        why = f"{', '.join(other)} changed between them" if other else "no scene, engine and time step was requested in both"
+        raise DropspinError(f"the runs have no result in common: {why}.")
+    changed = {str(engine): rows[rows["change"] != "same"] for engine, rows in found.groupby("engine")}
+    unmoved = [engine for engine, rows in changed.items() if rows.empty]
+    attributions = {engine: _attributed(rows, old, new, engine, unmoved) for engine, rows in changed.items() if len(rows)}
+    around = list(surroundings(old.provenance, new.provenance).values())
+    return Changes(found, attributions, around, other, _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other))
+
+
+def _attributed(rows: pd.DataFrame, old: Results, new: Results, engine: str, unmoved: Sequence[str]) -> Attribution:
+    """The cause to which changed results of an engine are attributed; its motions differ if those of one result do."""
     stamps = old.provenance, new.provenance
-    digests = digests_of(old.provenance), digests_of(new.provenance)
-    attributions = {
-        str(engine): attribute(*stamps, str(engine), unmoved, taken_together(rows, *digests))
-        for engine, rows in found[found["change"] != "same"].groupby("engine")
-    }
-    in_one_only, speed, motions = _in_one_only(old, new), speed_changes(old, new), equal_motions(old, new, other)
-    return Changes(found, attributions, list(surroundings(*stamps).values()), other, in_one_only, speed, motions)
+    digests = [digests_of(stamp) for stamp in stamps]
+    motions = {compared_digests(row, *digests) for row in rows.to_dict("records")}
+    together: Motion = "different" if "different" in motions else "same" if motions == {"same"} else "unknown"
+    return attribute(*stamps, engine, unmoved, together)
 
 
 def _in_one_only(old: Results, new: Results) -> list[str]:
@@ -92,3 +108,97 @@ def _in_one_only(old: Results, new: Results) -> list[str]:
         for thing in things
         if thing not in others
     ]
+
+
+@dataclass(frozen=True)
+class Move:
+    """A run in which results of an engine changed.
+
+    Attributes:
+        engine: Label of the engine.
+        before: Number of the last earlier run that has this engine.
+        run: Number of the run.
+        results: The changes (worse, better or moved) that `changes.changes` returns, largest first.
+        attribution: The cause to which the changes are attributed.
+    """
+
+    engine: str
+    before: int
+    run: int
+    results: pd.DataFrame
+    attribution: Attribution
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Runs in the order of their time.
+
+    Attributes:
+        names: Names of the runs.
+        stamps: Time, commit and versions of each.
+        results: The comparable results of all runs; `run` is the number.
+        moves: The changes, in the order of the runs.
+    """
+
+    names: list[str]
+    stamps: pd.DataFrame
+    results: pd.DataFrame
+    moves: list[Move]
+
+
+def history(runs: Mapping[str, Results]) -> History:
+    """Follow results over runs.
+
+    Args:
+        runs: Two or more runs, by name; they are sorted by start time.
+
+    Returns:
+        `names` of the runs in order; `stamps`, their times, commits and versions; `results`, the values of all runs; and `moves`, the
+        runs in which results changed, and the cause to which each change is attributed.
+
+    Raises:
+        DropspinError: There are fewer than two runs, or one is quick.
+    """
+    if len(runs) < 2:
+        raise DropspinError(f"a history needs two or more runs, got {len(runs)}; give more, or a folder of runs.")
+    verify_comparable(*runs.values())
+    ordered = sorted(runs.items(), key=lambda item: str(item[1].provenance["started"]))
+    names, results = [name for name, _ in ordered], [one for _, one in ordered]
+    stamps = [
+        {"run": name, "started": one.provenance["started"], "commit": one.provenance["commit"]} | versions_behind(one.provenance)
+        for name, one in ordered
+    ]
+    measured = [comparable_results(one) for one in results]
+    every = pd.concat([rows.assign(run=number) for number, rows in enumerate(measured)], ignore_index=True)
+    return History(names, pd.DataFrame(stamps), every, _moves(results, measured))
+
+
+def _moves(results: Sequence[Results], results_of: Sequence[pd.DataFrame]) -> list[Move]:
+    """The runs in which results changed.
+
+    Each result is compared with its value after its last change, so that slow drifts are found, and runs without the result have no effect.
+    """
+    held: dict[str, pd.DataFrame] = {}
+    scenes: dict[str, str] = {}
+    last: dict[str, int] = {}
+    found = []
+    for run, one in enumerate(results):
+        digests = {name: scene.digest for name, scene in one.scenes.items()}
+        other = {name for name, digest in digests.items() if scenes.get(name, digest) != digest}
+        scenes |= digests
+        held = {engine: rows[~rows["scene"].isin(other)] for engine, rows in held.items()}
+        moved = {}
+        for engine, now in ((str(engine), rows) for engine, rows in results_of[run].groupby("engine", sort=False)):
+            before = held.get(engine, now.iloc[:0])
+            change = changes(before, now)
+            moved[engine] = most_changed_first(change[change["change"].isin(["worse", "moved", "better"])])
+            stays = change["change"].isin(["same", "gone"])
+            kept, fresh = before.merge(change.loc[stays, KEY], on=KEY), now.merge(change.loc[~stays, KEY], on=KEY)
+            held[engine] = pd.concat([kept, fresh], ignore_index=True)
+        unmoved = [engine for engine, differing in moved.items() if differing.empty and engine in last]
+        for engine, differing in moved.items():
+            if len(differing):
+                before_it = results[last[engine]]
+                found.append(Move(engine, last[engine], run, differing, _attributed(differing, before_it, one, engine, unmoved)))
+        last |= dict.fromkeys(moved, run)
+    return found

@@ -30,7 +30,8 @@ def accept_command(runs: tuple[str, ...], reason: str, baseline: str, known_fail
     import os
     from pathlib import Path
 
-    from dropspin.comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
+    from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
+    from dropspin.comparisons.regressions.checking import accept
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.document import Document, Sentences
     from dropspin.reports.stories.check import accepted_sentences

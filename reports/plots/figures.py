@@ -21,7 +21,7 @@ from dropspin.scenarios import truth_for
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from dropspin.comparisons.regressions.history import History
+    from dropspin.comparisons.regressions.comparing import History
     from dropspin.comparisons.tradeoff.points import TradeOff
 
 CONVERGENCE = (

@@ -10,8 +10,8 @@ import pandas as pd
 
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES
 from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.changes import broke_down, comparable_results, regressed
 from dropspin.comparisons.regressions.checking import Checked
-from dropspin.comparisons.regressions.values import broke_down, comparable_results, regressed
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Document, Paragraph, Sentences, Table

@@ -4,9 +4,8 @@ import math
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+from dropspin.comparisons.regressions.changes import EqualMotions, SpeedChange
 from dropspin.comparisons.regressions.comparing import Changes
-from dropspin.comparisons.regressions.motions import EqualMotions
-from dropspin.comparisons.regressions.speed import SpeedChange
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.stories.failures import reproduce_scenes

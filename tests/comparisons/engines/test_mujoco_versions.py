@@ -14,8 +14,7 @@ from dropspin.comparisons.engines import mujoco_engine
 from dropspin.comparisons.engines.base import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
 from dropspin.comparisons.engines.mujoco_versions import flight_of, numbers_of
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.regressions.comparing import compare
-from dropspin.comparisons.regressions.history import history
+from dropspin.comparisons.regressions.comparing import compare, history
 from dropspin.comparisons.results.store import load_results
 from dropspin.comparisons.running.recording import simulate
 from dropspin.scenarios.mechanics import kinetic_energy

@@ -7,7 +7,8 @@ import pytest
 from support.releases import DTS, RELEASES, SCENES, TODAY, Candidate, longer, part, relabelled
 
 from dropspin.comparisons.engines.registry import engine
-from dropspin.comparisons.regressions.baseline import Baseline, accept
+from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.checking import accept
 from dropspin.comparisons.results.store import load_results, save
 from dropspin.comparisons.running.run import run
 

@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 from support.releases import SCENES, TODAY, WITH_FLOOR, Broken, Candidate, Euler, TooLively, failing, part
 
-from dropspin.comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
-from dropspin.comparisons.regressions.checking import check
-from dropspin.comparisons.regressions.values import KEY
+from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
+from dropspin.comparisons.regressions.changes import KEY
+from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.scenarios import DropspinError
 
 

@@ -8,9 +8,9 @@ from support.fault_suite import FAULTS as PLANTED
 from support.fault_suite import Made, with_body, with_gravity, with_restitution
 from support.releases import TODAY, WithoutGyroscopicTerm, relabelled
 
-from dropspin.comparisons.regressions.baseline import Baseline, accept
+from dropspin.comparisons.regressions.baseline import Baseline
 from dropspin.comparisons.regressions.causes import causes
-from dropspin.comparisons.regressions.checking import check
+from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.parameters import PARAMETERS
 from dropspin.comparisons.running.run import run
 from dropspin.reports.markdown import markdown

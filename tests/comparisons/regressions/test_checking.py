@@ -30,9 +30,9 @@ from support.releases import (
 
 from dropspin import scenarios
 from dropspin.comparisons.engines import mujoco_simulation
-from dropspin.comparisons.regressions.baseline import Baseline, accept
-from dropspin.comparisons.regressions.checking import NothingAccepted, check
-from dropspin.comparisons.regressions.values import KEY, comparable_results
+from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.changes import KEY, comparable_results
+from dropspin.comparisons.regressions.checking import NothingAccepted, accept, check
 from dropspin.comparisons.running.run import run
 
 

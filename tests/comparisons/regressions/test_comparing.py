@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support.releases import DTS, SCENES, TURNING, Candidate, WithoutGyroscopicTerm, part, released
 
+from dropspin.comparisons.regressions.changes import speed_changes
 from dropspin.comparisons.regressions.comparing import compare
-from dropspin.comparisons.regressions.speed import speed_changes
 from dropspin.comparisons.running.run import run
 from dropspin.scenarios import DropspinError
 

@@ -8,10 +8,10 @@ from support.releases import SCENES, TODAY, Candidate, TooLively, failing, relab
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.regressions.attribution import CORRECTION, attribute
-from dropspin.comparisons.regressions.baseline import Baseline, accept, load_baseline, write_baseline
-from dropspin.comparisons.regressions.checking import check
+from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
+from dropspin.comparisons.regressions.changes import digests_of
+from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.comparing import compare
-from dropspin.comparisons.regressions.motions import digests_of
 from dropspin.comparisons.running.run import run
 from dropspin.reports.stories.check import BaselineFile, sentences
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support import engines as made
 
+from dropspin.comparisons.regressions.changes import EqualMotions, equal_motions
 from dropspin.comparisons.regressions.comparing import compare
-from dropspin.comparisons.regressions.motions import EqualMotions, equal_motions
 from dropspin.comparisons.running.run import run
 
 DT = 4e-3

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dropspin.comparisons.measuring.metric import Average
 from dropspin.comparisons.measuring.tolerances import tolerance
-from dropspin.comparisons.regressions.values import KEY, changes, comparable_results
+from dropspin.comparisons.regressions.changes import KEY, changes, comparable_results
 from dropspin.scenarios import load
 
 

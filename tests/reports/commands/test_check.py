@@ -9,8 +9,8 @@ import xml.etree.ElementTree as ET
 import pytest
 from support.cli import dropspin
 
-from dropspin.comparisons.regressions.baseline import Baseline, accept
-from dropspin.comparisons.regressions.checking import check
+from dropspin.comparisons.regressions.baseline import Baseline
+from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.running.run import run
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.stories.check import BaselineFile, accepted_sentences, sentences

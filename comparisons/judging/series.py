@@ -34,24 +34,24 @@ def verified(dts: ArrayLike, errors: ArrayLike, resolution: ArrayLike, rounding:
     Raises:
         DropspinError: A number or a shape is invalid.
     """
-    h, e, noise, floor = (
-        _numbers(name, values)
-        for name, values in {"time steps": dts, "errors": errors, "resolution": resolution, "rounding": rounding}.items()
-    )
-    h, e = np.atleast_1d(h, e)
+    h, e = np.atleast_1d(_numbers("time steps", dts), _numbers("errors", errors))
     if h.ndim != 1 or h.shape != e.shape:
         raise DropspinError(f"an error budget takes one error for each time step; got {h.shape} time steps and {e.shape} errors.")
     if not ((h > 0.0) & np.isfinite(h)).all() or len(np.unique(h)) < len(h):
         raise DropspinError(f"time steps must be positive and different; got {_listed(h)}.")
-    for name, values in (("resolution", noise), ("rounding", floor)):
-        if values.shape not in ((), (1,), h.shape):
-            raise DropspinError(f"{name} takes one number, or one for each of {len(h)} time steps; got the shape {values.shape}.")
-    noise, floor = np.broadcast_to(noise, h.shape), np.broadcast_to(floor, h.shape)
-    for name, values in (("resolution", noise), ("rounding", floor)):
-        invalid = values[np.isfinite(e) & ~((values >= 0.0) & np.isfinite(values))]
-        if len(invalid):
-            raise DropspinError(f"{name} must be finite and not negative; got {_listed(np.unique(invalid))}.")
-    return h, e, noise, floor
+    return h, e, _spread("resolution", resolution, e), _spread("rounding", rounding, e)
+
+
+def _spread(name: str, given: ArrayLike, errors: Array) -> Array:
+    """Numbers that are finite and not negative, one for each error, from these or from one for all."""
+    values = _numbers(name, given)
+    if values.shape not in ((), (1,), errors.shape):
+        raise DropspinError(f"{name} takes one number, or one for each of {len(errors)} time steps; got the shape {values.shape}.")
+    values = np.broadcast_to(values, errors.shape)
+    invalid = values[np.isfinite(errors) & ~((values >= 0.0) & np.isfinite(values))]
+    if len(invalid):
+        raise DropspinError(f"{name} must be finite and not negative; got {_listed(np.unique(invalid))}.")
+    return values
 
 
 def verify_options(errors: Array, claimed_order: float | None, signed: bool, negligible: float, judged_together: int) -> None:

@@ -5,7 +5,7 @@ of the scenes in which asymptotic errors fail, and none in the scenes in which t
 known to the end, or leaves a metric undefined, neither holds.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -26,8 +26,6 @@ from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 
 Array = NDArray[np.float64]
-Wrong = Callable[[Scenario, Array], Trajectory | None]
-"""From a scene and times [s] to the exact motion with a cause; None without an exact solution, or if the cause changes nothing."""
 FIRST_SIZE = 1e-3
 LARGEST_SIZE = 0.3
 MOST_STEPS = 20_000
@@ -77,10 +75,10 @@ def causes(results: Results, engine: str) -> Causes:
     narrowest = failed["scene"].iloc[int(widths.argmin())]
     leading = failed[failed["scene"] == narrowest]
 
-    def holds(wrong: Wrong) -> bool:
+    def holds(fault: FaultModel) -> bool:
         count = 0
         for scene, rows in scenes:
-            explained = _explained(scene, wrong, rows, dt)
+            explained = _explained(scene, fault, rows, dt)
             if explained is None:
                 return False
             count += explained
@@ -90,7 +88,7 @@ def causes(results: Results, engine: str) -> Causes:
     for parameter in PARAMETERS:
         sizes = [size for size in _sizes(results.scenes[str(narrowest)], parameter, leading, dt) if holds(_with(parameter, size))]
         parameters += [WrongParameter(parameter, sizes[0], len(sizes) == 1)] if sizes else []
-    faults = [fault for fault in (*CONVENTIONS, *FLIGHT, *IMPACT) if fault.about != "start" and holds(_with_fault(fault))]
+    faults = [fault for fault in (*CONVENTIONS, *FLIGHT, *IMPACT) if fault.about != "start" and holds(fault)]
     return Causes(parameters, faults)
 
 
@@ -117,9 +115,9 @@ def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: floa
             yield size
 
 
-def _explained(scene: Scenario, wrong: Wrong, rows: pd.DataFrame, dt: float) -> int | None:
+def _explained(scene: Scenario, fault: FaultModel, rows: pd.DataFrame, dt: float) -> int | None:
     """How many of the failed asymptotic errors of a scene a cause has; None if it has another error than one of those that it defines."""
-    coarse, fine = (_caused(scene, wrong, step) for step in (dt, 0.5 * dt))
+    coarse, fine = (_caused(scene, fault, step) for step in (dt, 0.5 * dt))
     count = 0
     for row in rows.to_dict("records"):
         metric = row["metric"]
@@ -136,20 +134,9 @@ def _explained(scene: Scenario, wrong: Wrong, rows: pd.DataFrame, dt: float) -> 
     return count
 
 
-def _with(parameter: Parameter, size: float) -> Wrong:
-    return lambda scene, times: _simulated(parameter.change(scene, size), times)
-
-
-def _with_fault(fault: FaultModel) -> Wrong:
-    def wrong(scene: Scenario, times: Array) -> Trajectory | None:
-        motion = _simulated(fault.simulated(scene), times)
-        return motion and Trajectory.from_states(motion.t, fault.reported(motion.states))
-
-    return wrong
-
-
-def _simulated(changed: Scenario | None, times: Array) -> Trajectory | None:
-    return None if changed is None else _exact(changed, float(times[1]), len(times))
+def _with(parameter: Parameter, size: float) -> FaultModel:
+    """A parameter with an error as a fault."""
+    return FaultModel(parameter.name, lambda scene: parameter.change(scene, size))
 
 
 @lru_cache(maxsize=32)  # many faults of what is reported simulate the same scene
@@ -166,15 +153,18 @@ class _Caused(NamedTuple):
     is_whole: bool
 
 
-def _caused(scene: Scenario, wrong: Wrong, dt: float) -> _Caused:
+def _caused(scene: Scenario, fault: FaultModel, dt: float) -> _Caused:
     """The errors that a cause has; none without an exact solution."""
     reference = _sampled(scene, dt)
+    if reference is None:
+        return _Caused({}, {}, is_whole=False)
     try:
-        motion = None if reference is None else wrong(scene, reference.times)
+        motion = _exact(fault.simulated(scene), float(reference.times[1]), len(reference.times))
     except (DropspinError, ValueError):  # the body is impossible
         motion = None
-    if motion is None or reference is None:
+    if motion is None:
         return _Caused({}, {}, is_whole=False)
+    motion = Trajectory.from_states(motion.t, fault.reported(motion.states))
     common = min(len(motion), len(reference.motion))
     is_whole, exact = common == len(reference.motion), reference.motion[:common]
     sampled = reference.errors if is_whole else _measured(scene, exact, exact)
@@ -194,7 +184,7 @@ class _Sampled(NamedTuple):
 def _sampled(scene: Scenario, dt: float) -> _Sampled | None:
     step = max(dt, scene.duration / MOST_STEPS)
     times = step * np.arange(1 + scene.steps(step), dtype=float)
-    motion = _simulated(scene, times)
+    motion = _exact(scene, float(times[1]), len(times))
     return None if motion is None else _Sampled(times, motion, _measured(scene, motion, motion))
 
 

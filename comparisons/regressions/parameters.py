@@ -6,15 +6,15 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios import Scenario
+from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.model import Damping
 from dropspin.scenarios.rotations import about, rotate
 from dropspin.scenarios.variations import with_values
 
-Change = Callable[[Scenario, float], Scenario | None]
-"""From a scene and the size of an error to the scene with it: the scene itself if it does not have the parameter, None if no scene can have
-the error."""
+Change = Callable[[Scenario, float], Scenario]
+"""From a scene and the size of an error to the scene with it: the scene itself if it does not have the parameter. It raises `DropspinError`
+if no scene can have the error."""
 
 
 class Parameter(NamedTuple):
@@ -49,9 +49,9 @@ def _tilted(axis: tuple[float, float, float]) -> Change:
 
 
 def _added_damping(which: str) -> Change:
-    def change(scene: Scenario, rate: float) -> Scenario | None:
+    def change(scene: Scenario, rate: float) -> Scenario:
         if scene.floor is not None or rate < 0.0 or (scene.damping is not None and getattr(scene.damping, which)):
-            return None
+            raise DropspinError(f"no {which} damping of {rate:g} 1/s can be added to {scene.name}.")
         return scene.model_copy(update={"damping": (scene.damping or Damping()).model_copy(update={which: rate})})
 
     return change
@@ -62,10 +62,10 @@ def _mass(scene: Scenario, share: float) -> Scenario:
 
 
 def _moments(*wrong: int) -> Change:
-    def change(scene: Scenario, share: float) -> Scenario | None:
+    def change(scene: Scenario, share: float) -> Scenario:
         moments = np.array(scene.body.moments) * (1.0 + share * np.isin(np.arange(3), wrong))
-        if not is_diagonal(scene.body.inertia_tensor) or 2.0 * moments.max() > moments.sum():  # no body has these moments
-            return None
+        if not is_diagonal(scene.body.inertia_tensor) or 2.0 * moments.max() > moments.sum():
+            raise DropspinError(f"no body has the moments of inertia {moments} kg m² about these axes.")
         return with_values(scene, "body", inertia=tuple(moments.tolist()))
 
     return change

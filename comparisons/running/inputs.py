@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.base import Engine, engine_name
 from dropspin.comparisons.engines.registry import engine_names
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
 
@@ -83,7 +83,7 @@ def as_scene(scene: SceneLike) -> Scenario:
     try:
         return load(scene)
     except SceneError:
-        if isinstance(scene, str) and scene.partition("[")[0].strip() in engine_names():
+        if isinstance(scene, str) and engine_name(scene).strip() in engine_names():
             raise DropspinError(f"scene {scene!r} is an engine; give the scene first and the engine second.") from None
         raise
 

@@ -24,13 +24,14 @@ def rerun_command(engine: str, release: str, scene: str, folder: str, resources:
     temporary environment. The exit code is 1 if a motion differs from that of the record; then it is said which versions or which
     processor differ.
     """
+    from dropspin.comparisons.engines.base import engine_name
     from dropspin.comparisons.record.plan import load_plan
     from dropspin.comparisons.record.rerun import rerun
     from dropspin.reports.stories import rerun as view
     from dropspin.reports.terminal.progress import status
     from dropspin.reports.terminal.rows import print_json_or
 
-    with status(f"installing {engine.partition('[')[0]} {release}, and simulating {scene}"):
+    with status(f"installing {engine_name(engine)} {release}, and simulating {scene}"):
         found = rerun(folder, load_plan(), engine, release, scene, time_limit=resources.processor_time)
     print_json_or(json_output, view.as_data(found), view.document(found, scene))
     return 1 if found.moved else 0

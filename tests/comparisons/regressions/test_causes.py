@@ -17,7 +17,7 @@ from dropspin.reports.markdown import markdown
 from dropspin.reports.stories.check import output, page
 from dropspin.reports.stories.failures import failures, grouped
 from dropspin.reports.terminal.rows import print_document
-from dropspin.scenarios import load
+from dropspin.scenarios import DropspinError, load
 from dropspin.scenarios.rotations import about, rotate
 
 SLOWER = "Coulomb coefficient 1 % too high or gravity 1 % too high or direction of gravity wrong by 0.003 rad"
@@ -138,5 +138,6 @@ def test_moments_that_no_body_has_explain_no_error():
     """The largest moment of a thin plate is almost the sum of the other two."""
     plate = load({"duration": 1.0, "body": {"shape": "box", "half_extents": [0.3, 0.001, 0.2], "mass": 1.0}})
     [about_y] = [parameter for parameter in PARAMETERS if parameter.name == "moment of inertia about y"]
-    assert about_y.change(plate, 0.01) is None
-    assert about_y.change(plate, -0.01) is not None
+    with pytest.raises(DropspinError, match="no body has the moments of inertia"):
+        about_y.change(plate, 0.01)
+    assert about_y.change(plate, -0.01).body.inertia_tensor[1, 1] == pytest.approx(0.99 * plate.body.inertia_tensor[1, 1])

@@ -37,6 +37,8 @@ def judge(
         5. precision        failed becomes limited if rounding in single precision may cause the distance from the bound
         6. model error      passed becomes known if the bounds exclude 0 and the asymptotic error is a known fault
 
+    In the check of a run against a baseline, failures that were accepted become known too: `regressions.checking`.
+
     Args:
         scene: The scene.
         truth: Its exact solution, if it is known.

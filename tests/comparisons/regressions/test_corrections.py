@@ -6,12 +6,13 @@ from dataclasses import replace
 import pytest
 from support.releases import SCENES, TODAY, Candidate, TooLively, failing, relabelled
 
-from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.metrics import METRICS, metrics_for
 from dropspin.comparisons.regressions.attribution import CORRECTION, attribute
 from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, write_baseline
 from dropspin.comparisons.regressions.changes import digests_of
 from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.comparing import compare
+from dropspin.comparisons.running import measured
 from dropspin.comparisons.running.run import run
 from dropspin.reports.stories.check import BaselineFile, sentences
 
@@ -24,6 +25,7 @@ def corrected(monkeypatch):
     metric = METRICS["bounce_height_error"]
     changed = replace(metric, measure=lambda case: metric.measure(case) + 0.01)
     monkeypatch.setitem(METRICS, "bounce_height_error", changed)
+    monkeypatch.setattr(measured, "metrics_for", metrics_for.__wrapped__)  # which remembers the metrics of a scene
 
 
 def stamped(results, **changes):

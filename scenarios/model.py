@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.state import PARTS, Array
 from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector
 from dropspin.scenarios.text import Prose, Text, joined, verify_line
 
@@ -247,12 +247,7 @@ class Scenario(Table):
     def starting_at(self, state: Array) -> "Scenario":
         """The same scene with another initial state, shape (13,)."""
         values = [float(value) for value in state]
-        start = Start(
-            position=tuple(values[POSITION]),
-            orientation=tuple(values[ORIENTATION]),
-            velocity=tuple(values[VELOCITY]),
-            angular_velocity=tuple(values[SPIN]),
-        )
+        start = Start(**{name: tuple(values[part]) for name, part in PARTS.items()})
         return self.model_copy(update={"start": start})
 
 

@@ -1,46 +1,36 @@
 """Faults of conventions: frames, orders, signs and units of states, and parts of the start that are not set."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.comparisons.faults.fault_model import (
-    Change,
-    FaultModel,
-    Reported,
-    Simulated,
-    changed_part,
-    changed_start,
-    unchanged_scene,
-    unchanged_states,
-)
+from dropspin.comparisons.faults.fault_model import Change, FaultModel, Reported, changed_part, changed_start
 from dropspin.scenarios.rotations import about as rotation_about
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
-
-Array = NDArray[np.float64]
-Messages = tuple[str, str, str]
-"""For a fault in what is read from the engine, in what is set at the start, and in both."""
+from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY, Array
 
 
-def _convention(part: slice, messages: Messages, wrong: Change, right: Change) -> list[FaultModel]:
-    """Three faults of one convention: in what is read, in what is set, and in both.
+def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Change) -> list[FaultModel]:
+    """Three faults of one convention: in what is read, in what is set at the start, and in both.
 
     Args:
         part: The part of a state that has the convention.
-        messages: The message of each fault.
+        fault: The fault in what is read.
+        expected: The convention of a state.
         wrong: Function from the part in the correct convention to the part in the faulty one.
         right: The inverse function.
     """
-    return _read_set_both(part, messages, changed_part(part, wrong), changed_part(part, right))
+    return _read_set_both(part, fault, expected, changed_part(part, wrong), changed_part(part, right))
 
 
-def _read_set_both(part: slice, messages: Messages, reported: Reported, inverse: Reported) -> list[FaultModel]:
-    simulated = changed_start(inverse)
-    changes: list[tuple[Simulated, Reported]] = [(unchanged_scene, reported), (simulated, unchanged_states), (simulated, reported)]
-    return [FaultModel(message, *change, about=str(part)) for message, change in zip(messages, changes, strict=True)]
+def _read_set_both(part: slice, fault: str, expected: str, reported: Reported, inverse: Reported) -> list[FaultModel]:
+    simulated, about = changed_start(inverse), str(part)
+    return [
+        FaultModel(f"{fault}; {expected}", reported=reported, about=about),
+        FaultModel(f"{fault} where it is set at the start; {expected}", simulated, about=about),
+        FaultModel(f"{fault}, both set and read; {expected}", simulated, reported, about=about),
+    ]
 
 
-def _orientation(messages: Messages, wrong: Change, right: Change) -> list[FaultModel]:
+def _orientation(fault: str, wrong: Change, right: Change) -> list[FaultModel]:
     """Faults of the orientation, also where an adapter converts the angular velocity from the body frame by the wrong orientation."""
 
     def with_spin(change: Change) -> Reported:
@@ -52,11 +42,9 @@ def _orientation(messages: Messages, wrong: Change, right: Change) -> list[Fault
 
         return changed
 
-    return _convention(ORIENTATION, messages, wrong, right) + _read_set_both(ORIENTATION, messages, with_spin(wrong), with_spin(right))
-
-
-def _three(fault: str, expected: str) -> Messages:
-    return f"{fault}; {expected}", f"{fault} where it is set at the start; {expected}", f"{fault}, both set and read; {expected}"
+    expected = "a state has [x, y, z, w], body to world"
+    both = _read_set_both(ORIENTATION, fault, expected, with_spin(wrong), with_spin(right))
+    return _convention(ORIENTATION, fault, expected, wrong, right) + both
 
 
 def _z_up(sign: float, but: slice | None = None) -> Reported:
@@ -79,65 +67,65 @@ def _left_handed(states: Array) -> Array:
     return states * [1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0]
 
 
-def _start(part: slice, change: Change) -> Simulated:
-    """The scene with a part of its start changed."""
-    return changed_start(changed_part(part, change))
+def _scalar_first(q: Array, _: Array) -> Array:
+    return np.roll(q, 1, axis=1)
 
 
-BODY_TO_WORLD = "a state has [x, y, z, w], body to world"
-IN_WORLD = "a state has it in the world frame"
+def _scalar_last(q: Array, _: Array) -> Array:
+    return np.roll(q, -1, axis=1)
+
+
+def _inverted(q: Array, _: Array) -> Array:
+    return conjugate(q)
+
+
+def _in_body(vectors: Array, orientation: Array) -> Array:
+    return unrotate(orientation, vectors)
+
+
+def _in_world(vectors: Array, orientation: Array) -> Array:
+    return rotate(orientation, vectors)
+
+
+def _negative(vectors: Array, _: Array) -> Array:
+    return -vectors
+
+
+def _swapped(rates: Array, _: Array) -> Array:
+    return np.roll(rates, 3, axis=1)
+
+
+def _zero(values: Array, _: Array) -> Array:
+    return 0.0 * values
+
+
+def _identity(values: Array, _: Array) -> Array:
+    return np.eye(4)[[3]]
+
+
+def _not_set(name: str, part: slice, default: Change = _zero) -> FaultModel:
+    return FaultModel(f"the {name} at the start is not set", changed_start(changed_part(part, default)), about="start")
+
+
+WORLD = "a state has it in the world frame"
+SPIN_FROM_BODY = "angular velocity appears to be converted from the body frame, in which it was not"
 CONVENTIONS = (
-    *_orientation(
-        _three("the quaternion appears to be ordered [w, x, y, z]", BODY_TO_WORLD),
-        wrong=lambda q, _: np.roll(q, 1, axis=1),
-        right=lambda q, _: np.roll(q, -1, axis=1),
-    ),
-    *_orientation(
-        _three("the quaternion appears to be reordered from [w, x, y, z], which was not its order", BODY_TO_WORLD),
-        wrong=lambda q, _: np.roll(q, -1, axis=1),
-        right=lambda q, _: np.roll(q, 1, axis=1),
-    ),
-    *_orientation(
-        _three("the orientation appears to be inverted, world to body", BODY_TO_WORLD),
-        wrong=lambda q, _: conjugate(q),
-        right=lambda q, _: conjugate(q),
-    ),
+    *_orientation("the quaternion appears to be ordered [w, x, y, z]", _scalar_first, _scalar_last),
+    *_orientation("the quaternion appears to be reordered from [w, x, y, z], which was not its order", _scalar_last, _scalar_first),
+    *_orientation("the orientation appears to be inverted, world to body", _inverted, _inverted),
+    *_convention(SPIN, "angular velocity appears to be in the body frame", WORLD, _in_body, _in_world),
+    *_convention(SPIN, SPIN_FROM_BODY, WORLD, _in_world, _in_body),
+    *_convention(VELOCITY, "velocity appears to be in the body frame", WORLD, _in_body, _in_world),
     *_convention(
         SPIN,
-        _three("angular velocity appears to be in the body frame", IN_WORLD),
-        wrong=lambda w, q: unrotate(q, w),
-        right=lambda w, q: rotate(q, w),
-    ),
-    *_convention(
-        SPIN,
-        _three("angular velocity appears to be converted from the body frame, in which it was not", IN_WORLD),
-        wrong=lambda w, q: rotate(q, w),
-        right=lambda w, q: unrotate(q, w),
-    ),
-    *_convention(
-        VELOCITY,
-        _three("velocity appears to be in the body frame", IN_WORLD),
-        wrong=lambda v, q: unrotate(q, v),
-        right=lambda v, q: rotate(q, v),
-    ),
-    *_convention(
-        SPIN,
-        _three("angular velocity appears to be in degrees per second", "a state has rad/s"),
+        "angular velocity appears to be in degrees per second",
+        "a state has rad/s",
         wrong=lambda w, _: np.rad2deg(w),
         right=lambda w, _: np.deg2rad(w),
     ),
-    *_convention(
-        SPIN, _three("angular velocity has the opposite sign", "it is right-handed"), wrong=lambda w, _: -w, right=lambda w, _: -w
-    ),
-    *_convention(
-        VELOCITY, _three("velocity has the opposite sign", "it is the rate of the position"), wrong=lambda v, _: -v, right=lambda v, _: -v
-    ),
-    *_convention(
-        RATES,
-        _three("velocity and angular velocity appear to be swapped", "velocity comes first"),
-        wrong=lambda both, _: np.roll(both, 3, axis=1),
-        right=lambda both, _: np.roll(both, 3, axis=1),
-    ),
+    *_convention(SPIN, "angular velocity has the opposite sign", "it is right-handed", _negative, _negative),
+    *_convention(VELOCITY, "velocity has the opposite sign", "it is the rate of the position", _negative, _negative),
+    *_convention(RATES, "velocity and angular velocity appear to be swapped", "velocity comes first", _swapped, _swapped),
     FaultModel(
         "y and z appear to be swapped; y is up",
         reported=lambda states: states[:, [0, 2, 1, 3, 5, 4, 6, 7, 9, 8, 10, 12, 11]],
@@ -154,10 +142,10 @@ CONVENTIONS = (
         reported=changed_part(POSITION, lambda x, _: 1e3 * x),
         about="frame",
     ),
-    FaultModel("the position at the start is not set", simulated=_start(POSITION, lambda x, _: 0.0 * x), about="start"),
-    FaultModel("the orientation at the start is not set", simulated=_start(ORIENTATION, lambda q, _: np.eye(4)[[3]]), about="start"),
-    FaultModel("the velocity at the start is not set", simulated=_start(VELOCITY, lambda v, _: 0.0 * v), about="start"),
-    FaultModel("the angular velocity at the start is not set", simulated=_start(SPIN, lambda w, _: 0.0 * w), about="start"),
-    FaultModel("velocity is reported as 0", reported=changed_part(VELOCITY, lambda v, _: 0.0 * v)),
-    FaultModel("angular velocity is reported as 0", reported=changed_part(SPIN, lambda w, _: 0.0 * w)),
+    _not_set("position", POSITION),
+    _not_set("orientation", ORIENTATION, _identity),
+    _not_set("velocity", VELOCITY),
+    _not_set("angular velocity", SPIN),
+    FaultModel("velocity is reported as 0", reported=changed_part(VELOCITY, _zero)),
+    FaultModel("angular velocity is reported as 0", reported=changed_part(SPIN, _zero)),
 )

@@ -76,8 +76,11 @@ def _details(results: Results, summary: Overview) -> dict[str, Any]:
 def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:
     [(name, scene)] = results.scenes.items()
     truth = truth_for(scene)
-    frame, agreements, own = results.table, results.agreements, results.measurements
+    frame, own, order = results.table, results.measurements, list(ENSEMBLE_METRICS)
     dts = sorted(frame["dt"].dropna().unique(), reverse=True)
+    pairs = results.agreements[results.agreements["dt"] == min(dts)]
+    finest = pd.concat([frame[frame["dt"] == min(dts)], pairs])
+    ensemble = finest[finest["metric"].isin(order)]  # the means, followed by the differences between engines
     studies = frame[frame["kind"].isin(STUDIES)]
     motions = replay_of(results, name)
     budgets = error_budgets(results, name)
@@ -93,16 +96,16 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "truth": None if truth is None else truth.statement,
         "dts": dts,
         "metrics": list(own["metric"].unique()),
-        "cells": {(row.metric, row.engine, row.dt): _row(row) for row in own.itertuples()},
+        "cells": {(row["metric"], row["engine"], row["dt"]): row for row in own.to_dict("records")},
         "trends": _trends(studies),
-        "budgets": [one for one in budgets if one.cause != "discretisation"],
-        "converging": sum(one.cause == "discretisation" for one in budgets),
+        "budgets": [budget for budget in budgets if budget.cause != "discretisation"],
+        "converging": sum(budget.cause == "discretisation" for budget in budgets),
         "rows": _all_results(results, name, pd.concat([own, studies, frame[frame["kind"].isin(OF_SYMMETRIES)]])),
         "replay": None if motions is None else as_data(motions),
-        "remarks": [_row(row) for row in frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).itertuples()],
-        "agreement": _agreement(agreements, min(dts)),
+        "remarks": frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).to_dict("records"),
+        "agreement": pairs[~pairs["metric"].isin(order)].to_dict("records"),
         "contacts": worst_contacts(results, name),
-        "ensemble": _ensemble(pd.concat([frame, agreements]), min(dts)),
+        "ensemble": ensemble.sort_values("metric", key=lambda metrics: metrics.map(order.index), kind="stable").to_dict("records"),
         "wobbles": wobbles_freely(scene),
         "scales": [f"{scale(scene, unit):.3g} {unit}" for unit in dict.fromkeys(own["unit"]) if unit not in ("1", "rad")],
         "has_intervals": any(line.width == INTERVAL_WIDTH for line in convergence),
@@ -111,14 +114,12 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
     }
 
 
-def _trends(studies: pd.DataFrame) -> dict[tuple[str, str], dict[str, str]]:
+def _trends(studies: pd.DataFrame) -> dict[Any, dict[str, str]]:
     """For each metric and engine, the behaviour of the error as dt → 0, its cause, and the worse of the verdicts of its two checks."""
-    by_pair: dict[tuple[str, str], dict[str, Any]] = {}
-    for row in studies.to_dict("records"):
-        by_pair.setdefault((row["metric"], row["engine"]), {})[row["kind"]] = row
-    trends = {}
-    for pair, by_kind in by_pair.items():
-        rows, (order, asymptotic) = list(by_kind.values()), map(by_kind.get, STUDIES)
+    trends: dict[Any, dict[str, str]] = {}
+    for pair, group in studies.groupby(["metric", "engine"], sort=False):
+        rows = group.to_dict("records")
+        order, asymptotic = (next((row for row in rows if row["kind"] == kind), None) for kind in STUDIES)
         m = asymptotic["value"] if asymptotic else float("nan")
         p = numbers.observed_order(order["value"], order["lower"], order["upper"]) if order else ""
         cause, verdict = rows[0]["cause"], "failed" if any(row["verdict"] == "failed" for row in rows) else rows[-1]["verdict"]
@@ -139,18 +140,3 @@ def _all_results(results: Results, scene_name: str, rows: pd.DataFrame) -> dict[
         listed = (texts.setdefault(text, len(texts)) for text in [name, *values, *judged])
         found.append([engines[row["engine"]], int(row["verdict"] == "failed"), *listed])
     return {"scene": scene_name, "rows": found, "texts": list(texts)}
-
-
-def _agreement(agreements: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
-    pairs = agreements[(agreements["dt"] == dt) & ~agreements["metric"].isin(list(ENSEMBLE_METRICS))]
-    return [_row(row) for row in pairs.itertuples()]
-
-
-def _ensemble(frame: pd.DataFrame, dt: float) -> list[dict[str, Any]]:
-    """For each metric, the means over the ensemble, followed by the differences between engines."""
-    rows = frame[(frame["dt"] == dt) & frame["metric"].isin(list(ENSEMBLE_METRICS))]
-    return sorted(map(_row, rows.itertuples()), key=lambda row: list(ENSEMBLE_METRICS).index(row["metric"]))
-
-
-def _row(row: Any) -> dict[str, Any]:
-    return {str(key): value for key, value in row._asdict().items()}

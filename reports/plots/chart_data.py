@@ -1,6 +1,8 @@
 """A chart as JSON for the script of the report, which draws it."""
 
 import base64
+import re
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,24 +23,13 @@ def chart_data(chart: Chart) -> dict[str, Any]:
     reference = next((line for line in chart.lines if chart.reference and line.label == chart.reference), None)
     xs: list[Array] = []
     lines = [_line(line, reference, xs) for line in chart.lines if len(line.x)]
-    content = {
-        "xLabel": chart.x_label,
-        "yLabel": chart.y_label,
-        "xLog": chart.x_log,
-        "yLog": chart.y_log,
-        "flat": chart.is_flat,
-        "map": chart.is_map,
-        "reference": chart.reference,
-        "rounding": chart.rounding,
-        "remark": chart.remark,
-        "ticks": chart.ticks,
-        "rows": chart.rows,
-        "texts": chart.texts,
-        "xRange": chart.x_range,
-        "x": [_positions(x) for x in xs],
-        "lines": lines,
-    }
-    return {key: value for key, value in content.items() if value not in ("", 0.0, False, None) and value not in ((), [])}
+    return _given(vars(chart) | {"is_flat": chart.is_flat, "x": list(map(_positions, xs)), "lines": lines})
+
+
+def _given(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that are not empty, 0 or False, with the names that the script uses: `xLog` for `x_log`, `map` for `is_map`."""
+    given = {name.removeprefix("is_"): value for name, value in fields.items() if value or (isinstance(value, int) and name == "x")}
+    return {re.sub("_(.)", lambda letter: letter[1].upper(), name): value for name, value in given.items()}
 
 
 def _line(line: Line, reference: Line | None, xs: list[Array]) -> dict[str, Any]:
@@ -49,28 +40,17 @@ def _line(line: Line, reference: Line | None, xs: list[Array]) -> dict[str, Any]
     y = line.y.copy()
     if reference is not None and common:
         y[:common] -= reference.y[:common]
-    content = {
-        "label": line.label,
-        "x": number,
-        "y": None if line.is_fill else _packed(y),
-        "common": common,
-        "colour": line.colour,
-        "width": line.width,
-        "dashes": line.dashes,
-        "marker": line.marker,
-        "low": None if line.low is None else _packed(line.low),
-        "high": None if line.high is None else _packed(line.high),
-        "step": line.is_step,
-    }
-    return {key: value for key, value in content.items() if key == "x" or value not in ("", 0, 0.0, False, None)}
+    low, high = (None if values is None else _packed(values) for values in (line.low, line.high))
+    drawn = {"x": number, "y": None if line.is_fill else _packed(y), "low": low, "high": high, "common": common}
+    return _given(vars(line) | drawn | {"is_fill": False})
 
 
 def _at_the_same(x: Array, reference: Array) -> Array:
     """For each position, whether it and all previous ones equal those of the reference, shape (n,)."""
     count = min(len(x), len(reference))
     same = np.isclose(x[:count], reference[:count], rtol=1e-12, atol=0.0)
-    found: Array = np.logical_and.accumulate(same).astype(float)
-    return found
+    so_far: Array = np.logical_and.accumulate(same).astype(float)
+    return so_far
 
 
 def _positions(x: Array) -> Any:

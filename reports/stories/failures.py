@@ -111,16 +111,24 @@ def _failure(results: Results, group: list[Row], baseline: str | None) -> Failur
     )
 
 
-def grouped(results: Results, found: Sequence[Failure], baseline: str | None = None) -> list[FailureGroup]:
+def grouped(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> list[FailureGroup]:
     """The failures of a run, grouped by engine and scene; equal breakdowns of an engine in several scenes are one failure."""
     by_engine: dict[str, dict[tuple[bool, str], list[Failure]]] = {}
-    broken = {(one.scene, one.engine) for one in found if one.broke_down}
-    for one in found:
-        if one.accepted and not one.result and (one.scene, one.engine) in broken:
+    broken = {(failure.scene, failure.engine) for failure in failures if failure.broke_down}
+    for failure in failures:
+        if failure.accepted and not failure.result and (failure.scene, failure.engine) in broken:
             continue  # its accepted results are gone because it broke down
-        cause = one.what if one.broke_down else one.scene
-        by_engine.setdefault(one.engine, {}).setdefault((one.broke_down, cause), []).append(one)
-    return [_group(results, engine, list(by_cause.values()), baseline) for engine, by_cause in by_engine.items()]
+        cause = failure.what if failure.broke_down else failure.scene
+        by_engine.setdefault(failure.engine, {}).setdefault((failure.broke_down, cause), []).append(failure)
+    groups = []
+    for engine, by_cause in by_engine.items():
+        alike = [failure for group in by_cause.values() for failure in group]
+        scenes = list(dict.fromkeys(failure.scene for failure in alike))
+        of_baseline = baseline if any(failure.accepted for failure in alike) else None
+        symmetries = any(failure.of_symmetry for failure in alike)
+        command = reproduce_scenes(results, scenes, engine, baseline=of_baseline, symmetries=symmetries)
+        groups.append(FailureGroup(engine, list(map(_of_one_cause, by_cause.values())), _consistent_with(results, engine), command))
+    return groups
 
 
 def failure_parts(groups: Sequence[FailureGroup], most: int) -> list[Part]:
@@ -135,19 +143,11 @@ def failure_parts(groups: Sequence[FailureGroup], most: int) -> list[Part]:
     return parts
 
 
-def _group(results: Results, engine: str, by_cause: Sequence[Sequence[Failure]], baseline: str | None) -> FailureGroup:
-    scenes = list(dict.fromkeys(one.scene for some in by_cause for one in some))
-    accepted = any(one.accepted for some in by_cause for one in some)
-    symmetric = any(one.of_symmetry for some in by_cause for one in some)
-    command = reproduce_scenes(results, scenes, engine, baseline=baseline if accepted else None, symmetries=symmetric)
-    return FailureGroup(engine, [_of_one_cause(some) for some in by_cause], _consistent_with(results, engine), command)
-
-
 def _consistent_with(results: Results, engine: str) -> str:
     """The causes with which the errors of an engine are consistent, in a sentence; empty if there are none."""
     parameters, faults = causes(results, engine)
-    found = [" or ".join(dict.fromkeys(map(_described, parameters))), *(f"this fault: {fault.message}" for fault in faults)]
-    listed = ", or with ".join(filter(None, found))
+    wrong = " or ".join(dict.fromkeys(map(_described, parameters)))
+    listed = ", or with ".join(filter(None, [wrong, *(f"this fault: {fault.message}" for fault in faults)]))
     return f"Consistent with {listed}." if listed else ""
 
 
@@ -159,17 +159,18 @@ def _described(wrong: WrongParameter) -> str:
     return f"{name} {size} too {'high' if wrong.size > 0.0 else 'low'}"
 
 
-def _of_one_cause(some: Sequence[Failure]) -> str:
+def _of_one_cause(failures: Sequence[Failure]) -> str:
     """The first of some failures in words, and the number of the others."""
-    first = some[0]
-    if first.broke_down:
-        others = list(dict.fromkeys(one.scene for one in some[1:]))
-        return first.sentence.rstrip(".") + (f"; the same in {_listed(others)}" if others else "") + "."
-    rows = sum(1 + one.others for one in some[1:])
-    results = [name for name in dict.fromkeys(one.result for one in some[1:]) if name not in ("", first.result)]
-    others_too = f" ({_listed(results)})" if results else ""
-    fail = counted(rows, "other result of this scene fails", "other results of this scene fail")
-    return first.sentence.rstrip(".") + (f"; {fail}{others_too}" if rows else "") + "."
+    first, *others = failures
+    more = ""
+    if others and first.broke_down:
+        more = f"; the same in {_listed(list(dict.fromkeys(failure.scene for failure in others)))}"
+    elif others:
+        results = list(dict.fromkeys(failure.result for failure in others if failure.result not in ("", first.result)))
+        count = sum(1 + failure.others for failure in others)
+        fail = counted(count, "other result of this scene fails", "other results of this scene fail")
+        more = f"; {fail}" + (f" ({_listed(results)})" if results else "")
+    return f"{first.sentence.rstrip('.')}{more}."
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -235,9 +236,9 @@ def reproduce_drawn(results: Results) -> list[str]:
     if "draw" not in asked:
         return []
     named = [results.scenes[name].origin for name in asked["scenes"][: -asked["draw"]]]
+    drawn = ["--draw", str(asked["draw"]), "--seed", str(asked["seed"])]
     engines = [word for label in results.engines for word in ("-e", results.provenance["names"][label])]
-    options = _options(sorted(asked["dts"], reverse=True), asked)
-    command = ["dropspin", "run", *named, "--draw", str(asked["draw"]), "--seed", str(asked["seed"]), *engines, *options, "-o", "out/again"]
+    command = ["dropspin", "run", *named, *drawn, *engines, *_options(sorted(asked["dts"], reverse=True), asked), "-o", "out/again"]
     return [f"Scenes drawn with seed {asked['seed']}: {asked['draw']}. Reproduce: {shlex.join(command)}"]
 
 

@@ -60,15 +60,16 @@ def nominal(found: RobustnessStudy) -> str:
     )
 
 
-def step_rows(found: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
+def step_rows(studies: Sequence[RobustnessStudy]) -> list[dict[str, str]]:
     """The largest tested time steps at which each engine is accurate and stable, for each scene."""
-    table = []
-    for one in found:
-        spin = float(np.linalg.norm(one.scene.start.angular_velocity)) if one.scene.floor is None else 0.0
-        for engine in dict.fromkeys(scan.engine for scan in one.scans if scan.axis.name == "step"):
-            accurate, stable = (_largest(dt, one.steps(engine), spin) for dt in one.largest_steps(engine))
-            table.append({"scene": one.scene.name, "engine": engine, "accurate up to": accurate, "stable up to": stable})
-    return table
+    rows = []
+    for study in studies:
+        scene = study.scene
+        spin = float(np.linalg.norm(scene.start.angular_velocity)) if scene.floor is None else 0.0
+        for engine in dict.fromkeys(scan.engine for scan in study.scans if scan.axis.name == "step"):
+            accurate, stable = (_largest(dt, study.steps(engine), spin) for dt in study.largest_steps(engine))
+            rows.append({"scene": scene.name, "engine": engine, "accurate up to": accurate, "stable up to": stable})
+    return rows
 
 
 def _largest(dt: float | None, tried: Sequence[ScanPoint], spin: float) -> str:
@@ -95,24 +96,23 @@ def range_rows(found: RobustnessStudy) -> list[dict[str, str]]:
 
 def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
     """The range of an axis; `nominal` is the failure mode at the nominal values, if there is one, which an invariant axis repeats."""
-    points, sound = scan.points, scan.sound_range
-    if scan.axis.invariant and nominal and all(point.mode == "sound" for point in points):
-        beyond = f"{nominal} at the nominal value; the same motion at all {len(points)} tested values"
-        return {"sound from": "–", "to": "–", "beyond": beyond}
-    if sound is None:
-        those = sum(point.mode == "sound" for point in points)
-        beyond = f"{_mode(scan.at(scan.base))} at the nominal value, {scan.base:.4g}; sound at {those} of {len(points)} tested values"
-        return {"sound from": "–", "to": "–", "beyond": beyond}
-    first, last = sound
-    outside = [f"{_mode(points[number])} at {points[number].value:.4g}" for number in (first - 1, last + 1) if 0 <= number < len(points)]
+    points, ends = scan.points, scan.sound_range
+    count, sound = len(points), sum(point.mode == "sound" for point in points)
+    none = {"sound from": "–", "to": "–"}
+    if ends is None:
+        base = f"{_mode(scan.at(scan.base))} at the nominal value, {scan.base:.4g}"
+        return none | {"beyond": f"{base}; sound at {sound} of {count} tested values"}
+    first, last = ends
+    least, most = (f"{points[number].value:.4g}" for number in ends)
+    outside = [f"{_mode(points[number])} at {points[number].value:.4g}" for number in (first - 1, last + 1) if 0 <= number < count]
     if scan.axis.invariant and nominal:
-        same = f"{nominal} at the nominal value; the same motion from {points[first].value:.4g} to {points[last].value:.4g}"
-        return {"sound from": "–", "to": "–", "beyond": "; ".join([same, *outside])}
+        same = f"at all {count} tested values" if sound == count else f"from {least} to {most}"
+        return none | {"beyond": "; ".join([f"{nominal} at the nominal value; the same motion {same}", *outside])}
     if not outside:
-        outside = [f"not tested; {'the same motion' if scan.axis.invariant else 'sound'} at all {len(points)} tested values"]
+        outside = [f"not tested; {'the same motion' if scan.axis.invariant else 'sound'} at all {count} tested values"]
     elif len(outside) == 1:
         outside.append(f"no {'smaller' if first == 0 else 'larger'} value tested")
-    return {"sound from": f"{points[first].value:.4g}", "to": f"{points[last].value:.4g}", "beyond": "; ".join(outside)}
+    return {"sound from": least, "to": most, "beyond": "; ".join(outside)}
 
 
 def sentences(found: RobustnessStudy) -> list[str]:
@@ -123,13 +123,11 @@ def sentences(found: RobustnessStudy) -> list[str]:
 
 def _refinement(engine: str, points: Sequence[ScanPoint]) -> str:
     nominal, *smaller = points
-    sentence = (
-        f"{engine} is not sound at the nominal values and dt = {_step(nominal.value)}: {_mode(nominal)}, {nominal.diagnosis.message}."
-    )
+    where = f"{engine} is not sound at the nominal values and dt = {_step(nominal.value)}"
+    sentence = f"{where}: {_mode(nominal)}, {nominal.diagnosis.message}."
     if not smaller:
         return f"{sentence} No smaller time step was tried."
-    tried = [f"{mode} at {', '.join(_step(point.value) for point in some)}" for mode, some in groupby(smaller, _mode)]
-    at_the_end = (
-        "" if smaller[-1].mode == "sound" else f" At {_step(smaller[-1].value)}, the smallest tried, {smaller[-1].diagnosis.message}."
-    )
-    return f"{sentence} Smaller time steps tried: {'; '.join(tried)}.{at_the_end}"
+    tried = [f"{mode} at {', '.join(_step(point.value) for point in group)}" for mode, group in groupby(smaller, _mode)]
+    sentence += f" Smaller time steps tried: {'; '.join(tried)}."
+    last = smaller[-1]
+    return sentence if last.mode == "sound" else f"{sentence} At {_step(last.value)}, the smallest tried, {last.diagnosis.message}."

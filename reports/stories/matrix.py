@@ -42,12 +42,12 @@ def matrix(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> Ma
     leading = leading_errors(results)
     rows = []
     for scene in scenes:
-        one, found = leading.get(scene), statuses[scene]
-        of = "" if one is None else quantity(one.metric) + unit(one.unit)
-        sizes = {} if one is None else {engine: formatted(size) for engine, size in one.sizes.items() if not math.isnan(size)}
-        cells = [(status.mark, sizes.get(engine, "")) for engine, status in found.items()]
-        rows.append(MatrixRow(scene, of, cells, any(status.verdict in FAILURES | BREAKDOWNS for status in found.values())))
-    steps = sorted({in_ms(one.dt) for one in leading.values()})
+        errors, by_engine = leading.get(scene), statuses[scene]
+        of = quantity(errors.metric) + unit(errors.unit) if errors else ""
+        sizes = {engine: formatted(size) for engine, size in errors.sizes.items() if not math.isnan(size)} if errors else {}
+        cells = [(status.mark, sizes.get(engine, "")) for engine, status in by_engine.items()]
+        rows.append(MatrixRow(scene, of, cells, any(status.verdict in FAILURES | BREAKDOWNS for status in by_engine.values())))
+    steps = sorted({in_ms(errors.dt) for errors in leading.values()})
     legend = legend_of_marks({scene: statuses[scene] for scene in scenes})
     return Matrix(rows, f"error at dt = {' or '.join(steps)}" if steps else "", legend, left_out)
 

@@ -45,7 +45,7 @@ PATHS = st.sampled_from(
     ["run", "ball.toml", "spec.toml", "absent", ".", "..", "/", "/dev/null", "/dev/full", "/proc/x", "run/run.json", "ball.toml/x", "pipe"]
 )
 ODD = st.one_of(TEXTS, TEXTS, NUMBERS.map(str), PATHS)
-LIMITS = {"time_limit": ["1", "0.5", "1e8"], "budget": ["0.1", "0.05", "1e8"]}
+LIMITS = {"resources": ["1", "0.5", "1e8"], "budget": ["0.1", "0.05", "1e8"]}
 """Values of options with which a command ends soon."""
 ALWAYS = {"run": ["--time-limit", "1"], "sweep": ["--time-limit", "1"], "limits": ["--time-limit", "1", "--axis", "step"]}
 ALWAYS |= {"tradeoff": ["--budget", "0.1"], "conform": ["--time-limit", "1"], "replay": ["--no-open"], "record": ["--merge=run"]}

@@ -214,6 +214,6 @@ def test_defaults_of_options_are_those_of_the_library():
     """Options state their defaults as numbers, because `--help` imports no library."""
     limits = {option.name: option.default for option in limits_command.params}
     run = {option.name: option for option in run_command.params}
-    assert (limits["dt"], limits["within"], limits["time_limit"]) == (study.DT, study.WITHIN, study.RESOURCES.processor_time)
-    assert run["time_limit"].default == ResourceLimits().processor_time
+    assert (limits["dt"], limits["within"], limits["resources"]) == (study.DT, study.WITHIN, study.RESOURCES.processor_time)
+    assert run["resources"].default == ResourceLimits().processor_time
     assert run["dts"].help.endswith(f"[default: {', '.join(map(str, ds.DEFAULT_DTS))}]")

@@ -1,7 +1,7 @@
-"""The cost of a default run relative to its stepping and recording, and of a job of a sweep beside its stepping: `make bench`.
+"""The stages of a default run relative to the bare stepping of its engines, and a job of a sweep beside its stepping: `make bench`.
 
-The run is made in this process, so that all of its parts can be timed. Ratios and shares are printed, because absolute times on a shared
-machine are noise.
+The run is made in this process, so that all of its parts can be timed; bare stepping is that of the same simulations again, without
+reading a state. Ratios are printed, because absolute times on a shared machine are noise.
 """
 
 import tempfile
@@ -41,6 +41,8 @@ STAGES = {
 
 seconds: dict[str, float] = defaultdict(float)
 active: list[str] = []
+simulated: list[tuple[ds.Engine, Sequence[ds.Scenario], float]] = []
+"""The engine, the scenes and the time step of each simulation, or batch, of the run."""
 
 
 def time_method(owner: Any, name: str, part: str) -> None:
@@ -58,6 +60,30 @@ def time_method(owner: Any, name: str, part: str) -> None:
                 seconds[part] += time.perf_counter() - start
 
     setattr(owner, name, timed)
+
+
+def note_simulations(module: Any, name: str) -> None:
+    """Add what a function of a module simulates to `simulated`."""
+    function: Callable[..., Any] = getattr(module, name)
+
+    def noted(engine: ds.Engine, scenes: ds.Scenario | Sequence[ds.Scenario], dt: float, *given: Any, **named: Any) -> Any:
+        simulated.append((engine, [scenes] if isinstance(scenes, ds.Scenario) else scenes, dt))
+        return function(engine, scenes, dt, *given, **named)
+
+    setattr(module, name, noted)
+
+
+def bare_stepping() -> float:
+    """The time that the simulations of the run take without reading a state [s]."""
+    spent = 0.0
+    for engine, scenes, dt in simulated:
+        batch = engine.prepare_batch(scenes, dt) if len(scenes) > 1 else None
+        for simulation in (engine.prepare(scene, dt) for scene in scenes) if batch is None else [batch]:
+            with simulation:
+                start = time.perf_counter()
+                simulation.advance(scenes[0].steps(dt))
+                spent += time.perf_counter() - start
+    return spent
 
 
 class ProcessesHere:
@@ -90,7 +116,7 @@ class ProcessesHere:
 
 
 def run_cost(scenes: Sequence[ds.Scenario]) -> None:
-    """Print the parts of a run relative to its stepping and recording."""
+    """Print the stages of a run relative to the bare stepping of its engines."""
     simulations = (WangSimulation, WangBatch, MuJoCoSimulation, MuJoCoBatch, PyBulletSimulation)
     for simulation, name in product(simulations, ("record", "advance")):
         time_method(simulation, name, "stepping and recording")
@@ -101,18 +127,24 @@ def run_cost(scenes: Sequence[ds.Scenario]) -> None:
     for stage, functions in STAGES.items():
         for module, name in functions:
             time_method(import_module(f"dropspin.comparisons.running.{module}"), name, stage)
+    for module, name in (("engine_run", "record"), ("engine_run", "record_batch"), ("ensembles", "record_batch")):
+        note_simulations(import_module(f"dropspin.comparisons.running.{module}"), name)
     import_module("dropspin.comparisons.running.run").EngineProcesses = ProcessesHere
     ds.run(scenes[:1], "wang", jobs=1)  # compiles
     seconds.clear()
+    simulated.clear()
     start = time.perf_counter()
     results = ds.run(scenes, ["wang", "mujoco", "pybullet"], jobs=1)
-    seconds["all of the run"] = time.perf_counter() - start
+    whole = time.perf_counter() - start
+    seconds["all else"] = whole - sum(seconds.values())
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         ds.write_report(results, f"{folder}/run")
-        seconds["the report, after the run"] = time.perf_counter() - start
+        seconds["report"] = time.perf_counter() - start
+    bare = bare_stepping()
     for part, spent in seconds.items():
-        print(f"{part}: {spent / seconds['stepping and recording']:.2f} times its stepping and recording")
+        print(f"{part}: {spent / bare:.2f} times bare stepping")
+    print(f"the run and its report: {sum(seconds.values()) / bare:.2f} times bare stepping")
 
 
 def sweep_cost() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.contacts import contact_residuals
 from dropspin.comparisons.measuring.motions import Motions, RowNumbers, Setup
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
-from dropspin.comparisons.measuring.states import Array, Mask, States, is_touching
+from dropspin.comparisons.measuring.states import Array, Mask, States, StatesOfMany, is_touching
 from dropspin.scenarios import Scenario, Trajectory, mechanics
 from dropspin.scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
 
@@ -24,17 +24,6 @@ BATCH_BYTES = 8 * 2**20
 AT_ONCE = ("kinetic_energy", "energy", "lowest_height", "touching")
 REACH = 1.0 + 1e-9
 """Height of the centre of mass, relative to the size of the body, above which no point of it is below the floor."""
-
-
-class _StatesOfMany(NamedTuple):
-    """`StateQuantities` of many motions."""
-
-    height: Array
-    vertical_velocity: Array
-    kinetic_energy: Array
-    energy: Array
-    lowest_height: Array
-    touching: Mask
 
 
 def motions_side_by_side(
@@ -56,13 +45,12 @@ def motions_side_by_side(
     shape = states.shape[:2]
     height, kinetic, energy, lowest = (np.empty(shape) for _ in range(4))
     touching, valid = np.zeros((shape[0], shape[1] - 1), dtype=bool), np.ones(shape[0], dtype=bool)
+    found = StatesOfMany(height, states[..., 8], kinetic, energy, lowest, touching)
     shared = (setup.mass, setup.inertia, setup.vertices, setup.rounding, setup.size, setup.origin, setup.gravity, setup.gravity_strength)
-    given = [_for_each(values, shape[0]) for values in (*shared, setup.damping_share(dt), dt, velocity_lag)]
-    rows = np.ascontiguousarray(states)
-    _kernel()(
-        height, kinetic, energy, lowest, touching, valid, rows, unit_tolerance, np.ascontiguousarray(last_row, dtype=np.int64), *given
-    )
-    return Motions(setup, _StatesOfMany(height, states[..., 8], kinetic, energy, lowest, touching), dt, last_row), valid
+    given = tuple(_for_each(values, shape[0]) for values in (*shared, setup.damping_share(dt), dt, velocity_lag))
+    rows, last = np.ascontiguousarray(states), np.ascontiguousarray(last_row, dtype=np.int64)
+    _kernel()((height, kinetic, energy, lowest, touching, valid), rows, unit_tolerance, last, given)
+    return Motions(setup, found, dt, last_row), valid
 
 
 def compute_cases(cases: Sequence[Comparison]) -> None:
@@ -124,28 +112,9 @@ def _kernel() -> Callable[..., None]:
     return compile_cached(_fill, *(Path(module) for module in (__file__, mechanics.__file__, states_module.__file__)))
 
 
-def _fill(
-    height: Any,
-    kinetic: Any,
-    energy: Any,
-    lowest: Any,
-    touching: Any,
-    valid: Any,
-    states: Any,
-    unit_tolerance: float,
-    last_row: Any,
-    mass: Any,
-    inertia: Any,
-    vertices: Any,
-    rounding: Any,
-    size: Any,
-    origin: Any,
-    gravity: Any,
-    strength: Any,
-    damping_share: Any,
-    dt: Any,
-    lag: Any,
-) -> None:
+def _fill(found: Any, states: Any, unit_tolerance: float, last_row: Any, given: Any) -> None:
+    height, kinetic, energy, lowest, touching, valid = found
+    mass, inertia, vertices, rounding, size, origin, gravity, strength, damping_share, dt, lag = given
     for body in range(states.shape[0]):
         i, o, g, last = inertia[body], (origin[body, 0], origin[body, 1], origin[body, 2]), gravity[body], last_row[body]
         tensor = ((i[0, 0], i[0, 1], i[0, 2]), (i[1, 0], i[1, 1], i[1, 2]), (i[2, 0], i[2, 1], i[2, 2]))

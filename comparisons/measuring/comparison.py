@@ -109,8 +109,8 @@ class Comparison:
     @property
     def states(self) -> States:
         """Quantities at each state of the motion."""
-        states: States = self.motions.states  # type: ignore[assignment]
-        return states
+        assert isinstance(self.motions.states, States)
+        return self.motions.states
 
     @cached_property
     def exact_states(self) -> States:
@@ -239,11 +239,6 @@ class Comparison:
         """The last row before and the first row after the first contact; None without a contact."""
         before, after = self.motions.first_contact
         return None if before < 0 else (int(before), int(after))
-
-    @property
-    def in_contact(self) -> NDArray[np.bool_]:
-        """For each step, whether it is in a contact, shape (n - 1,)."""
-        return self.motions.in_contact
 
     def contact_point(self, row: int) -> Array:
         """The vector from the centre of mass to the lowest point at a row [m], shape (3,); the mean if several points are equally low."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,40 +15,30 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-class StateQuantities(Protocol):
-    """Quantities at each state of a motion; rows after the last one of a shorter motion repeat its last state."""
+class StatesOfMany(NamedTuple):
+    """Quantities at each state of many motions; rows after the last one of a shorter motion repeat its last state.
 
-    @property
-    def height(self) -> Array:
-        """Height of the centre of mass [m], shape (..., n)."""
+    Attributes:
+        height: Height of the centre of mass [m], shape (B, n).
+        vertical_velocity: Of the centre of mass [m/s], shape (B, n).
+        kinetic_energy: [J], shape (B, n).
+        energy: Kinetic plus potential energy, velocity synchronised with position [J], shape (B, n).
+        lowest_height: Height of the body's lowest point above the floor [m], shape (B, n). It may be inf where no point is below the floor,
+            except at the rows of a step in `touching` and of the step before it.
+        touching: For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (B, n - 1).
+    """
 
-    @property
-    def vertical_velocity(self) -> Array:
-        """Of the centre of mass [m/s], shape (..., n)."""
-
-    @property
-    def kinetic_energy(self) -> Array:
-        """[J], shape (..., n)."""
-
-    @property
-    def energy(self) -> Array:
-        """Kinetic plus potential energy, velocity synchronised with position [J], shape (..., n)."""
-
-    @property
-    def lowest_height(self) -> Array:
-        """Height of the body's lowest point above the floor [m], shape (..., n).
-
-        It may be inf where no point is below the floor, except at the rows of a step in `touching` and of the step before it.
-        """
-
-    @property
-    def touching(self) -> Mask:
-        """For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (..., n - 1)."""
+    height: Array
+    vertical_velocity: Array
+    kinetic_energy: Array
+    energy: Array
+    lowest_height: Array
+    touching: Mask
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """`StateQuantities` of one motion of a scene, each computed once."""
+    """Quantities at each state of one motion of a scene, each computed once."""
 
     scene: Scenario
     motion: Trajectory

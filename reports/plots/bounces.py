@@ -52,7 +52,7 @@ def plot_bounce_ladder(results: Results, scene_name: str, axes: "Axes") -> None:
 @np.errstate(all="ignore")  # an engine may return 1e300
 def apexes(scene: Scenario, motion: Trajectory) -> Array:
     """Apex above the floor [m] of the drop and of each later flight, averaged over the middle half of the flight, shape (flights,)."""
-    in_contact = Comparison(scene, motion).in_contact
+    in_contact = Comparison(scene, motion).motions.in_contact
     edges = np.flatnonzero(np.diff(np.concatenate([[True], in_contact, [True]])))
     found = []
     for start, end in edges.reshape(-1, 2):  # rows at which a flight begins and ends

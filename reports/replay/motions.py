@@ -214,7 +214,7 @@ def impact_rows(scene: Scenario, motion: Trajectory) -> tuple[Rows, Rows, Rows]:
     Returns:
         The row before each impact, the row after it, and the row after the step with the largest impulse in it, each of shape (k,).
     """
-    steps = np.flatnonzero(Comparison(scene, motion).in_contact)
+    steps = np.flatnonzero(Comparison(scene, motion).motions.in_contact)
     impulses = np.linalg.norm(floor_impulses(scene, motion, steps, steps + 1)[0], axis=1)
     weight = scene.body.mass * float(np.linalg.norm(scene.acceleration))
     is_impact = impulses > RESOLVED_HOP * weight * (motion.t[1] - motion.t[0])

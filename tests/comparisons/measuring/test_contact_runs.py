@@ -91,7 +91,7 @@ def test_impact_is_told_from_an_acceleration_that_is_wrong_in_flight(name, dt):
     last = np.full(2, len(motion) - 1)
     both, _ = motions_side_by_side(Setup.of_starts([BALL]), beside, np.full(2, dt), np.full(2, 0.5 * dt), last, 1e-5)
     assert (both.first_contact[0][1], both.first_contact[1][1]) == case.first_contact
-    np.testing.assert_array_equal(both.in_contact[1], case.in_contact)
+    np.testing.assert_array_equal(both.in_contact[1], case.motions.in_contact)
 
 
 def test_tilted_gravity_has_the_contacts_of_level_gravity():

@@ -48,6 +48,24 @@ def _shared_functions():
     simulate("drop-box-corner", "wang", 1e-2)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _engines_in_process():
+    """Engines work in the process of the tests, but for tests that use `engine_processes`."""
+    from support.in_process import engines_in_process
+
+    with engines_in_process():
+        yield
+
+
+@pytest.fixture
+def engine_processes():
+    """Each engine works in a process of its own, as it does outside tests."""
+    from support.in_process import engines_in_processes
+
+    with engines_in_processes():
+        yield
+
+
 @pytest.fixture
 def few_start_phases(monkeypatch):
     """Four start phases instead of 32, for engines made for tests: they solve each start anew, and are as exact from each."""

@@ -25,6 +25,11 @@ def _surroundings(tmp_path_factory):
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 0)
 
 
+@pytest.fixture(autouse=True)
+def _isolated(engine_processes):
+    """A case is a whole command, whose processes are counted."""
+
+
 @pytest.fixture(scope="session")
 def sound(shared):
     """A folder with a scene, two runs of it, a baseline of them, a sweep, and a study; tests only copy from it."""

@@ -1,5 +1,7 @@
 """The option --engine: the engine whose adapter is tested, in an environment that has it."""
 
+import pytest
+
 from dropspin.comparisons.results.provenance import versions
 
 
@@ -30,3 +32,8 @@ def pytest_generate_tests(metafunc):
 
         commands = [command for command in findings() if heavy_engine(command) == metafunc.config.getoption("engine")]
         metafunc.parametrize("finding", commands)
+
+
+@pytest.fixture(autouse=True)
+def _isolated(engine_processes):
+    """Engines of this folder load libraries of hundreds of MB, which disturb one another."""

@@ -233,6 +233,7 @@ def test_planted_fault_of_a_contact_is_named(change, check, message):
     assert message in found[check][1]
 
 
+@pytest.mark.usefixtures("engine_processes")
 def test_crash_of_the_process_fails_its_check_only():
     """A segmentation fault with gravity; checks without gravity still run."""
     import ctypes

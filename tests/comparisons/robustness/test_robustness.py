@@ -308,6 +308,7 @@ def test_exact_engine_is_sound_everywhere(name):
     assert [(scan.axis.name, point.value, point.diagnosis) for scan in found.scans for point in scan.points if point.mode != "sound"] == []
 
 
+@pytest.mark.usefixtures("engine_processes")
 def test_limits_do_not_depend_on_the_number_of_jobs():
     """Also where an engine ends its process."""
 
@@ -324,6 +325,7 @@ def test_limits_do_not_depend_on_the_number_of_jobs():
     assert {point.mode for scan in studies[0].scans for point in scan.points} >= {"sound", "clamped", "crashed", "inaccurate"}
 
 
+@pytest.mark.usefixtures("engine_processes")
 def test_crash_of_the_process_is_a_failure_mode():
     class Leaving(Exact):
         name = "leaving"

@@ -24,6 +24,8 @@ from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimi
 BALL, SPIN, TIGHT = breaking.BALL, breaking.SPIN, breaking.TIGHT
 TESTS = Path(__file__).parents[2]
 
+pytestmark = pytest.mark.usefixtures("engine_processes")
+
 
 @pytest.fixture(autouse=True, scope="module")
 def _compiled():

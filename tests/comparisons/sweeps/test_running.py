@@ -65,6 +65,7 @@ class Breaking(test_engines.Exact):
         return super().prepare(scene, dt)
 
 
+@pytest.mark.usefixtures("engine_processes")
 def test_engine_that_breaks_costs_its_own_rows(tmp_path):
     """A segmentation fault, an endless loop, an exception, NaN: each is reported in its row; the other rows do not change."""
     sweep = load_sweep(SPEC)
@@ -104,6 +105,7 @@ class Leaking(test_engines.Exact):
         return super().prepare(scene, dt)
 
 
+@pytest.mark.usefixtures("engine_processes")
 def test_leak_is_not_attributed_to_a_job(tmp_path):
     """Sixteen jobs exceed a limit of 1 GB together; none of them does in a process of its own."""
     sweep = replace(load_sweep(SPEC | {"grid": {"floor.restitution": {"from": 0.1, "to": 0.9, "count": 16}}}), engines=(Leaking(),))

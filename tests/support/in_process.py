@@ -1,0 +1,74 @@
+"""Engines in the process of the tests: most tests are about results, and a process for each engine costs more than its steps.
+
+Engines of one's own, whose code a command imports anew, keep their processes; an engine that is to have a new process has one from then on;
+and so has every engine in tests that use the fixture `engine_processes`: crashes, hangs, leaks, limits, and what else depends on isolation.
+"""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import RLock
+from unittest import mock
+
+from dropspin.comparisons.engines.exceptions import described
+from dropspin.comparisons.engines.stand_in import StandIn
+from dropspin.comparisons.running.engine_process import Failed
+from dropspin.comparisons.running.engine_run import EngineRun, run_engine
+from dropspin.comparisons.running.processes import Closed, EngineProcesses
+from dropspin.comparisons.running.recording import Breakdown
+
+REAL = {name: getattr(EngineProcesses, name) for name in ("start", "run_engine", "call", "renew")}
+_one_at_a_time = RLock()
+
+
+def needs_process(processes, entry):
+    """Whether an engine's code must stay out of this process, or it was given a new process before."""
+    is_foreign = not entry.absence and (entry.engine is None or isinstance(entry.engine, StandIn))
+    return is_foreign or entry.label in processes._pools
+
+
+def start(self, entries):
+    REAL["start"](self, [entry for entry in entries if needs_process(self, entry)])
+
+
+def renew(self, entry):
+    if needs_process(self, entry):
+        REAL["renew"](self, entry)
+    REAL["start"](self, [entry])
+
+
+def run(self, entry, scene, dt, starts, on_simulations=lambda done, total: None, *, quick=False):
+    if needs_process(self, entry):
+        return REAL["run_engine"](self, entry, scene, dt, starts, on_simulations, quick=quick)
+    try:
+        return call(self, entry, run_engine, scene, dt, starts, on_simulations, quick=quick)
+    except Failed as failure:
+        return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
+
+
+def call(self, entry, work, *given, while_waiting=lambda: None, **options):
+    """As `EngineProcesses.call`; one piece of work at a time, for not all that engines do is safe in threads."""
+    if needs_process(self, entry):
+        return REAL["call"](self, entry, work, *given, while_waiting=while_waiting)
+    if self._closed:
+        raise Closed
+    while_waiting()
+    with _one_at_a_time, mock.patch.object(tempfile, "tempdir", tempfile.tempdir):
+        try:
+            return work(entry, *given, **options)
+        except Exception as error:
+            raise Failed("crashed", described(error)) from None
+
+
+@contextmanager
+def engines_in_process() -> Iterator[None]:
+    """Let engines work in this process, one at a time."""
+    with mock.patch.multiple(EngineProcesses, start=start, run_engine=run, call=call, renew=renew):
+        yield
+
+
+@contextmanager
+def engines_in_processes() -> Iterator[None]:
+    """Let each engine work in a process of its own, as it does outside tests."""
+    with mock.patch.multiple(EngineProcesses, **REAL):
+        yield

@@ -57,13 +57,13 @@ def test_check_judges_a_run_and_writes_junit_and_a_summary(release, repository, 
 
 def test_check_reads_by_default_the_baseline_that_accept_writes_by_default(repository, tmp_path):
     """And the output says whether there was one."""
-    assert dropspin("check", "out/failing", cwd=repository).stdout == dropspin("check", "out/failing", *BASELINE, cwd=repository).stdout
+    assert dropspin("check", "out/crashing", cwd=repository).stdout == dropspin("check", "out/crashing", *BASELINE, cwd=repository).stdout
     with_baseline = dropspin("check", "out/good", cwd=repository).stdout
     assert "Checked: the expectations of the scenes, and the accepted results in dropspin-baseline.toml." in with_baseline
-    without = dropspin("check", repository / "out/failing", "--summary", "summary.md", cwd=tmp_path)
+    without = dropspin("check", repository / "out/crashing", "--summary", "summary.md", cwd=tmp_path)
     assert "Checked: the expectations of the scenes only, without a baseline." in without.stdout
     assert "without a baseline" in (tmp_path / "summary.md").read_text()
-    left_out = dropspin("check", "out/failing", "--no-baseline", cwd=repository)
+    left_out = dropspin("check", "out/crashing", "--no-baseline", cwd=repository)
     assert (left_out.returncode, left_out.stdout) == (without.returncode, without.stdout)
 
 
@@ -81,10 +81,13 @@ def test_run_that_the_default_baseline_does_not_cover_is_refused_with_the_remedy
 
 def test_the_command_that_reproduces_a_failure_measures_the_same_value(repository, tmp_path):
     """It is one command and ends as the check did."""
-    found = json.loads(dropspin("check", "out/failing", *BASELINE, "--json", cwd=repository).stdout)
-    [row] = [row for row in found if row["kind"] == "baseline" and row["metric"] == "restitution_error" and row["dt"] == 0.004]
+    checked = dropspin("check", "out/failing", *BASELINE, "--json", "--junit", tmp_path / "j.xml", cwd=repository)
+    [row] = [
+        row
+        for row in json.loads(checked.stdout)
+        if row["kind"] == "baseline" and row["metric"] == "restitution_error" and row["dt"] == 0.004
+    ]
     command = f"dropspin run drop-ball -e {ENGINE} --dt 0.004 --baseline dropspin-baseline.toml -o out/again"
-    checked = dropspin("check", "out/failing", *BASELINE, "--junit", tmp_path / "j.xml", cwd=repository)
     assert checked.returncode == 1
     assert command in (tmp_path / "j.xml").read_text()
     for name in ("my_engine.py", "dropspin-baseline.toml"):
@@ -184,9 +187,9 @@ def test_known_failures_are_counted_apart(metric, accepted, outcome):
 
 def test_annotations_are_for_github(repository):
     """Commands that its runner reads, only there, and no more than it shows."""
-    quiet = dropspin("check", "out/failing", *BASELINE, cwd=repository)
+    quiet = dropspin("check", "out/crashing", *BASELINE, cwd=repository)
     assert "::error" not in quiet.stdout
-    loud = dropspin("check", "out/failing", *BASELINE, cwd=repository, GITHUB_ACTIONS="true")
+    loud = dropspin("check", "out/crashing", *BASELINE, cwd=repository, GITHUB_ACTIONS="true")
     commands = [line for line in loud.stdout.splitlines() if line.startswith("::")]
     assert 0 < len(commands) <= 10
     assert commands[0].startswith("::error title=drop-ball my-engine::drop-ball · ")

@@ -40,7 +40,7 @@ def assert_outcome(release, folder, done, exit_codes, junit_schema):
 
 
 @pytest.mark.parametrize("server", ["github", pytest.param("gitlab", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("release", ["good", "failing", "crashing"])
+@pytest.mark.parametrize("release", ["failing", *(pytest.param(release, marks=pytest.mark.slow) for release in ("good", "crashing"))])
 def test_an_example_judges_a_good_a_failing_and_a_crashing_engine(server, release, repository, exit_codes, junit_schema, tmp_path):
     """By the example's own lines, with one scene and one time step, and what is installed here."""
     for name in ("my_engine.py", "dropspin-baseline.toml"):

@@ -8,8 +8,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.published.printed import agreement
-from dropspin.comparisons.published.results import EXACT, Result, Status, compared
+from dropspin.comparisons.published.results import EXACT, Agreement, Result, Status, agreement
 from dropspin.comparisons.published.sources import DATA, Source
 from dropspin.scenarios import Scenario, Truth, load, truth_for
 from dropspin.scenarios.mechanics import kinetic_energy
@@ -54,27 +53,27 @@ def nesc_brick(source: Source) -> list[Result]:
         worst, rate = np.unravel_index(np.argmax(np.abs(printed - rates)), printed.shape)
         text = rows[worst][RATES[rate]]
         quantity = f"{RATES[rate]}, {times[worst]:.0f} s [deg/s]"
-        here = f"{rates[worst, rate]:.{DECIMALS}f}"
-        error = float(printed[worst, rate] - rates[worst, rate])
-        results.append(_beside_exact(source, name, quantity, text, here, "error of the source", error))
+        error = Agreement(f"{rates[worst, rate]:.{DECIMALS}f}", float(printed[worst, rate] - rates[worst, rate]), agrees=False)
+        results.append(_beside_exact(source, name, quantity, text, error, is_claimed=False))
     return results
 
 
-def _beside_exact(source: Source, tool: str, quantity: str, published: str, here: str, status: Status, difference: float) -> Result:
-    return Result(source.name, tool, quantity, published, here, EXACT, status, difference=difference)
+def _beside_exact(source: Source, tool: str, quantity: str, published: str, found: Agreement, *, is_claimed: bool = True) -> Result:
+    """A published value beside the exact one; of one that is not claimed to be exact, its error."""
+    status: Status = found.status if is_claimed else "error of the source"
+    return Result(source.name, tool, quantity, published, found.here, EXACT, status, difference=found.difference)
 
 
 def _count(source: Source, tool: str, quantity: str, published: int, here: int) -> Result:
     """How many of some values have equal digits."""
-    return _beside_exact(
-        source, tool, quantity, f"{published} equal", f"{here} equal", compared(published == here), float(here - published)
-    )
+    found = Agreement(f"{here} equal", float(here - published), here == published)
+    return _beside_exact(source, tool, quantity, f"{published} equal", found)
 
 
 def _digits(source: Source, tool: str, quantity: str, published: float, here: float) -> Result:
     """A value of a formula beside that of the exact solution, to `DECIMALS`."""
-    found = agreement(f"{published:.{DECIMALS}f}", here)
-    return _beside_exact(source, tool, quantity, f"{published:.{DECIMALS}f}", found.here, compared(found.agrees), found.difference)
+    text = f"{published:.{DECIMALS}f}"
+    return _beside_exact(source, tool, quantity, text, agreement(text, here))
 
 
 def kane_free_body(source: Source) -> list[Result]:
@@ -135,9 +134,9 @@ def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rat
     expected = about(direction, np.array([rate * time]))[0]
     error = float(min(np.abs(quaternion - expected).max(), np.abs(quaternion + expected).max()))
     bound = f"≤ {source.parameters['simple']['bound_in_epsilon'] * EPSILON:.2g}"
-    found = agreement(bound, error)
+    found = agreement(bound, error)._replace(here=f"{error:.2g}")
     quantity = f"quaternion, axis {' '.join(f'{component:g}' for component in axis)}"
-    return _beside_exact(source, "simple rotation", quantity, bound, f"{error:.2g}", compared(found.agrees), math.nan)
+    return _beside_exact(source, "simple rotation", quantity, bound, found)
 
 
 def housner_block(source: Source) -> list[Result]:
@@ -155,10 +154,10 @@ def housner_block(source: Source) -> list[Result]:
         exact = 4.0 * truth_of(rocking_scene(alpha, share)).events[0].time
         found = agreement(f"{published:.{digits}g}", exact, digits)
         is_slender = alpha == source.parameters["slender"]
-        status: Status = compared(found.agrees) if is_slender else "error of the source"
-        difference = found.difference if is_slender else published - exact
+        if not is_slender:
+            found = found._replace(difference=published - exact)
         quantity = f"T [s], α = {alpha:g}, θ₀ = {share:g} α"
-        results.append(_beside_exact(source, "period", quantity, f"{published:.{digits}g}", found.here, status, difference))
+        results.append(_beside_exact(source, "period", quantity, f"{published:.{digits}g}", found, is_claimed=is_slender))
     return results
 
 
@@ -200,11 +199,11 @@ def bouncing_ball(source: Source) -> list[Result]:
     results = []
     for time, text in source.parameters["heights"].items():
         exact = float(truth.states(np.array([float(time)]))[0, POSITION][1]) - scene.body.rounding
-        error = float(text) - exact
-        here = f"{exact:.{DECIMALS}f}"
-        results.append(_beside_exact(source, "FMU", f"height at {time} s [m]", text, here, "error of the source", error))
+        error = Agreement(f"{exact:.{DECIMALS}f}", float(text) - exact, agrees=False)
+        results.append(_beside_exact(source, "FMU", f"height at {time} s [m]", text, error, is_claimed=False))
     text, exact = source.parameters["rests_from"], truth.events[-1].time
-    return [*results, _beside_exact(source, "FMU", "at rest from [s]", text, f"{exact:.6f}", "error of the source", float(text) - exact)]
+    error = Agreement(f"{exact:.6f}", float(text) - exact, agrees=False)
+    return [*results, _beside_exact(source, "FMU", "at rest from [s]", text, error, is_claimed=False)]
 
 
 FORMULAS: Mapping[str, Callable[[Source], list[Result]]] = {

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 from dropspin.comparisons.engines.mujoco_versions import numbers_of
 from dropspin.comparisons.published.formulas import FORMULAS
-from dropspin.comparisons.published.printed import ABSENT, SHOWN, agreement
 from dropspin.comparisons.published.quantities import quantity
-from dropspin.comparisons.published.results import Result, compared
+from dropspin.comparisons.published.results import ABSENT, SHOWN, Result, agreement
 from dropspin.comparisons.published.sources import Case, Group, Source, sources
 from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import engine_entry
@@ -89,5 +88,5 @@ def _of_case(source: Source, group: Group, case: Case, measured: list[float] | B
             yield replace(result, here=f"{value:.{SHOWN}g}", status="for comparison")
         else:
             found = agreement(printed, value, source.significant)
-            result = replace(result, here=found.here, difference=found.difference, status=compared(found.agrees))
+            result = replace(result, here=found.here, difference=found.difference, status=found.status)
             yield replace(result, status="not reproducible", reason=group.why_not) if group.why_not and not found.agrees else result

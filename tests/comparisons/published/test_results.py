@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dropspin.comparisons.published.printed import agreement
+from dropspin.comparisons.published.results import agreement
 
 
 @pytest.mark.parametrize(

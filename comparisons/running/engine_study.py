@@ -36,14 +36,14 @@ class Outcome(NamedTuple):
     Attributes:
         case: The columns that its rows have in common.
         per_step: Wall time of a native step [s].
-        given: Its motion and what it states of itself, without the motions from the start phases; its breakdown if it has no metrics.
+        run: Its motion and what it states of itself, without the motions from the start phases; its breakdown if it has no metrics.
         points: Its metrics, by name.
         digest: The hash of all its motions.
     """
 
     case: Case
     per_step: float
-    given: EngineRun
+    run: EngineRun
     points: Mapping[str, SeriesPoint]
     digest: str
 
@@ -85,31 +85,31 @@ class EngineStudy:
         self, entry: EngineEntry, phases: Sequence[StartPhase], exact: Sequence[States | None], progress: Progress, timing: Timing
     ) -> tuple[Outcome, list[Comparison]]:
         """Simulate the scene from all start phases, and measure every metric."""
-        scene, dt, given = self.own.scene, progress.dt, EngineRun(entry.label)
+        scene, dt, run = self.own.scene, progress.dt, EngineRun(entry.label)
         if not timing.ended:
             starts = [phase.scene for phase in phases]
-            given = self.processes.run_engine(entry, scene, dt, starts, reporter(progress, self.on_progress), quick=self.own.quick)
-        given.breakdown = given.breakdown or timing.breakdown or breakdown_of(given)
-        cases = [] if given.breakdown else compare(given.phases, phases, exact)
-        points = measure(self.own, dt, given, phases, exact, cases) if cases else {}
-        digest = "" if given.motion is None else motion_digest([given.motion, *given.phases])
+            run = self.processes.run_engine(entry, scene, dt, starts, reporter(progress, self.on_progress), quick=self.own.quick)
+        run.breakdown = run.breakdown or timing.breakdown or breakdown_of(run)
+        cases = [] if run.breakdown else compare(run.phases, phases, exact)
+        points = measure(self.own, dt, run, phases, exact, cases) if cases else {}
+        digest = "" if run.motion is None else motion_digest([run.motion, *run.phases])
         case = Case(scene.name, entry.label, dt, scene.steps(dt))
-        return Outcome(case, timing.per_step, replace(given, phases=[], perturbed=[]), points, digest), cases
+        return Outcome(case, timing.per_step, replace(run, phases=[], perturbed=[]), points, digest), cases
 
     def rows(self, *, is_extrapolated: bool) -> Iterator[Measurement]:
         """All rows of the engine: at each time step, and its orders and asymptotic errors if there are enough time steps."""
         scene, truth, _, _ = self.own
         causes = {name: self.cause(name) for name in self.series} if is_extrapolated else {}
         truths = {"truth": "" if truth is None else truth.name, "invariant": ""}
-        for case, per_step, given, points, _ in self.outcomes:
+        for case, per_step, run, points, _ in self.outcomes:
             timed = replace(case, time_per_step=per_step)
-            if given.breakdown is not None:
-                yield timed.remark(given.breakdown.verdict, given.breakdown.reason)
+            if run.breakdown is not None:
+                yield timed.remark(run.breakdown.verdict, run.breakdown.reason)
                 continue
-            yield from (timed.remark("limited", one.message) for one in given.limitations if not one.is_minor)
+            yield from (timed.remark("limited", limitation.message) for limitation in run.limitations if not limitation.is_minor)
             for name, point in points.items():
                 metric = METRICS[name]
-                judgement = judge(scene, truth, _claim([given]), metric, point, causes.get(name))
+                judgement = judge(scene, truth, _claim([run]), metric, point, causes.get(name))
                 yield timed.measurement(metric.kind, name, metric.unit, judgement, truths[metric.kind])
             if truth is None:
                 yield timed.remark("no_truth", "no closed form is known for this scene")
@@ -124,7 +124,7 @@ class EngineStudy:
     @cached_property
     def claim(self) -> Claim:
         """The properties that the engine declares, and the limitations that it met at any time step."""
-        return _claim([outcome.given for outcome in self.outcomes if outcome.given.motion is not None])
+        return _claim([outcome.run for outcome in self.outcomes if outcome.run.motion is not None])
 
     @cached_property
     def series(self) -> Mapping[str, list[SeriesPoint]]:
@@ -218,10 +218,10 @@ class EngineStudy:
         return engine.options == {**calibrated.options, "profile": "default"}
 
 
-def _claim(given: Sequence[EngineRun]) -> Claim:
+def _claim(runs: Sequence[EngineRun]) -> Claim:
     """The properties that an engine declares, and the limitations that it met in some runs."""
-    last = given[-1]
-    return Claim(last.label, last.order, last.precision, tuple(one for run in given for one in run.limitations))
+    last = runs[-1]
+    return Claim(last.label, last.order, last.precision, tuple(limitation for run in runs for limitation in run.limitations))
 
 
 def _short(value: str) -> str:

@@ -113,17 +113,17 @@ def _results(
     ensembles: dict[TrajectoryKey, EnsembleOutcome] = {}
     settings: dict[str, dict[str, Any]] = {}
     motions: dict[str, dict[str, str]] = {}
-    for case, _, given, _, digest in chain(*zip(*(study.outcomes for study in studies), strict=True)):
+    for case, _, run, _, digest in chain(*zip(*(study.outcomes for study in studies), strict=True)):
         key = case.scene, case.engine, case.dt
-        for name, value in given.predicted.items():
+        for name, value in run.predicted.items():
             predictions.append(case.measurement("prediction", name, METRICS[name].unit, Judgement(value, "measured"), truth))
-        if given.motion is not None:
-            trajectories[key] = given.motion
-            settings.setdefault(case.engine, {})[f"{case.scene} dt={case.dt:g}"] = given.settings
+        if run.motion is not None:
+            trajectories[key] = run.motion
+            settings.setdefault(case.engine, {})[f"{case.scene} dt={case.dt:g}"] = run.settings
             motions.setdefault(case.engine, {})[repr(float(case.dt))] = digest
-        if given.outcome is not None:
-            ensembles[key] = given.outcome
-            for name, judgement in judge_means(scene, case.dt, given.outcome):
+        if run.outcome is not None:
+            ensembles[key] = run.outcome
+            for name, judgement in judge_means(scene, case.dt, run.outcome):
                 means.append(case.measurement("ensemble", name, ENSEMBLE_METRICS[name].unit, judgement))
     labels = tuple(study.entry.label for study in studies)
     table, predicted, differences = map(as_table, ([*means, *judged], predictions, agreements))

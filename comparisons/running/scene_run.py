@@ -87,11 +87,13 @@ def _distances_to_other_laws(
     scene: Scenario, dt: float, phases: Sequence[StartPhase], compared: Sequence[tuple[Outcome, Sequence[Comparison]]]
 ) -> Iterator[Measurement]:
     """How far engines are from the exact solutions under the impact laws that the scene does not name, in its leading metric; no errors."""
-    metric = METRICS[leading_metric(scene)]
     laws = []
     for law, truth in other_laws(scene).items():
         of_law = [phase._replace(truth=truth.after(phase.delay)) for phase in phases]
         laws.append((law, of_law, exactly_at(scene, dt, truth, of_law)))
+    if not laws:  # also without an exact solution, where no metric leads
+        return
+    metric = METRICS[leading_metric(scene)]
     for outcome, cases in compared:
         for law, of_law, exact in laws:
             value = metric.value_or_nan(compare([case.motion for case in cases], of_law, exact))

@@ -22,16 +22,8 @@ from dropspin.scenarios.truths.truth import Impact, Truth
 
 __all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "truth_for"]
 
-ON_FLOOR: tuple[Callable[[Scenario, Floor], Truth | None], ...] = (
-    bounce_ladder,
-    rocking,
-    slipping,
-    top,
-    corner_impact,
-    coulomb_slide,
-    rolling,
-    coulomb_turn,
-)
+Solution = Callable[[Scenario, Floor], Truth | None]
+ON_FLOOR: tuple[Solution, ...] = (bounce_ladder, rocking, slipping, top, corner_impact, coulomb_slide, rolling, coulomb_turn)
 """The solutions of scenes with a floor and without damping; each is None for a scene that is not of its kind, and the first that is not
 counts.
 """

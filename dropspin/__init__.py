@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from dropspin.comparisons.engines.base import EngineBroken as EngineBroken
     from dropspin.comparisons.engines.base import EngineMissing as EngineMissing
     from dropspin.comparisons.engines.base import KnownLimitation as KnownLimitation
-    from dropspin.comparisons.engines.base import NumericOption as NumericOption
+    from dropspin.comparisons.engines.base import OneWorld as OneWorld
     from dropspin.comparisons.engines.base import Simulation as Simulation
+    from dropspin.comparisons.engines.options import NumericOption as NumericOption
     from dropspin.comparisons.engines.registry import engine as engine
     from dropspin.comparisons.engines.registry import engine_names as engine_names
     from dropspin.comparisons.judging.error_budget import ErrorBudget as ErrorBudget
@@ -87,9 +88,10 @@ _HOMES = {
         "EngineBroken",
         "EngineMissing",
         "KnownLimitation",
-        "NumericOption",
+        "OneWorld",
         "Simulation",
     ),
+    "dropspin.comparisons.engines.options": ("NumericOption",),
     "dropspin.comparisons.engines.registry": ("engine", "engine_names"),
     "dropspin.comparisons.judging.error_budget": ("ErrorBudget", "error_budget"),
     "dropspin.comparisons.measuring.contacts": ("contacts",),

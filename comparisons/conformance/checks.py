@@ -2,19 +2,13 @@
 
 import tempfile
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import cast
 
-from dropspin.comparisons.conformance.batches import check_batches
-from dropspin.comparisons.conformance.clock import check_time, check_velocity_lag
-from dropspin.comparisons.conformance.compilation import check_compilation
-from dropspin.comparisons.conformance.exceptions import described, whole_traceback
-from dropspin.comparisons.conformance.isolation import check_files, check_repeats
-from dropspin.comparisons.conformance.motion import check_motion
-from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckOutcome, CheckResult, Declined
+from dropspin.comparisons.conformance import protocol, symmetries, timing
+from dropspin.comparisons.conformance.motions import check_motion
+from dropspin.comparisons.conformance.outcomes import CheckOutcome, CheckResult, NotPassed, described, whole_traceback
 from dropspin.comparisons.conformance.probes import PROBES
-from dropspin.comparisons.conformance.protocol import check_builds, check_claims, check_record, check_refusals, check_settings, check_states
-from dropspin.comparisons.conformance.symmetries import check_symmetries
-from dropspin.comparisons.conformance.waiting import check_waiting
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import present_entry
@@ -23,23 +17,24 @@ from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimi
 from dropspin.comparisons.running.verification import BuildMismatch
 from dropspin.scenarios.errors import UnknownName
 
-CHECKS: dict[str, Callable[[Engine, str], CheckResult]] = {
-    "compilation": check_compilation,
-    "claims": check_claims,
-    "declines": check_refusals,
-    "builds what is meant": check_builds,
-    "record and advance": check_record,
-    "time": check_time,
-    "waiting": check_waiting,
-    "velocity lag": check_velocity_lag,
-    "repeats": check_repeats,
-    "symmetries": check_symmetries,
-    "batches": check_batches,
-    "states": check_states,
-    "settings": check_settings,
-    "files": check_files,
-    **{probe.name: check_motion for probe in PROBES},
+CHECKS: dict[str, Callable[[Engine], str]] = {
+    "compilation": timing.check_compilation,
+    "claims": protocol.check_claims,
+    "declines": protocol.check_refusals,
+    "builds what is meant": protocol.check_builds,
+    "record and advance": protocol.check_record,
+    "time": timing.check_time,
+    "waiting": timing.check_waiting,
+    "velocity lag": timing.check_velocity_lag,
+    "repeats": protocol.check_repeats,
+    "symmetries": symmetries.check_symmetries,
+    "batches": symmetries.check_batches,
+    "states": protocol.check_states,
+    "settings": protocol.check_settings,
+    "files": protocol.check_files,
+    **{probe.name: partial(check_motion, probe=probe) for probe in PROBES},
 }
+"""By name; each returns what it found, and raises `NotPassed` otherwise."""
 
 
 def conform(
@@ -89,11 +84,10 @@ def _run_check(entry: EngineEntry, check: str, folder: str) -> CheckResult:
 def run_check(entry: EngineEntry, check: str) -> CheckResult:
     """Run one check in this process."""
     try:
-        return CHECKS[check](entry.adapter, check)
-    except (CheckFailed, BuildMismatch) as failure:
-        return CheckResult(check, "failed", str(failure), whole_traceback(failure) if failure.__cause__ else "")
-    except Declined as declined:
-        return CheckResult(check, "declined", str(declined))
+        return CheckResult(check, "passed", CHECKS[check](entry.adapter))
+    except (NotPassed, BuildMismatch) as ended:
+        outcome = ended.outcome if isinstance(ended, NotPassed) else "failed"
+        return CheckResult(check, outcome, str(ended), whole_traceback(ended) if ended.__cause__ else "")
     except Diverged as diverged:
         return CheckResult(check, "failed", f"the engine diverged: {diverged}")
     except Exception as error:  # an adapter is somebody else's code

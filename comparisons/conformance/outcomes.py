@@ -1,6 +1,12 @@
-"""The outcome of a conformance check, and the exceptions by which a check ends early."""
+"""The outcome of a conformance check, the exceptions by which a check ends early, and what an adapter raised as text."""
 
-from typing import Literal, NamedTuple
+import os
+import sys
+import traceback
+from typing import ClassVar, Literal, NamedTuple
+
+from dropspin.comparisons.engines import exceptions
+from dropspin.comparisons.engines.base import Engine
 
 CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]
 """`noted` is a peculiarity of the engine: the adapter is right."""
@@ -22,9 +28,38 @@ class CheckResult(NamedTuple):
     traceback: str = ""
 
 
-class CheckFailed(Exception):
+class NotPassed(Exception):
+    """A check ends; the text says why. A check that passes returns what was found."""
+
+    outcome: ClassVar[CheckOutcome]
+
+
+class CheckFailed(NotPassed):
     """The adapter is wrong; the text says what is wrong, and what is expected."""
 
+    outcome = "failed"
 
-class Declined(Exception):
+
+class Noted(NotPassed):
+    """The engine has a peculiarity, which the text states; the adapter is right."""
+
+    outcome = "noted"
+
+
+class Declined(NotPassed):
     """The engine declines all scenes that a check needs."""
+
+    outcome = "declined"
+
+
+def described(error: Exception, engine: Engine) -> str:
+    """The type and the text of an exception, and the innermost line of the adapter's file that it passed through, if any."""
+    file = getattr(sys.modules.get(type(engine).__module__), "__file__", None)
+    own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    where = f" ({os.path.relpath(own[-1].filename)}:{own[-1].lineno}, in {own[-1].name})" if own else ""
+    return exceptions.described(error) + where
+
+
+def whole_traceback(error: Exception) -> str:
+    """The traceback of an exception, or of its cause if it has one."""
+    return "".join(traceback.format_exception(error.__cause__ or error))

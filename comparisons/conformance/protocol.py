@@ -1,19 +1,21 @@
 """Checks of the engine protocol: what the class claims, which scenes it declines, what it builds, and that its methods agree.
 
-These checks call `prepare`, `advance`, `state` and `record` themselves, because that is what they test.
+Simulations are also independent: of what ran before, of each other, and of the working directory. These checks call `prepare`, `advance`,
+`state` and `record` themselves, because that is what they test.
 """
 
 import json
+import os
+import tempfile
+from contextlib import chdir
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.conformance.exceptions import described
-from dropspin.comparisons.conformance.explanations import explain_start
-from dropspin.comparisons.conformance.outcomes import CheckFailed, CheckResult, Declined
-from dropspin.comparisons.conformance.probes import DT, PROBES
-from dropspin.comparisons.conformance.short_runs import A_FEW_STEPS, FLIGHTS, accepted_scene
+from dropspin.comparisons.conformance.motions import explain_start
+from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
+from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.verification import MULTIPLE, BuildMismatch, verified_record, verify_build, verify_start
 from dropspin.scenarios import Scenario, load, names
@@ -27,22 +29,21 @@ ASYMMETRIC = next(probe.scene for probe in PROBES if probe.name == "tumbling")
 """A scene whose start has no two equal numbers."""
 
 
-def check_claims(engine: Engine, check: str) -> CheckResult:
+def check_claims(engine: Engine) -> str:
     """The class has a valid order and precision."""
     order = engine.order
     if not (order is None or (isinstance(order, int | float) and order > 0)):
         raise CheckFailed(f"order is {order!r}; it must be None (no claim), a number above 0, or inf (exact)")
     if engine.precision not in (np.float32, np.float64):
         raise CheckFailed(f"precision is {engine.precision!r}; it must be numpy.float64 or numpy.float32")
-    return CheckResult(check, "passed", f"order {order if order is not None else 'not claimed'}, {np.dtype(engine.precision).name}")
+    return f"order {order if order is not None else 'not claimed'}, {np.dtype(engine.precision).name}"
 
 
-def check_refusals(engine: Engine, check: str) -> CheckResult:
+def check_refusals(engine: Engine) -> str:
     """Scenes are declined with a reason, and not all of them."""
     scenes = [load(name) for name in names()]
     for scene in [*scenes, *(probe.scene for probe in PROBES)]:
-        answer = engine.declines(scene)
-        again = engine.declines(scene)
+        answer, again = engine.declines(scene), engine.declines(scene)
         if answer != again:
             raise CheckFailed(f"declines({scene.name}) returns {answer!r}, then {again!r}; it must return the same each time")
         if not (answer is None or (isinstance(answer, str) and answer.strip())):
@@ -50,18 +51,17 @@ def check_refusals(engine: Engine, check: str) -> CheckResult:
     declined = sum(engine.refusal(scene) is not None for scene in scenes)
     if declined == len(scenes):
         raise CheckFailed(f"every scene of the catalogue is declined; {scenes[0].name}: {engine.refusal(scenes[0])}")
-    return CheckResult(check, "passed", f"{len(scenes) - declined} scenes of the catalogue are accepted, {declined} declined with a reason")
+    return f"{len(scenes) - declined} scenes of the catalogue are accepted, {declined} declined with a reason"
 
 
-def check_builds(engine: Engine, check: str) -> CheckResult:
+def check_builds(engine: Engine) -> str:
     """The built simulation equals the scene, for the probes and for every scene of the catalogue."""
-    read_back, built = 0, 0
+    read_back = []
     for scene in [ASYMMETRIC, *(probe.scene for probe in PROBES), *(load(name) for name in names())]:
         if engine.refusal(scene) is not None:
             continue
         try:
-            read_back += _verify_built(engine, scene)
-            built += 1
+            read_back.append(_verify_built(engine, scene))
         except (CheckFailed, BuildMismatch) as wrong:
             raise CheckFailed(f"{wrong} (in the scene {scene.name})") from None
         except Diverged:
@@ -70,11 +70,11 @@ def check_builds(engine: Engine, check: str) -> CheckResult:
             raise CheckFailed(
                 f"{described(error, engine)}, in the scene {scene.name}; decline scenes that the engine cannot run, with a reason"
             ) from error
-    if not built:
-        raise Declined("the engine declines every scene")
     if not read_back:
-        return CheckResult(check, "passed", "the start equals the scene's; as_built() returns no mass, inertia and gravity to compare")
-    return CheckResult(check, "passed", f"start, mass, inertia and gravity equal the scene's to {MULTIPLE} eps")
+        raise Declined("the engine declines every scene")
+    if not any(read_back):
+        return "the start equals the scene's; as_built() returns no mass, inertia and gravity to compare"
+    return f"start, mass, inertia and gravity equal the scene's to {MULTIPLE} eps"
 
 
 def _verify_built(engine: Engine, scene: Scenario) -> bool:
@@ -104,7 +104,7 @@ def _start_explained(engine: Engine, scene: Scenario, state: Array) -> str:
     return "" if fault is None else fault.message
 
 
-def check_record(engine: Engine, check: str) -> CheckResult:
+def check_record(engine: Engine) -> str:
     """`record` and `advance` take the same steps."""
     scene = accepted_scene(engine)
     with engine.prepare(scene, DT) as simulation:
@@ -119,9 +119,8 @@ def check_record(engine: Engine, check: str) -> CheckResult:
             one_by_one.append(simulation.state().copy())
         again = verified_record(simulation.record(SEVERAL), 1 + SEVERAL)
     stepped = np.array(one_by_one)
-    with engine.prepare(scene, DT) as simulation:
-        simulation.advance(SEVERAL)
-        _verify_equal(simulation.state(), stepped[SEVERAL], f"advance({SEVERAL}) differs from {SEVERAL} calls of advance(1)")
+    together = state_after(engine, scene, [SEVERAL])
+    _verify_equal(together, stepped[SEVERAL], f"advance({SEVERAL}) differs from {SEVERAL} calls of advance(1)")
     if engine.precision is np.float64 and np.array_equal(stepped[1:], np.float32(stepped[1:])):
         raise CheckFailed(
             "states after the start have single precision only; declare precision = numpy.float32, or return them in double precision"
@@ -134,8 +133,8 @@ def check_record(engine: Engine, check: str) -> CheckResult:
     _verify_equal(rows[-1], end, "after record, state() differs from the last row")
     _verify_equal(again[0], stepped[-1], "a second record does not begin at the current state")
     if not np.array_equal(rows, stepped):
-        return CheckResult(check, "noted", f"record and advance differ by rounding, {relative_difference(rows, stepped):.1g}")
-    return CheckResult(check, "passed", "record and advance take the same steps, bit for bit")
+        raise Noted(f"record and advance differ by rounding, {relative_difference(rows, stepped):.1g}")
+    return "record and advance take the same steps, bit for bit"
 
 
 def _verify_equal(found: Array, expected: Array, message: str) -> None:
@@ -150,7 +149,7 @@ def relative_difference(found: Array, expected: Array) -> float:
     return difference if np.isfinite(difference) else float("inf")
 
 
-def check_states(engine: Engine, check: str) -> CheckResult:
+def check_states(engine: Engine) -> str:
     """A state that was returned does not change."""
     scene = accepted_scene(engine, *FLIGHTS)
     with engine.prepare(scene, DT) as simulation:
@@ -161,10 +160,10 @@ def check_states(engine: Engine, check: str) -> CheckResult:
             raise CheckFailed("state() returns the engine's own memory, which changes with the next step; return a copy")
         if np.array_equal(simulation.state(), before):
             raise CheckFailed(f"the state is the same after {A_FEW_STEPS} steps: the body does not move, or state() returns the start")
-    return CheckResult(check, "passed", "returned states do not change")
+    return "returned states do not change"
 
 
-def check_settings(engine: Engine, check: str) -> CheckResult:
+def check_settings(engine: Engine) -> str:
     """Results can be stored with the settings."""
     with engine.prepare(accepted_scene(engine), DT) as simulation:
         settings = simulation.settings
@@ -173,8 +172,50 @@ def check_settings(engine: Engine, check: str) -> CheckResult:
     except (TypeError, ValueError) as error:
         raise CheckFailed(f"settings cannot be written as JSON: {error}") from None
     if "version" not in settings:
-        return CheckResult(check, "noted", "settings has no 'version'; add the engine's version, with which results are stored")
-    return CheckResult(check, "passed", f"version {settings['version']}, and {len(settings) - 1} other settings")
+        raise Noted("settings has no 'version'; add the engine's version, with which results are stored")
+    return f"version {settings['version']}, and {len(settings) - 1} other settings"
+
+
+def check_repeats(engine: Engine) -> str:
+    """The same scene gives the same bits after and beside other simulations."""
+    a, b = accepted_scene(engine), accepted_scene(engine, "turning", "coasting")
+    halves = [A_FEW_STEPS // 2, A_FEW_STEPS - A_FEW_STEPS // 2]
+    first, stepped = recorded(engine, a), state_after(engine, a, halves)
+    if not all(_same(first, recorded(engine, a)) and _same(stepped, state_after(engine, a, halves)) for _ in range(SEVERAL)):
+        raise CheckFailed(
+            "the same scene gives different bits when it runs again: the engine is random, or keeps state between simulations"
+        )
+    with engine.prepare(b, 4 * DT) as other:
+        other.advance(A_FEW_STEPS)
+        if not _same(first, recorded(engine, a)):
+            raise CheckFailed("the same scene gives different bits while another simulation is open: simulations share state")
+        if not _same(stepped, state_after(engine, a, halves, lambda: other.advance(A_FEW_STEPS))):
+            raise CheckFailed("two simulations that take turns affect each other: simulations share state")
+    if not _same(first, recorded(engine, a)):
+        raise CheckFailed("the same scene gives different bits after another scene (A, B, A): a simulation leaves state behind")
+    return "a scene gives the same bits again and after another scene, and so do two that take turns"
+
+
+def _same(one: Array, other: Array) -> bool:
+    return np.array_equal(one, other, equal_nan=True)
+
+
+def check_files(engine: Engine) -> str:
+    """No file is written to the working directory, also when a simulation breaks down."""
+    scene = accepted_scene(engine, "tumbling", "turning", "falling straight", "coasting")
+    wild = scene.starting_at(scene.initial_state * np.repeat([1.0, 1e4], [7, 6]))
+    breakdown = ""
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        recorded(engine, scene)
+        if engine.refusal(wild) is None:
+            try:
+                recorded(engine, wild, 100 * DT)
+            except Exception as error:  # a breakdown is allowed, files are not
+                breakdown = f"; a start 10,000 times as fast ends in {type(error).__name__}"
+        left = sorted(os.listdir(folder))
+    if left:
+        raise CheckFailed(f"files are left in the working directory: {', '.join(left)}")
+    return f"no file is written to the working directory{breakdown}"
 
 
 def _kind(found: Any) -> str:

@@ -5,13 +5,13 @@ import hashlib
 import inspect
 import sys
 import sysconfig
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
-PACKAGE, PROTOCOL = "dropspin.comparisons.engines", "base"
+PACKAGE, COMMON = "dropspin.comparisons.engines", frozenset({"base", "options", "packages"})
 INSTALLED = frozenset({"site-packages", "dist-packages"})
 STANDARD = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib"))
 
@@ -34,25 +34,23 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
         return None
     if adapter.__module__.startswith(f"{PACKAGE}."):
         return built_in_code(file)
-    files: dict[Path, None] = {file: None}
-    _add_imports(files, file, adapter.__module__)
-    for name in loaded:
-        _add(files, name)
-    return _hashed(files)
+    files = _with_imports({file: adapter.__module__}, _file)
+    further = {other: name for name in loaded if (other := _file(name)) is not None and other not in files}
+    return _hashed({**files, **_with_imports(further, _file)})
 
 
 def built_in_code(file: Path) -> str:
     """The short hash of a built-in adapter: its file and those of its folder that the file imports, and others of the same names.
 
-    The engine protocol, which all adapters have in common, is left out. No file is imported.
+    The modules in `COMMON`, which decide no motion, are left out. No file is imported.
     """
-    files: set[Path] = set()
-    left = {file}
-    while left:
-        files |= left
-        imported = {name.removeprefix(f"{PACKAGE}.") for one in left for name in _imported(one, PACKAGE)}
-        named = {file.with_name(f"{name}.py") for name in imported - {PROTOCOL}}
-        left = {one for one in named - files if one.is_file()}
+
+    def beside(name: str) -> Path | None:
+        module = name.removeprefix(f"{PACKAGE}.")
+        there = file.with_name(f"{module}.py")
+        return there if module not in COMMON and there.is_file() else None
+
+    files = _with_imports({file: f"{PACKAGE}.{file.stem}"}, beside)
     return _hashed(same for one in files for same in file.parent.glob(f"{one.stem}.*"))
 
 
@@ -63,29 +61,31 @@ def _hashed(files: Iterable[Path]) -> str:
     return found.hexdigest()[:12]
 
 
-def _add(files: dict[Path, None], name: str) -> None:
-    """Add the file of a module, and of all that it imports, unless it is installed or known already."""
-    file = _file(name)
-    if file is not None and file not in files:
-        files[file] = None
-        _add_imports(files, file, name)
+def _with_imports(files: Mapping[Path, str], file_of: Callable[[str], Path | None]) -> dict[Path, str]:
+    """Files of modules and of all that they import, directly or not, with the names of the modules.
 
-
-def _add_imports(files: dict[Path, None], file: Path, module: str) -> None:
-    if file.suffix == ".py":
+    Args:
+        files: The files, with the names of their modules.
+        file_of: Function from the name of a module to its file, or to None for one that is left out.
+    """
+    found, left = dict(files), list(files.items())
+    while left:
+        file, module = left.pop()
         package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-        for name in _imported(file, package):
-            _add(files, name)
-
-
-def _imported(file: Path, package: str) -> tuple[str, ...]:
-    """The names of modules that a file imports, in functions too; of `from a import b` both a and a.b, which may be a module."""
-    return _imported_by(file.read_bytes(), package)
+        for name in _imported_by(file.read_bytes(), package) if file.suffix == ".py" else ():
+            other = file_of(name)
+            if other is not None and other not in found:
+                found[other] = name
+                left.append((other, name))
+    return found
 
 
 @cache
 def _imported_by(source: bytes, package: str) -> tuple[str, ...]:
-    """The same for the content of a file, parsed once: every run needs the hashes of its adapters."""
+    """The names of modules that a file imports, in functions too; of `from a import b` both a and a.b, which may be a module.
+
+    Each content is parsed once: every run needs the hashes of its adapters.
+    """
     return tuple(dict.fromkeys(_imports(ast.parse(source), package)))
 
 

@@ -5,13 +5,14 @@ from typing import Any, ClassVar
 import dartpy as dart
 import numpy as np
 
-from dropspin.comparisons.engines import base
-from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE, AsBuilt, Diverged, Engine, KnownLimitation, Simulation, version
+from dropspin.comparisons.engines import mapping
+from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLimitation, Simulation
+from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE
+from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.bodies import Box
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.rotations import cross, rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, Array
-from dropspin.scenarios.variations import heavy_neighbour
 
 REASONS = {
     "deactivation": "never falls asleep; else a block that tips over more slowly than 0.05 rad/s stops halfway",
@@ -29,21 +30,19 @@ class Dart(Engine):
 
     name, order, reasons = "dart", 1.0, REASONS
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"floor": ("plane", "box"), "beside": ("none", "heavy")}
+    choices: ClassVar = {"floor": ("plane", "box"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Free flight agrees with MuJoCo's Euler to 1e-13 (to 1e-7 below 1e-3 rad a step, where DART truncates a series)."""
-        flight = base.EXPLICIT_GYROSCOPIC if base.may_tumble(scene) else base.SEMI_IMPLICIT_EULER
+        flight = mapping.EXPLICIT_GYROSCOPIC if mapping.may_tumble(scene) else mapping.SEMI_IMPLICIT_EULER
         return flight if scene.floor is None and scene.damping is None else None
 
     def declines(self, scene: Scenario) -> str | None:
-        unfit = base.refusal_of_unequal_damping(scene)
-        if (unfit := unfit or base.refusal_of_floor(scene, self.option("floor"))) is not None:
-            return unfit
-        if scene.floor is not None and not hasattr(dart.constraint, "NsgsFrictionSolver"):
+        unfit = mapping.refusal_of_unequal_damping(scene) or mapping.refusal_of_floor(scene, self.option("floor"))
+        if unfit is None and scene.floor is not None and not hasattr(dart.constraint, "NsgsFrictionSolver"):
             return f"dartpy {version('dartpy')} is installed, without the settings of exact contacts; update it to 6.20 or later"
-        return base.refusal_of_rest_speed(scene, "DART", "it sets rebounds below 0.1 m/s to 0")
+        return unfit or mapping.refusal_of_rest_speed(scene, "DART", "it sets rebounds below 0.1 m/s to 0")
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return DartSimulation(scene, dt, self.option("floor"), self.option("beside"))
@@ -60,9 +59,7 @@ class DartSimulation(Simulation):
         self.settings = {"version": version("dartpy"), "floor": floor, "beside": beside}
         if scene.floor is not None:
             self.settings |= self._add_floor(scene.floor, floor)
-        self._body = self._add_body(scene)
-        if beside == "heavy":
-            self._add_body(heavy_neighbour(scene))
+        self._body, *_ = [self._add_body(one) for one in mapping.bodies_in(scene, beside)]
 
     def _add_body(self, scene: Scenario) -> Any:
         skeleton, mounting = dart.dynamics.Skeleton(f"body {self._world.getNumSkeletons()}"), dart.math.Isometry3()
@@ -94,7 +91,7 @@ class DartSimulation(Simulation):
             options = dart.constraint.NsgsFrictionSolver.Options()
             options.tolerance = 1e-8
             solver.setBoxedLcpSolver(dart.constraint.NsgsFrictionSolver(options))
-        friction = {"none": 0.0, "infinite": 1e6}[floor.friction] if isinstance(floor.friction, str) else floor.friction
+        friction = mapping.friction_of(floor, gripping=1e6)
         restitution = min(1.0, floor.restitution + (1.0 + floor.restitution) * 1e-5)
         ground, half = dart.dynamics.Skeleton("floor"), np.full(3, FLOOR_HALF_SIZE)
         shape = dart.dynamics.BoxShape(2.0 * half) if kind == "box" else dart.dynamics.PlaneShape([0.0, 1.0, 0.0], 0.0)

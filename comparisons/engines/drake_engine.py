@@ -12,15 +12,14 @@ from pydrake.multibody.tree import QuaternionFloatingJoint, RotationalInertia, S
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from dropspin.comparisons.engines import base
-from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
+from dropspin.comparisons.engines import mapping
+from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.state import ORIENTATION, Array
-from dropspin.scenarios.variations import heavy_neighbour
 
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 
-STICKING = 1e6
 LONGEST = 1e150
 REASONS = {
     "discrete_contact_approximation": "tamsi for a coefficient, else sap; the default, lagged, with this dissipation stops a sliding box",
@@ -39,20 +38,19 @@ class Drake(Engine):
     name = "drake"
     order = 1.0
     reasons = REASONS
-    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": ("none", "heavy")}
+    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Semi-implicit Euler without spin; else ω is as in MuJoCo's Euler, but a step turns by 2 atan(|ω| dt/2), as in Wang's method."""
         falls = scene.floor is None and scene.damping is None and not any(scene.start.angular_velocity)
-        return base.SEMI_IMPLICIT_EULER if falls else None
+        return mapping.SEMI_IMPLICIT_EULER if falls else None
 
     def declines(self, scene: Scenario) -> str | None:
-        if (unfit := base.refusal_of_unequal_damping(scene)) is not None:
-            return unfit
-        if scene.floor is not None and scene.floor.restitution > 0.0:
+        unfit = mapping.refusal_of_unequal_damping(scene)
+        if unfit is None and scene.floor is not None and scene.floor.restitution > 0.0:
             return "Drake has no coefficient of restitution; its contacts are springs with dissipation"
-        return base.refusal_of_floor(scene, self.option("floor"))
+        return unfit or mapping.refusal_of_floor(scene, self.option("floor"))
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
         return DrakeSimulation(scene, dt, self.option("floor"), self.option("beside"))
@@ -66,7 +64,7 @@ class DrakeSimulation(Simulation):
         builder: Any = DiagramBuilder()
         self._dt, self._steps = dt, 0
         self._plant = builder.AddSystem(MultibodyPlant(dt)) if scene.floor is None else AddMultibodyPlantSceneGraph(builder, dt)[0]
-        scenes = [scene] if beside == "none" else [scene, heavy_neighbour(scene)]
+        scenes = mapping.bodies_in(scene, beside)
         bodies = [self._add_body(one, self._plant.AddModelInstance(f"body {number}")) for number, one in enumerate(scenes)]
         self._body = bodies[0]
         self._plant.mutable_gravity_field().set_gravity_vector(scene.acceleration)
@@ -94,7 +92,7 @@ class DrakeSimulation(Simulation):
 
     def _add_floor(self, scene: Scenario, floor: Floor, kind: str, bodies: list[Any]) -> dict[str, Any]:
         plant, body, approximation = self._plant, scene.body, "sap" if isinstance(floor.friction, str) else "tamsi"
-        friction = {"none": 0.0, "infinite": STICKING}[floor.friction] if isinstance(floor.friction, str) else floor.friction
+        friction = mapping.friction_of(floor, gripping=1e6)
         chosen = {"sap_near_rigid_threshold": 0.01, "relaxation_time": 1.0, "dissipation": 1e7, "friction": friction}
         plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, f"k{approximation.capitalize()}"))
         plant.set_sap_near_rigid_threshold(chosen["sap_near_rigid_threshold"])
@@ -133,6 +131,6 @@ def _floor(kind: str) -> tuple[RigidTransform, Shape]:
     """The pose and the shape of the floor."""
     if kind == "plane":
         return RigidTransform(RotationMatrix.MakeXRotation(-np.pi / 2)), HalfSpace()
-    half = np.full(3, base.FLOOR_HALF_SIZE)
-    corners = half[:, np.newaxis] * np.array(list(product((-1.0, 1.0), repeat=3))).T
-    return RigidTransform([0.0, -base.FLOOR_HALF_SIZE, 0.0]), Box(2.0 * half) if kind == "box" else Convex(corners, "floor")
+    half = mapping.FLOOR_HALF_SIZE
+    corners = np.array(list(product((-half, half), repeat=3))).T
+    return RigidTransform([0.0, -half, 0.0]), Box([2.0 * half] * 3) if kind == "box" else Convex(corners, "floor")

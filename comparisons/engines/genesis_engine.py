@@ -10,20 +10,10 @@ from typing import Any, ClassVar
 import genesis
 import numpy as np
 
-from dropspin.comparisons.engines.base import (
-    FLOOR_HALF_SIZE,
-    Array,
-    AsBuilt,
-    BatchSimulation,
-    Engine,
-    Simulation,
-    refusal_of_axes,
-    refusal_of_floor,
-    refusal_of_rest_speed,
-    version,
-)
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, OneWorld, Simulation
+from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, refusal_of_axes, refusal_of_floor, refusal_of_rest_speed
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
-from dropspin.comparisons.engines.one_world import OneWorld
+from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
 from dropspin.scenarios.model import initial_states
@@ -66,8 +56,7 @@ class Genesis(Engine):
         return refusal_of_rest_speed(scene, "Genesis") or refusal_of_floor(scene, "plane with edges")
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        worlds = self.prepare_batch([scene], dt)
-        return OneWorld(scene, worlds, worlds.settings, worlds.as_built())
+        return OneWorld(scene, self.prepare_batch([scene], dt))
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> "Worlds":
         start(self.option("precision"))

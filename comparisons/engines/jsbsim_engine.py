@@ -13,7 +13,8 @@ import jsbsim
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation, version
+from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
 

@@ -13,12 +13,13 @@ import jax
 import numpy as np
 from jax import numpy as jnp
 
-from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
-from dropspin.comparisons.engines.mujoco_engine import MuJoCo
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation
+from dropspin.comparisons.engines.mapping import built
+from dropspin.comparisons.engines.mujoco_engine import MuJoCo, flight_of
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
-from dropspin.comparisons.engines.mujoco_ports import Port, built, ported_model
+from dropspin.comparisons.engines.mujoco_ports import Port, ported_model
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
-from dropspin.comparisons.engines.mujoco_versions import RUNGE_KUTTA_SINCE, numbers_of
+from dropspin.comparisons.engines.packages import numbers_of, version
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
@@ -43,7 +44,7 @@ class MJX(Port):
     def discretisation(self, scene: Scenario) -> str | None:
         """MuJoCo's, but the gyroscopic term is explicit in `implicitfast` too, and RK4's rotations are those of MuJoCo before 4.0."""
         if self.option("integrator") == "rk4":
-            return RUNGE_KUTTA_SINCE[max(since for since in RUNGE_KUTTA_SINCE if since <= numbers_of(version("mujoco-mjx")))]
+            return flight_of("rk4", numbers_of(version("mujoco-mjx")))
         return MuJoCo().discretisation(scene)
 
     def declines(self, scene: Scenario) -> str | None:
@@ -104,7 +105,7 @@ class MJXSimulation(Simulation):
 
     def as_built(self) -> AsBuilt:
         model = self.model
-        return built(model.body_mass[1], model.body_inertia[1], model.body_iquat[1], model.opt.gravity)
+        return built(model.body_mass[1], model.body_inertia[1], np.roll(model.body_iquat[1], -1), model.opt.gravity)
 
 
 class MJXBatch(BatchSimulation):

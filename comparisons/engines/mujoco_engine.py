@@ -1,4 +1,9 @@
-"""The engine `mujoco`: calibrated settings that reproduce the scene, or MuJoCo's defaults (profile=default)."""
+"""The engine `mujoco`: calibrated settings that reproduce the scene, or MuJoCo's defaults (profile=default); and what its versions have.
+
+Source of what versions have: MuJoCo's changelog, under the versions named here. Also measured in each minor version from 3.2.4 to 4.0.0,
+with MuJoCo's own free-body test (a box of half extents .1 .2 .3 m, ω = (1, 2, 3) rad/s, 500 steps of 10 ms): the final E/E₀ is 1.0868946
+with the gyroscopic term explicit, .9260083 with it implicit, and 1 - 7e-15 with the midpoint rule.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -6,43 +11,80 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.engines.base import (
+from dropspin.comparisons.engines.base import BatchSimulation, Engine
+from dropspin.comparisons.engines.mapping import (
+    BESIDE,
+    EXPLICIT_GYROSCOPIC,
+    IMPLICIT_GYROSCOPIC,
     LATE_IMPACTS,
     MIDPOINT_GYROSCOPIC,
     PROFILES,
     SEMI_IMPLICIT_EULER,
-    BatchSimulation,
-    Engine,
-    NumericOption,
-    Simulation,
     may_tumble,
     refusal_of_axes,
     refusal_of_floor,
     refusal_of_hull,
     refusal_of_rest_speed,
 )
-from dropspin.comparisons.engines.mujoco_contact import IMPEDANCE, STRONGEST_FRICTION, contact
-from dropspin.comparisons.engines.mujoco_model import INTEGRATORS, Form, calibrated_specification, default_specification
+from dropspin.comparisons.engines.mujoco_model import FORM, IMPEDANCE, INTEGRATORS, calibrated_specification, contact, default_specification
 from dropspin.comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
-from dropspin.comparisons.engines.mujoco_versions import (
-    BATCHES,
-    flight_of,
-    numbers_of,
-    refusal,
-    refusal_of_boxes,
-    refusal_of_meshes,
-    solver,
-)
+from dropspin.comparisons.engines.options import NumericOption
+from dropspin.comparisons.engines.packages import Version, formatted, numbers_of
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.bodies import Box, Sphere, Vertices
-from dropspin.scenarios.model import differ_in_start_alone
+from dropspin.scenarios.bodies import Sphere, Vertices
+from dropspin.scenarios.model import Floor, differ_in_start_alone
 
 VERSION = numbers_of(mujoco.__version__)
+OLDEST: Version = (3, 2, 4)
+"""The first version in which Python can set the options of a specification."""
+BATCHES: Version = (3, 2, 7)
+"""The first version whose rollouts step many bodies in threads."""
+EXACT_DIAGONAL: Version = (3, 9)
+"""The first version with the flag diagexact.
+
+Without the flag, MuJoCo assumes that each contact is in line with the centre of mass. That holds for a ball, whose motion is the same
+to the last bit. For a box that lands flat or on a corner, the error of restitution does not vanish as dt → 0: it tends to 1.1e-4 or
+3e-5 (e = 0.5, steps of 4, 2 and 1 ms).
+"""
+FOUR_POINTS: Version = (4, 0)
+"""A version that gives a mesh four contact points with a plane; some between 3.9.0 and it may do so too.
+
+Earlier versions give a mesh at most three contact points with a plane, so that one end of an edge may be without any. Measured with
+3.2.4, 3.3.7 and 3.9.0 at 1 ms.
+"""
+CONTACTS_SINCE: Mapping[str, tuple[Version, str]] = {
+    "box": (
+        EXACT_DIAGONAL,
+        "which gives boxes a coefficient of restitution that is wrong by about 1e-4 at every time step; versions from "
+        f"{formatted(EXACT_DIAGONAL)} on have the flag diagexact, which corrects this: update mujoco, or use profile=default",
+    ),
+    "vertices": (
+        FOUR_POINTS,
+        "which gives a mesh at most three contact points with a plane, so that a prism that rolls over its edges leaves its course by 6 to "
+        f"8 mm in 1.8 m; versions from {formatted(FOUR_POINTS)} on give it four: update mujoco, or use profile=default",
+    ),
+}
+"""By shape, the first version whose calibrated contacts with a floor are right, and what is wrong in earlier ones."""
+
+SOLVER = {"cone": "elliptic", "jacobian": "dense", "diagexact": "enable", "island": "disable", "autoreset": "disable"}
+"""The solver settings of calibrated contacts, by their names in MJCF."""
+FLAGS_SINCE: Mapping[str, Version] = {"diagexact": EXACT_DIAGONAL, "island": (3, 3, 6)}  # earlier versions look for islands on request only
+FLIGHT_SINCE: Mapping[str, Mapping[Version, str]] = {
+    "euler": {OLDEST: EXPLICIT_GYROSCOPIC},
+    "implicit": {OLDEST: IMPLICIT_GYROSCOPIC, (3, 7): MIDPOINT_GYROSCOPIC, (3, 8, 1): IMPLICIT_GYROSCOPIC},
+    "implicitfast": {OLDEST: EXPLICIT_GYROSCOPIC, (3, 7): MIDPOINT_GYROSCOPIC, (3, 11): IMPLICIT_GYROSCOPIC},
+    "rk4": {
+        # It averaged its stages' angular velocities as if rotations commuted.
+        OLDEST: "classical Runge-Kutta with rotations of second order",
+        (4, 0): "classical Runge-Kutta",
+    },
+}
+STRONGEST_FRICTION = 1e9
+"""The largest coefficient that the adapter sets."""
 LEAST_OF_A_SPRING = 0.01  # restitution; the damping ratio there is 5, and a contact that is damped more hardly pushes
 FEWEST_SPRING_STEPS = 5  # with fewer steps the restitution is between 0.25 and 1.5 times the one asked for
-
 REASONS = {
     "solref": "[0, -(1 + e)/dt]: a damper that turns v into -e v in one step; with the default spring the restitution is 0.13 for any e",
     "solimp": "the hardest contact that MuJoCo allows, at any depth; at the default 0.9 to 0.95, restitution 0.5 becomes 0.466 at 0.25 ms, "
@@ -61,19 +103,24 @@ REASONS = {
 SPRING = "a spring that only pushes, with stiffness and damping for this many steps of contact and for e; the values hold for this dt only"
 
 
+def flight_of(integrator: str, version: Version) -> str:
+    """The name of an integrator's discretisation of a tumbling body in a version."""
+    since = FLIGHT_SINCE[integrator]
+    return since[max(first for first in since if first <= version)]
+
+
 class MuJoCo(Engine):
     """MuJoCo with exact restitution: one free body and one explicit contact pair with the floor; or its defaults (profile=default)."""
 
-    name = "mujoco"
+    name, mixes_scenes = "mujoco", True
     choices: ClassVar = {
         "integrator": tuple(INTEGRATORS),
         "profile": PROFILES,
         "body": ("geom", "mesh", "child"),
         "floor": ("plane", "box", "mesh"),
-        "beside": ("none", "heavy"),
+        "beside": BESIDE,
     }
-    representations: ClassVar = ("body", "floor", "beside")
-    mixes_scenes = True
+    representations: ClassVar = tuple(FORM)
     numbers: ClassVar = {"kappa": NumericOption(0.0, 0.0, 1.0), "spring_steps": NumericOption(0.0, 0.0, 1e4)}
 
     def __post_init__(self) -> None:
@@ -94,6 +141,11 @@ class MuJoCo(Engine):
         """The order of accuracy that the manuals of all versions claim for the integrator; RK4's rotations reach it from 4.0 on."""
         return 4.0 if self.option("integrator") == "rk4" else 1.0
 
+    @property
+    def _stops_in_a_step(self) -> bool:
+        """Whether a contact is the damper over one step alone."""
+        return not {"profile", "kappa", "spring_steps"} & set(self.options)
+
     def discretisation(self, scene: Scenario) -> str | None:
         """The integrator's scheme, which depends on the gyroscopic term; contacts of the default profile have no name in common use."""
         integrator = self.option("integrator")
@@ -107,14 +159,9 @@ class MuJoCo(Engine):
             return flight
         return f"{flight}, {LATE_IMPACTS}" if self._stops_in_a_step else None
 
-    @property
-    def _stops_in_a_step(self) -> bool:
-        """Whether a contact is the damper over one step alone."""
-        return not {"profile", "kappa", "spring_steps"} & set(self.options)
-
     def predicted_error(self, scene: Scenario, truth: Truth | None, metric: str, dt: float) -> float | None:
         """The error of semi-implicit Euler about a fixed axis, and of a flat bounce detected late that loses (1 - d) g dt to impedance."""
-        if self.option("integrator") == "rk4" or self.option("profile") == "default":
+        if self.option("integrator") == "rk4" or self.is_default:
             return None
         flight = flight_error(scene, truth, metric, dt, exact_rotation=True)
         if flight is not None or not self._stops_in_a_step:
@@ -126,20 +173,28 @@ class MuJoCo(Engine):
     def declines(self, scene: Scenario) -> str | None:
         """Why calibration cannot reproduce the scene, or the installed version cannot run it."""
         body, floor = scene.body, scene.floor
-        if (too_old := refusal(VERSION)) is not None:
-            return too_old
+        if VERSION < OLDEST:
+            return (
+                f"MuJoCo {formatted(VERSION)} is installed, whose options Python cannot set; update mujoco to {formatted(OLDEST)} or later"
+            )
         if min(body.mass, *np.linalg.eigvalsh(body.inertia_tensor)) < mujoco.mjMINVAL:
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
         unfit = refusal_of_axes(scene, "damps") if scene.damping is not None else None
-        if (unfit := unfit or self._refusal_of_shape(scene)) is not None:
+        unfit = unfit or (refusal_of_hull(scene, "mesh") if self.option("body") == "mesh" else None)
+        unfit = unfit or refusal_of_floor(scene, self.option("floor"))
+        if unfit is not None or floor is None:
             return unfit
-        if floor is None or self.option("profile") == "default":
-            return None
+        if isinstance(body, Vertices) and body.resting_height == 0.0:
+            return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo has no convex hull of a flat mesh"
+        return None if self.is_default else self._refusal_of_contacts(scene, floor)
+
+    def _refusal_of_contacts(self, scene: Scenario, floor: Floor) -> str | None:
+        """Why calibrated contacts cannot reproduce those of a scene."""
         if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
             return f"the adapter takes coefficients of friction up to {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
-        refusal_of_contacts = {Box: refusal_of_boxes, Vertices: refusal_of_meshes}.get(type(body))
-        if refusal_of_contacts is not None and (too_old := refusal_of_contacts(VERSION)) is not None:
-            return too_old
+        since, wrong = CONTACTS_SINCE.get(scene.body.shape, (OLDEST, ""))
+        if since > VERSION:
+            return f"MuJoCo {formatted(VERSION)} is installed, {wrong}"
         if self.option("integrator") == "rk4" and "spring_steps" not in self.options:
             return (
                 "with RK4 the adapter's one-step damper acts in all stages, and no body rebounds; use integrator=euler, or spring_steps=20"
@@ -148,53 +203,41 @@ class MuJoCo(Engine):
             return f"the adapter sets springs for a restitution of at least {LEAST_OF_A_SPRING:g}; leave out spring_steps"
         return refusal_of_rest_speed(scene, "MuJoCo")
 
-    def _refusal_of_shape(self, scene: Scenario) -> str | None:
-        """Why the shape of a scene's body cannot strike a floor."""
-        unfit = refusal_of_hull(scene, "mesh") if self.option("body") == "mesh" else None
-        unfit = unfit or refusal_of_floor(scene, self.option("floor"))
-        if unfit is None and scene.floor is not None and isinstance(scene.body, Vertices) and scene.body.resting_height == 0.0:
-            return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo has no convex hull of a flat mesh"
-        return unfit
+    def _flags(self) -> dict[str, str]:
+        """The settings of `SOLVER` that the installed version has."""
+        return {name: value for name, value in SOLVER.items() if FLAGS_SINCE.get(name, OLDEST) <= VERSION}
+
+    def _pair(self, scene: Scenario, dt: float) -> dict[str, Any]:
+        """Settings of the contact pair; empty without a floor."""
+        return contact(scene.floor, dt, *(float(self.option(name)) for name in self.numbers))
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python and as MJCF."""
-        if self.option("profile") == "default" or not can_be_pasted(scene):
+        if self.is_default or not can_be_pasted(scene):
             return {}
-        settings = {"integrator": self.option("integrator"), "solver": solver(VERSION), "pair": self._pair(scene, dt)}
+        settings = {"integrator": self.option("integrator"), "solver": self._flags(), "pair": self._pair(scene, dt)}
         values = {"engine": "MuJoCo", "dt": dt} | settings
         return {
             "python": rendered("mujoco.py.jinja", scene, why=self.reasons, **values),
             "mjcf": rendered("mujoco.xml.jinja", scene, **values),
         }
 
-    def _pair(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        """Settings of the contact pair; empty without a floor."""
-        if scene.floor is None:
-            return {}
-        kappa, steps = (float(self.option(name)) for name in ("kappa", "spring_steps"))
-        return contact(scene.floor.restitution, scene.floor.friction, dt, kappa, steps)
-
-    def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return self._prepare(scene, dt)
+    def prepare(self, scene: Scenario, dt: float) -> MuJoCoSimulation:
+        integrator, form = self.option("integrator"), {name: self.option(name) for name in FORM}
+        settings = {"profile": self.option("profile"), "integrator": integrator} | form
+        if self.is_default:
+            return MuJoCoSimulation(scene, default_specification(scene, dt, integrator, form), settings)
+        pair = self._pair(scene, dt)
+        flags = self._flags() if pair else {"autoreset": "disable"}
+        return MuJoCoSimulation(scene, calibrated_specification(scene, dt, integrator, form, pair, flags), settings | flags | pair)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         if VERSION < BATCHES:
             return None
-        first = self._prepare(members[0], dt)
-        model, _ = first.built
+        first = self.prepare(members[0], dt)
         if differ_in_start_alone(members):
-            return MuJoCoBatch(first, [model] * len(members), members)
-        models = [model, *(self._prepare(member, dt).built[0] for member in members[1:])]
+            return MuJoCoBatch(first, [first.model] * len(members), members)
+        models = [first.model, *(self.prepare(member, dt).model for member in members[1:])]
         # Models of other sizes in the same data give NaN; MuJoCo's signature does not count the sizes of meshes.
-        sizes = {(one.signature, one.nbuffer, one.nbvh) for one in models}
+        sizes = {(model.signature, model.nbuffer, model.nbvh) for model in models}
         return MuJoCoBatch(first, models, members) if len(sizes) == 1 else None
-
-    def _prepare(self, scene: Scenario, dt: float) -> "MuJoCoSimulation":
-        form = Form(self.option("integrator"), **{name: self.option(name) for name in self.representations})
-        settings = {name: self.option(name) for name in ("profile", "integrator", *self.representations)}
-        if self.option("profile") == "default":
-            return MuJoCoSimulation(scene, default_specification(scene, dt, form), settings)
-        pair = self._pair(scene, dt)
-        flags = solver(VERSION) if pair else {"autoreset": "disable"}
-        specification = calibrated_specification(scene, dt, form, pair, flags)
-        return MuJoCoSimulation(scene, specification, settings | flags | pair)

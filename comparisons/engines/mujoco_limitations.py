@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Array, KnownLimitation
-from dropspin.comparisons.engines.mujoco_contact import IMPEDANCE
+from dropspin.comparisons.engines.mujoco_model import IMPEDANCE
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
 from dropspin.scenarios.rotations import cross, length, rotate, unrotate
@@ -61,11 +61,7 @@ def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray
     speed = (1.0 + scene.floor.restitution) * float(length(stopped).max(initial=0.0))
     approach = float(-before[:, 8].min())
     changed = (1.0 - IMPEDANCE) / IMPEDANCE * float(inverse_inertias.max(initial=0.0)) * speed / approach
-    sizes = {"restitution_error": changed}
-    g = -float(scene.acceleration[1])
-    if g > 0.0 and scene.starts_above_floor:
-        e, added = scene.floor.restitution, changed * approach
-        sizes["bounce_height_error"] = (2.0 * e * approach * added + added**2) / (2.0 * g * scene.clearance)
+    sizes = {"restitution_error": changed} | _of_bounce(scene, scene.floor.restitution * approach, changed * approach)
     return KnownLimitation(
         f"several forces share an impulse; MuJoCo's largest impedance, {IMPEDANCE:g}, changes the restitution by up to {changed:.2g}", sizes
     )
@@ -103,10 +99,17 @@ def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: flo
         sizes |= {"angular_momentum_error": turned, "angular_momentum_direction_error": 0.5 * np.pi * turned}
     if approach > 0.0:
         sizes["restitution_error"] = added / approach
-    if g > 0.0 and scene.starts_above_floor:
-        sizes["bounce_height_error"] = (2.0 * e * fastest * added + added**2) / (2.0 * g * scene.clearance)
+    sizes |= _of_bounce(scene, e * fastest, added)
     return KnownLimitation(
         f"contacts slip at up to {slip:.3g} m/s; with calibrated contacts MuJoCo's friction cone adds up to µ times that, {added:.3g} m/s, "
         "to the rebound",
         sizes,
     )
+
+
+def _of_bounce(scene: Scenario, rebound: float, added: float) -> dict[str, float]:
+    """The error of the bounce height if a speed is added to that of the rebound [m/s]; empty for a scene without a bounce."""
+    g = -float(scene.acceleration[1])
+    if g <= 0.0 or not scene.starts_above_floor:
+        return {}
+    return {"bounce_height_error": (2.0 * rebound * added + added**2) / (2.0 * g * scene.clearance)}

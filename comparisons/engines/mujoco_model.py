@@ -1,75 +1,123 @@
-"""MuJoCo models of a scene: a free body and, where the scene has a floor, one contact pair with it; or MuJoCo's defaults."""
+"""MuJoCo models of a scene: a free body and, where the scene has a floor, one contact pair with it; or MuJoCo's defaults.
 
+MuJoCo has no coefficient of restitution. A contact is a damped spring with the reference acceleration a_ref = -b v - k r, and its force
+only pushes. Two settings give a restitution e:
+
+The damper, over one step: k = 0 and b = (1 + e) / dt turn the normal velocity v into -e v in one step of a one-stage integrator. The
+impedance d < 1 leaves an error of (1 - d) g dt. In addition, k = kappa / dt² removes the share kappa of the depth in each step, and adds
+up to kappa to e.
+
+The spring, over N steps, with any integrator: its damping leaves the restitution e when its force ends. The force ends where
+k r + b v = 0, before the depth r is 0: e = exp(-z c), with the angle c(z) of `_contact_angle` below. (If it ended at r = 0, e would be
+exp(-π z / √(1 - z²)); the z of that formula for e = .5 gives .55.) Source: the damped oscillator x'' + 2 z w x' + w² x = 0 from x = 0,
+until x'' = 0.
+"""
+
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import chain, product
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE
+from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, bodies_in, friction_of, principal_frame
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.bodies import Box, Sphere, Vertices
-from dropspin.scenarios.bodies.inertia import is_diagonal, principal_axes
-from dropspin.scenarios.variations import heavy_neighbour
+from dropspin.scenarios.bodies import Sphere, Vertices
+from dropspin.scenarios.bodies.inertia import is_diagonal
+from dropspin.scenarios.model import Floor
 
-Array = NDArray[np.float64]
-
-DEFAULT_INFINITE_FRICTION = 10.0
-"""In the default profile; with the default's pyramidal cones a coefficient of 1e6 would leave no friction and no contact."""
+IMPEDANCE = 0.9999  # the largest that MuJoCo allows
+MOST_DAMPED = 1e3
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
     "rk4": mujoco.mjtIntegrator.mjINT_RK4,
 }
-FLOOR_QUATERNION = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: rotates the plane's normal from z to y
+FORM = {"body": "geom", "floor": "plane", "beside": "none"}
+"""How a scene is written as a model.
+
+The body is a `geom`; a `mesh`, a box as the convex hull of its corners; or a `child`, with mass and shape on a fixed child of the free
+body. A body of vertices is always a mesh. The floor is a `plane`; or a `box` or a `mesh`, the convex hull of its corners, whose top is the
+floor.
+"""
+UPWARD = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: rotates the plane's normal from z to y
 
 
-@dataclass(frozen=True)
-class Form:
-    """How a scene is written as a model.
+def contact(floor: Floor | None, dt: float, kappa: float = 0.0, spring_steps: float = 0.0) -> dict[str, Any]:
+    """The settings of a contact pair that give a floor's restitution and friction; empty without a floor.
 
-    Attributes:
-        integrator: A key of `INTEGRATORS`.
-        body: `geom`; `mesh`, a box as the convex hull of its corners; or `child`, with mass and shape on a fixed child of the free
-            body. A body of vertices is always a mesh.
-        floor: `plane`; or `box` or `mesh`, the convex hull of its corners, whose top is the floor.
-        beside: `none`, or `heavy`, a second body far away.
+    Args:
+        floor: The floor.
+        dt: Time step [s].
+        kappa: The share of the depth that the damper removes in a step.
+        spring_steps: N, the steps that a collision takes with the spring; 0 for the damper, with which it takes one.
     """
+    if floor is None:
+        return {}
+    coefficient = friction_of(floor, gripping=1e6)
+    if spring_steps:
+        z = damping_ratio(floor.restitution)
+        w = _contact_angle(z) / (spring_steps * dt)
+        solref = [-(w**2), -2.0 * z * w]
+    else:
+        solref = [0.0 - kappa / dt**2, -(1.0 + floor.restitution) / dt]  # 0.0, not -0.0, without a spring
+    return {
+        "condim": 3 if coefficient else 1,
+        "friction": [coefficient, coefficient, 0.0, 0.0, 0.0],
+        "solref": solref,
+        "solimp": [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+        "solreffriction": [0.0, -1.0 / dt],
+    }
 
-    integrator: str
-    body: str = "geom"
-    floor: str = "plane"
-    beside: str = "none"
+
+def damping_ratio(restitution: float) -> float:
+    """The damping ratio z of a spring that only pushes and gives a restitution 0 < e <= 1."""
+    from scipy.optimize import brentq
+
+    if restitution == 1.0:
+        return 0.0
+    return float(brentq(lambda z: z * _contact_angle(z) + math.log(restitution), 0.0, MOST_DAMPED, xtol=1e-15, rtol=1e-15))
 
 
-def default_specification(scene: Scenario, dt: float, form: Form) -> Any:
+def _contact_angle(z: float) -> float:
+    """The duration of a spring's push times its undamped angular frequency [rad]."""
+    if z < 1.0:
+        s = math.sqrt(1.0 - z * z)
+        return math.atan2(2.0 * z * s, 2.0 * z * z - 1.0) / s
+    if z == 1.0:
+        return 2.0
+    s = math.sqrt(z * z - 1.0)
+    return math.log((z + s) / (z - s)) / s
+
+
+def default_specification(scene: Scenario, dt: float, integrator: str, form: Mapping[str, str]) -> Any:
     """The specification of a user who sets friction on both surfaces and nothing else: MuJoCo has no restitution to set."""
-    spec, bodies = _free_bodies(scene, dt, form)
+    spec, bodies = _free_bodies(scene, dt, integrator, form)
     if scene.floor is not None:
-        known = {"none": 0.0, "infinite": DEFAULT_INFINITE_FRICTION}
-        friction = known[scene.floor.friction] if isinstance(scene.floor.friction, str) else scene.floor.friction
-        surface = {"friction": [friction, 0.005, 0.0001]}  # sliding; torsion and rolling keep their defaults
+        # With the default's pyramidal cones a coefficient of 1e6 would leave no friction and no contact; torsion and rolling keep theirs.
+        surface = {"friction": [friction_of(scene.floor, gripping=10.0), 0.005, 0.0001]}
         for body in bodies:
-            _add_shape(body, scene, form, **surface)
+            body.add_geom(**_shape(scene, form), **surface)
         spec.worldbody.add_geom(**_floor(form), **surface)
     return spec
 
 
-def calibrated_specification(scene: Scenario, dt: float, form: Form, pair: Mapping[str, Any], flags: Mapping[str, str]) -> Any:
+def calibrated_specification(
+    scene: Scenario, dt: float, integrator: str, form: Mapping[str, str], pair: Mapping[str, Any], flags: Mapping[str, str]
+) -> Any:
     """The specification of a calibrated simulation.
 
     Args:
         scene: The scene.
         dt: Time step [s].
-        form: How the scene is written.
+        integrator: A key of `INTEGRATORS`.
+        form: How the scene is written, as `FORM`.
         pair: Settings of the contact pair; without any, MuJoCo detects neither contacts nor constraints.
         flags: Solver settings that the installed version has, by their names in MJCF.
     """
-    spec, bodies = _free_bodies(scene, dt, form)
+    spec, bodies = _free_bodies(scene, dt, integrator, form)
     option, disable = spec.option, mujoco.mjtDisableBit
     if not pair:
         option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
@@ -83,12 +131,12 @@ def calibrated_specification(scene: Scenario, dt: float, form: Form, pair: Mappi
     passive = {"contype": 0, "conaffinity": 0}  # the pairs are the only contacts
     spec.worldbody.add_geom(name="floor", **_floor(form), **passive)
     for number, body in enumerate(bodies):
-        _add_shape(body, scene, form, name=f"shape {number}", **passive)
+        body.add_geom(name=f"shape {number}", **_shape(scene, form), **passive)
         spec.add_pair(geomname1="floor", geomname2=f"shape {number}", **pair)
     return spec
 
 
-def _free_bodies(scene: Scenario, dt: float, form: Form) -> tuple[Any, list[Any]]:
+def _free_bodies(scene: Scenario, dt: float, integrator: str, form: Mapping[str, str]) -> tuple[Any, list[Any]]:
     """The specification that all profiles share: step, gravity, integrator, meshes and free bodies; and the bodies that have the masses.
 
     The automatic reset is off: it would put a simulation that broke down back to its start without notice.
@@ -96,55 +144,47 @@ def _free_bodies(scene: Scenario, dt: float, form: Form) -> tuple[Any, list[Any]
     spec = mujoco.MjSpec()
     spec.option.timestep = dt
     spec.option.gravity = scene.acceleration
-    spec.option.integrator = INTEGRATORS[form.integrator]
+    spec.option.integrator = INTEGRATORS[integrator]
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if scene.floor is not None and _is_mesh(scene, form):
         spec.add_mesh(name="hull", uservert=scene.body.hull.ravel().tolist())
-    if scene.floor is not None and form.floor == "mesh":
+    if scene.floor is not None and form["floor"] == "mesh":
         spec.add_mesh(name="floor", uservert=list(chain(*product((-FLOOR_HALF_SIZE, FLOOR_HALF_SIZE), repeat=3))))
     bodies = []
-    for one in [scene] if form.beside == "none" else [scene, heavy_neighbour(scene)]:
+    for one in bodies_in(scene, form["beside"]):
         body = spec.worldbody.add_body()
         body.add_freejoint()
-        if form.body == "child":
+        if form["body"] == "child":
             body = body.add_body()
+        moments, axes = principal_frame(one.body.inertia_tensor)
+        if not is_diagonal(one.body.inertia_tensor):
+            # A flat body's largest moment is the sum of the others; MuJoCo rejects one that exceeds it by rounding.
+            moments[2] = min(moments[2], np.nextafter(moments[0] + moments[1], 0.0))
         body.explicitinertial = True
         body.mass = one.body.mass
         body.ipos = [0.0, 0.0, 0.0]
-        body.inertia, body.iquat = _principal(one.body.inertia_tensor)
+        body.inertia, body.iquat = moments, np.roll(axes, 1)
         bodies.append(body)
     return spec, bodies
 
 
-def _principal(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments and the quaternion [w, x, y, z] of their axes; the identity where the tensor is diagonal."""
-    if is_diagonal(inertia):
-        return np.diag(inertia), np.array([1.0, 0.0, 0.0, 0.0])
-    from scipy.spatial.transform import Rotation
-
-    moments, axes = principal_axes(inertia)
-    # A flat body's largest moment is the sum of the others; MuJoCo rejects one that exceeds it by rounding.
-    moments[2] = min(moments[2], np.nextafter(moments[0] + moments[1], 0.0))
-    return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)
+def _is_mesh(scene: Scenario, form: Mapping[str, str]) -> bool:
+    return form["body"] == "mesh" or isinstance(scene.body, Vertices)
 
 
-def _floor(form: Form) -> dict[str, Any]:
-    """The geom of the floor."""
-    if form.floor == "box":
-        return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [FLOOR_HALF_SIZE] * 3, "pos": [0.0, -FLOOR_HALF_SIZE, 0.0]}
-    if form.floor == "mesh":
-        return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "floor", "pos": [0.0, -FLOOR_HALF_SIZE, 0.0]}
-    return {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "quat": FLOOR_QUATERNION}
-
-
-def _is_mesh(scene: Scenario, form: Form) -> bool:
-    return form.body == "mesh" or isinstance(scene.body, Vertices)
-
-
-def _add_shape(body: Any, scene: Scenario, form: Form, **properties: Any) -> None:
+def _shape(scene: Scenario, form: Mapping[str, str]) -> dict[str, Any]:
+    """The geom of the body."""
     if _is_mesh(scene, form):
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull", **properties)
-    elif isinstance(scene.body, Sphere):
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[scene.body.radius, 0.0, 0.0], **properties)
-    elif isinstance(scene.body, Box):
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=scene.body.half_extents, **properties)
+        return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "hull"}
+    if isinstance(scene.body, Sphere):
+        return {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": [scene.body.radius, 0.0, 0.0]}
+    return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": scene.body.vertices.max(axis=0)}
+
+
+def _floor(form: Mapping[str, str]) -> dict[str, Any]:
+    """The geom of the floor."""
+    if form["floor"] == "box":
+        return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [FLOOR_HALF_SIZE] * 3, "pos": [0.0, -FLOOR_HALF_SIZE, 0.0]}
+    if form["floor"] == "mesh":
+        return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "floor", "pos": [0.0, -FLOOR_HALF_SIZE, 0.0]}
+    return {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "quat": UPWARD}

@@ -5,14 +5,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.engines.base import Array, AsBuilt, Engine
-from dropspin.comparisons.engines.mujoco_contact import contact
+from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo
-from dropspin.comparisons.engines.mujoco_model import Form, calibrated_specification
+from dropspin.comparisons.engines.mujoco_model import FORM, calibrated_specification, contact
 from dropspin.comparisons.engines.mujoco_simulation import set_damping
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.rotations import rotate
 
 STICKING = 1e4
 """Friction of a floor that grips, in single precision; with 1e5 a gripping corner can become NaN in MJX, with 1e3 a turning box slips."""
@@ -50,10 +48,10 @@ class Port(Engine):
 def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -> tuple[Any, dict[str, Any]]:
     """A compiled model without the flags that ports lack (autoreset, diagexact), and its settings."""
     floor = scene.floor
-    pair = {} if floor is None else contact(floor.restitution, floor.friction, dt)
+    pair = contact(floor, dt)
     if floor is not None and floor.friction == "infinite" and precision is np.float32:
         pair["friction"][:2] = [STICKING, STICKING]
-    spec = calibrated_specification(scene, dt, Form(integrator), pair, {})
+    spec = calibrated_specification(scene, dt, integrator, FORM, pair, {})
     settings: dict[str, Any] = {"mujoco": mujoco.__version__, "precision": np.dtype(precision).name, "integrator": integrator}
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     if pair:
@@ -65,9 +63,3 @@ def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -
     model = spec.compile()
     set_damping(model, scene)
     return model, settings | pair
-
-
-def built(mass: float, moments: Array, axes: Array, gravity: Array) -> AsBuilt:
-    """What a port built: mass, principal moments, the quaternion [w, x, y, z] of their axes, and gravity, in its own precision."""
-    turned = rotate(np.array(axes, dtype=float)[[1, 2, 3, 0]], np.eye(3))
-    return AsBuilt(float(mass), turned.T @ np.diag(np.array(moments, dtype=float)) @ turned, np.array(gravity, dtype=float))

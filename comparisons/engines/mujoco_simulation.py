@@ -10,6 +10,7 @@ import numpy as np
 from mujoco import rollout
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, KnownLimitation, Simulation
+from dropspin.comparisons.engines.mapping import built
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import Scenario
@@ -26,27 +27,30 @@ CHUNK = 8192
 
 
 class MuJoCoSimulation(Simulation):
-    """A compiled model and its data."""
+    """A compiled model and its data.
+
+    Attributes:
+        model: The model.
+    """
 
     def __init__(self, scene: Scenario, specification: Any, settings: Mapping[str, Any]) -> None:
-        self._scene = scene
-        self._model = specification.compile()
-        self.velocity_lag = 0.0 if settings["integrator"] == "rk4" else 0.5 * self._model.opt.timestep
+        self._scene, self.model = scene, specification.compile()
+        self.velocity_lag = 0.0 if settings["integrator"] == "rk4" else 0.5 * self.model.opt.timestep
         self.settings = {"version": mujoco.__version__, **settings}
-        set_damping(self._model, scene)
-        self._data = mujoco.MjData(self._model)
-        _place(self._data, scene)
+        set_damping(self.model, scene)
+        self._data = mujoco.MjData(self.model)
+        start = _starts(self.model, [scene])[0]
+        self._data.qpos[:], self._data.qvel[:] = np.split(start, [self.model.nq])
         self._steps = 0
 
     def advance(self, steps: int) -> None:
         with _quiet():
-            mujoco.mj_step(self._model, self._data, steps)
+            mujoco.mj_step(self.model, self._data, steps)
         self._steps += steps
         _raise_if_bad([self._data], f"within the first {self._steps} steps")
 
     def state(self) -> Array:
-        rows = np.concatenate([self._data.qpos[:7], self._data.qvel[:6]])[None]
-        return to_world(rows)[0]
+        return to_world(np.concatenate([self._data.qpos[:7], self._data.qvel[:6]])[None])[0]
 
     def record(self, steps: int, every: int = 1) -> Array:
         with _quiet():
@@ -60,36 +64,26 @@ class MuJoCoSimulation(Simulation):
     def limitations_of(self, scene: Scenario, states: Array) -> list[KnownLimitation]:
         """The limitations that a motion met, given its states after each step, shape (n, 13)."""
         is_calibrated = self.settings["profile"] == "calibrated"
-        return list(limitations_met(scene, states, self._model.opt.timestep)) if is_calibrated else []
+        return list(limitations_met(scene, states, self.model.opt.timestep)) if is_calibrated else []
 
     def _each_step(self, steps: int) -> Array:
         """Record with MuJoCo's rollout, which takes a fifth to a quarter less time than a Python loop and gives the same bits."""
-        now = _full_state(self._model, self._data)
+        now = _full_state(self.model, self._data)
         warm = self._data.qacc_warmstart.copy()
-        states, _ = rollout.rollout(self._model, self._data, now, nstep=steps, initial_warmstart=warm)
-        return np.vstack([now, states[0]])[:, _columns(self._model)]
-
-    @property
-    def built(self) -> tuple[Any, Any]:
-        """The model and its data."""
-        return self._model, self._data
+        states, _ = rollout.rollout(self.model, self._data, now, nstep=steps, initial_warmstart=warm)
+        return np.vstack([now, states[0]])[:, _columns(self.model)]
 
     def _some_steps(self, steps: int, every: int) -> Array:
-        rows = np.empty((1 + steps // every, 13))
-        positions, velocities = rows[:, :7], rows[:, 7:]
-        data, model, step = self._data, self._model, mujoco.mj_step
-        qpos, qvel = data.qpos[:7], data.qvel[:6]
-        positions[0], velocities[0] = qpos, qvel
-        for row in range(1, len(rows)):
-            step(model, data, every)
-            positions[row], velocities[row] = qpos, qvel
+        rows, data = np.empty((1 + steps // every, 13)), self._data
+        for number, row in enumerate(rows):
+            if number:
+                mujoco.mj_step(self.model, data, every)
+            row[:7], row[7:] = data.qpos[:7], data.qvel[:6]
         return rows
 
     def as_built(self) -> AsBuilt:
-        body = int(np.argmax(self._model.body_mass > 0.0))  # the free body, or its child
-        axes = rotate(self._model.body_iquat[body][[1, 2, 3, 0]], np.eye(3))
-        inertia = axes.T @ np.diag(self._model.body_inertia[body]) @ axes
-        return AsBuilt(float(self._model.body_mass[body]), inertia, self._model.opt.gravity.copy())
+        model, body = self.model, int(np.argmax(self.model.body_mass > 0.0))  # the free body, or its child
+        return built(model.body_mass[body], model.body_inertia[body], np.roll(model.body_iquat[body], -1), model.opt.gravity)
 
 
 class MuJoCoBatch(BatchSimulation):
@@ -102,7 +96,7 @@ class MuJoCoBatch(BatchSimulation):
     def __init__(self, first: MuJoCoSimulation, models: Sequence[Any], members: Sequence[Scenario]) -> None:
         """Worlds of models, which have the sizes of the first."""
         self.velocity_lag, self._first, self._models = first.velocity_lag, first, models
-        model, data = first.built
+        model, data = first.model, first._data
         self._columns = _columns(model)
         self._datas = [data, *(mujoco.MjData(model) for _ in range(usable_cores() - 1))]
         self._now = np.empty((len(members), mujoco.mj_stateSize(model, FULL_STATE)))
@@ -145,12 +139,6 @@ class MuJoCoBatch(BatchSimulation):
         with _quiet(), ThreadPoolExecutor(threads) as pool:
             list(pool.map(run, range(0, size, each)))
         _raise_if_bad(self._datas, f"within {steps} steps of a batch")
-
-
-def _place(data: Any, scene: Scenario) -> None:
-    """Write a scene's start into the positions and velocities of a simulation."""
-    start = _starts(data.model, [scene])[0]
-    data.qpos[:], data.qvel[:] = np.split(start, [data.model.nq])
 
 
 def _starts(model: Any, scenes: Sequence[Scenario]) -> Array:

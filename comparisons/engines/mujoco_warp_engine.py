@@ -10,11 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
-from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, Simulation, version
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, KnownLimitation, OneWorld, Simulation
+from dropspin.comparisons.engines.mapping import built
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
-from dropspin.comparisons.engines.mujoco_ports import Port, built, ported_model
+from dropspin.comparisons.engines.mujoco_ports import Port, ported_model
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
-from dropspin.comparisons.engines.one_world import OneWorld
+from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Vertices
 from dropspin.scenarios.model import differ_in_start_alone, initial_states
@@ -30,8 +31,7 @@ class MuJoCoWarp(Port):
     choices: ClassVar = {"integrator": ("euler", "implicit", "implicitfast", "rk4")}
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        worlds = Worlds([scene], dt, self.option("integrator"))
-        return OneWorld(scene, worlds, worlds.settings, worlds.as_built())
+        return OneWorld(scene, Worlds([scene], dt, self.option("integrator")))
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         if len({member.body.vertices.tobytes() for member in members if isinstance(member.body, Vertices)}) > 1:
@@ -94,4 +94,4 @@ class Worlds(BatchSimulation):
         """The first world."""
         model = self.model
         mass, moments, axes = (part.numpy()[0, 1] for part in (model.body_mass, model.body_inertia, model.body_iquat))
-        return built(mass, moments, axes, model.opt.gravity.numpy()[0])
+        return built(mass, moments, np.roll(axes, -1), model.opt.gravity.numpy()[0])

@@ -1,55 +1,94 @@
-"""The engine `pybullet`: calibrated settings that reproduce the scene, or Bullet's defaults (profile=default)."""
+"""The engine `pybullet`: calibrated settings that reproduce the scene, or Bullet's defaults (profile=default).
+
+Maximal coordinates (btRigidBody) give v+ = -e v exactly once three settings are 0: the contact thresholds that start a collision early,
+the error reduction that adds penetration to the rebound, and the speed below which Bullet drops restitution.
+"""
 
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import (
+from dropspin.comparisons.engines.base import Engine, Simulation
+from dropspin.comparisons.engines.mapping import (
+    BESIDE,
     EXPLICIT_GYROSCOPIC,
     FLOOR_HALF_SIZE,
     IMPLICIT_GYROSCOPIC,
     LATE_IMPACTS,
     PROFILES,
     SEMI_IMPLICIT_EULER,
-    Engine,
-    Simulation,
+    friction_of,
     may_tumble,
     refusal_of_axes,
     refusal_of_floor,
     refusal_of_hull,
 )
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
-from dropspin.comparisons.engines.pybullet_settings import (
-    FASTEST,
-    REASONS,
-    STRONGEST_FRICTION,
-    contact_properties,
-    damping_properties,
-    world_parameters,
-)
-from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, Form, PyBulletSimulation
+from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION, PyBulletSimulation
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.bodies import Box, Vertices
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
 FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision, and the body stops
+FASTEST = 1e12  # m/s and rad/s; Bullet clamps the speeds of a multibody to 100 by default
+RESIDUAL = float(np.finfo(float).eps)  # of the speed that gravity gives in a step; Bullet's residuals are squares of speeds
+NEVER_SLEEPS = 2  # pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
+WORLD: Mapping[str, tuple[float, str]] = {
+    "fixedTimeStep": (np.nan, "the step asked for; Bullet's own is 1/240 s"),
+    "numSubSteps": (0, "no steps within a step, whose states would not be recorded"),
+    "solverResidualThreshold": (
+        np.nan,
+        "the square of one ulp of the speed that gravity gives in a step: solved to rounding, for two thirds of the cost of 0; at the "
+        "default 1e-7 a resting box jitters at 5 mm/s, a corner errs by 5e-6",
+    ),
+    "numSolverIterations": (
+        500,
+        "enough to solve contacts to rounding; the default, 50, leaves an error at impacts on a floor that grips",
+    ),
+    "erp": (0.0, "as contactERP, for joints"),
+    "contactERP": (
+        0.0,
+        "corrects no depth; at the default 0.08 a resting box jitters at 3 mm/s, and rebounds gain the depth over a step",
+    ),
+    "frictionERP": (0.0, "as contactERP, for friction"),
+    "contactSlop": (0.0, "tolerates no depth"),
+    "restitutionVelocityThreshold": (np.nan, "the scene's rest speed, by default 0; Bullet drops restitution below 0.2 m/s"),
+    "useSplitImpulse": (1, "keeps corrections of depth out of the velocities"),
+    "splitImpulsePenetrationThreshold": (0.0, "at any depth"),
+    "enableConeFriction": (
+        1,
+        "the same friction in every direction, for a multibody; maximal coordinates ignore it, and limit friction along the initial slip "
+        "and across it separately, so that friction is up to 1.41 times larger where the slip turns in an impact",
+    ),
+    "deterministicOverlappingPairs": (1, "contacts in the same order in every run"),
+}
+"""The calibrated parameters of the physics engine, NaN for those that depend on the scene or the step; and why."""
+REASONS = {name: why for name, (_, why) in WORLD.items()} | {
+    "coordinates": "maximal: a rebound of e times the approach speed; a multibody's is e (u + g dt), and its speeds are clamped at 100",
+    "restitution": "the scene's; Bullet multiplies those of two bodies, and the floor's is 1",
+    "lateralFriction": f"the scene's coefficient; {STRONGEST_FRICTION:g}, the most that Bullet allows, where the floor grips",
+    "contactProcessingThreshold": "contacts begin at touch; at the default, restitution 0.5 becomes 0.248 at 1 ms and 0.024 at 0.25 ms",
+    "linearDamping": "1 - exp(-rate), 0 without damping; a multibody's default is 0.04",
+    "angularDamping": "as linearDamping",
+    "activationState": "never falls asleep",
+    "maxJointVelocity": "no clamp of a multibody's speeds, which are by default 100 m/s and 100 rad/s (velocity_clamp=kept keeps them)",
+}
+"""Effects were measured on a ball dropped from 1 m and a box at rest, restitution 0.5, without the one setting."""
 
 
 class PyBullet(Engine):
     """Bullet's rigid body on a plane, or on a large box (boxes); or with its defaults (profile=default)."""
 
-    name = "pybullet"
-    order = 1.0
-    reasons = REASONS
+    name, order, reasons = "pybullet", 1.0, REASONS
     choices: ClassVar = {
         "coordinates": ("maximal", "multibody"),
         "profile": PROFILES,
         "velocity_clamp": ("lifted", "kept"),
         "body": ("shape", "hull"),
         "floor": ("fitting", "plane", "box", "mesh"),
-        "beside": ("none", "heavy"),
+        "beside": BESIDE,
     }
     representations: ClassVar = ("body", "floor", "beside")
 
@@ -61,19 +100,9 @@ class PyBullet(Engine):
             raise DropspinError(f"engine {self.label!r}: only multibodies clamp speeds; add coordinates=multibody.")
 
     @property
-    def is_default(self) -> bool:
-        """Whether Bullet keeps its defaults."""
-        return self.option("profile") == "default"
-
-    @property
     def is_multibody(self) -> bool:
         """Whether the body is Bullet's btMultiBody, its default, rather than a btRigidBody."""
         return self.is_default or self.option("coordinates") == "multibody"
-
-    @property
-    def is_unclamped(self) -> bool:
-        """Whether the clamp of a multibody's speeds is removed."""
-        return self.is_multibody and not self.is_default and self.option("velocity_clamp") == "lifted"
 
     def discretisation(self, scene: Scenario) -> str | None:
         """Maximal coordinates solve the gyroscopic term implicitly, with one Newton step; multibodies do not, and have other contacts."""
@@ -92,27 +121,61 @@ class PyBullet(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         """Why calibration cannot reproduce the scene."""
-        inertia = scene.body.inertia_tensor
+        floor, damping, is_hull = scene.floor, scene.damping, self.option("body") == "hull"
         if (askew := refusal_of_axes(scene, "passes inertia")) is not None:
             return askew
-        floor = scene.floor
-        if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(inertia)) < SMALLEST_INERTIA:
+        if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(scene.body.inertia_tensor)) < SMALLEST_INERTIA:
             return f"Bullet omits the gyroscopic term if the product of the moments is below {SMALLEST_INERTIA:g}; scale the scene's units"
-        if scene.damping is not None and not self.is_default and max(scene.damping.linear, scene.damping.angular) > FASTEST_DECAY:
+        if damping is not None and not self.is_default and max(damping.linear, damping.angular) > FASTEST_DECAY:
             return f"the adapter sets no decay faster than {FASTEST_DECAY:g} per second; Bullet's coefficient, 1 - exp(-rate), loses digits"
-        if scene.damping is not None and self.is_multibody and not self.is_default:
+        if damping is not None and self.is_multibody and not self.is_default:
             return "Bullet's multibodies damp by another law, k v (1 + |v|)"
-        is_hull = self.option("body") == "hull"
         unfit = refusal_of_hull(scene, "hull") if is_hull else None
         if unfit is not None or floor is None:
             return unfit
         if isinstance(scene.body, Vertices) and not is_hull and len(scene.body.hull) > MOST_BALLS:
             return f"the adapter builds compound shapes of at most {MOST_BALLS} parts; the convex hull has {len(scene.body.hull)} vertices"
-        if (too_small := refusal_of_floor(scene, self._form.floor_in(scene))) is not None:
-            return too_small
-        if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
+        unfit = refusal_of_floor(scene, self._floor_in(scene))
+        if unfit is None and not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
             return f"Bullet caps friction at {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
-        return None
+        return unfit
+
+    def _floor_in(self, scene: Scenario) -> str:
+        """The floor of a scene: `plane`, `box` or `mesh`; `fitting` is with calibrated settings a box for boxes, else a plane."""
+        if self.option("floor") == "fitting":
+            return "plane" if self.is_default or not isinstance(scene.body, Box) else "box"
+        return self.option("floor")
+
+    def _parameters(self, scene: Scenario, dt: float) -> dict[str, float]:
+        """The parameters of the physics engine at a time step [s]."""
+        if self.is_default:
+            return {"fixedTimeStep": dt}
+        return {name: value for name, (value, _) in WORLD.items()} | {
+            "fixedTimeStep": dt,
+            "solverResidualThreshold": (RESIDUAL * float(np.linalg.norm(scene.acceleration)) * dt) ** 2,
+            "restitutionVelocityThreshold": 0.0 if scene.floor is None else scene.floor.rest_speed,
+        }
+
+    def _dynamics(self, scene: Scenario) -> dict[str, float]:
+        """The properties of the body: contact, damping, sleep and clamp.
+
+        Maximal coordinates damp as v (1 - k)^t, so that k = 1 - exp(-rate) is the scene's decay. In the default profile a scene without
+        damping keeps Bullet's default of 0.04.
+        """
+        found: dict[str, float] = {}
+        if scene.floor is not None:
+            found |= {"restitution": scene.floor.restitution, "lateralFriction": friction_of(scene.floor, STRONGEST_FRICTION)}
+            found |= {} if self.is_default else {"contactProcessingThreshold": 0.0}
+        for motion in ("linear", "angular"):
+            if scene.damping is not None:
+                rate = getattr(scene.damping, motion)
+                found[f"{motion}Damping"] = rate if self.is_default else float(-np.expm1(-rate))
+            elif not self.is_default:
+                found[f"{motion}Damping"] = 0.0
+        if not self.is_default:
+            found["activationState"] = NEVER_SLEEPS
+            found |= {"maxJointVelocity": FASTEST} if self.is_multibody and self.option("velocity_clamp") == "lifted" else {}
+        return found
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python, and the body's part of them as URDF."""
@@ -120,19 +183,15 @@ class PyBullet(Engine):
             return {}
         moments = np.diag(scene.body.inertia_tensor)[[2, 0, 1]].tolist()
         sizes = [2.0 * scene.body.half_extents[axis] for axis in (2, 0, 1)] if isinstance(scene.body, Box) else []
-        surface = {**contact_properties(scene, default=False), **damping_properties(scene, default=False)}
-        surface |= {"maxJointVelocity": FASTEST} if self.is_unclamped else {}
-        parameters = {name: value for name, value in world_parameters(scene, dt).items() if name != "fixedTimeStep"}
+        surface = {name: value for name, value in self._dynamics(scene).items() if name != "activationState"}
+        parameters = {name: value for name, value in self._parameters(scene, dt).items() if name != "fixedTimeStep"}
         values = {"engine": "PyBullet", "dt": dt, "maximal": not self.is_multibody, "surface": surface}
         return {
             "python": rendered("pybullet.py.jinja", scene, why=REASONS, parameters=parameters, floor_half_size=FLOOR_HALF_SIZE, **values),
             "urdf": rendered("pybullet.urdf.jinja", scene, moments=moments, sizes=sizes, **values),
         }
 
-    @property
-    def _form(self) -> Form:
-        represented = {name: self.option(name) for name in self.representations}
-        return Form(self.is_default, self.is_multibody, self.is_unclamped, **represented)
-
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
-        return PyBulletSimulation(scene, dt, self._form)
+        coordinates = "multibody" if self.is_multibody else "maximal"
+        form = {"profile": self.option("profile"), "coordinates": coordinates} | {name: self.option(name) for name in self.representations}
+        return PyBulletSimulation(scene, dt, form, self._floor_in(scene), self._parameters(scene, dt), self._dynamics(scene))

@@ -2,171 +2,117 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from itertools import product
+from itertools import chain
 from struct import pack
 from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import FLOOR_HALF_SIZE, Array, AsBuilt, KnownLimitation, Simulation, version
-from dropspin.comparisons.engines.pybullet_settings import (
-    FASTEST,
-    STRONGEST_FRICTION,
-    contact_properties,
-    damping_properties,
-    world_parameters,
-)
+from dropspin.comparisons.engines.base import Array, AsBuilt, KnownLimitation, Simulation
+from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, SQUARE, TRIANGLES, bodies_in
+from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.bodies import Box, Sphere, Vertices
+from dropspin.scenarios.bodies import Body, Box, Sphere
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
 from dropspin.scenarios.state import SPIN, VELOCITY
-from dropspin.scenarios.variations import heavy_neighbour
 
 ALMOST = 0.999
 NO_PUSH = 1e-6  # relative to what gravity adds in a step
 BALL = 1e-9  # of the body's size; the radius of the balls that are its vertices, which must not be 0
 MOST_BALLS = 16  # createCollisionShapeArray drops all others without notice
-SQUARE = {
-    "vertices": [[x, 0.0, z] for x, z in product((-FLOOR_HALF_SIZE, FLOOR_HALF_SIZE), repeat=2)],
-    "indices": [0, 1, 2, 2, 1, 3],
-}
-"""The floor as a mesh: two triangles, with upward normals."""
+STRONGEST_FRICTION = 10.0  # Bullet clamps the coefficient of a contact to this
+CONTACT = ("restitution", "lateralFriction", "contactProcessingThreshold")
+"""The properties of a body that are of its contacts."""
 CHUNK = 512  # states that are read before they are stored as numbers of an array
 MOST_USES = 50
 """Simulations after which a connection is reset, which takes as long as 500 steps; until then the shapes of removed bodies take memory."""
 LARGEST_TURN = np.pi / 4  # rad a step; beyond it Bullet's rotation is too small
 
 
-@dataclass(frozen=True)
-class Form:
-    """How a scene is built.
-
-    Attributes:
-        default: Whether Bullet keeps its defaults.
-        multibody: Whether the body is a btMultiBody rather than a btRigidBody.
-        unclamped: Whether the clamp of a multibody's speeds is removed.
-        body: `shape`, or `hull`, a body with corners as their convex hull.
-        floor: `plane`, `box`, `mesh` (two triangles), or `fitting`: with calibrated settings a box for boxes, else a plane.
-        beside: `none`, or `heavy`, a second body far away.
-    """
-
-    default: bool
-    multibody: bool
-    unclamped: bool
-    body: str = "shape"
-    floor: str = "fitting"
-    beside: str = "none"
-
-    def floor_in(self, scene: Scenario) -> str:
-        """The floor of a scene: `plane`, `box` or `mesh`."""
-        if self.floor == "fitting":
-            return "plane" if self.default or not isinstance(scene.body, Box) else "box"
-        return self.floor
-
-
 class PyBulletSimulation(Simulation):
     """A connection to the physics server in this process, which no other simulation uses until it is closed."""
 
-    def __init__(self, scene: Scenario, dt: float, form: Form) -> None:
+    def __init__(
+        self, scene: Scenario, dt: float, form: Mapping[str, str], floor: str, parameters: dict[str, float], dynamics: dict[str, float]
+    ) -> None:
+        """Build a scene.
+
+        Args:
+            scene: The scene.
+            dt: Time step [s].
+            form: The profile (`calibrated` or `default`), the coordinates (`maximal` or `multibody`), and how body and floor are built.
+            floor: `plane`, `box`, or `mesh` (two triangles).
+            parameters: Of the physics engine.
+            dynamics: Properties of the body.
+        """
         self._bullet = _import_quietly()
         self._dt, self._fall, self.velocity_lag = dt, dt * scene.acceleration, 0.5 * dt
         self._grips = scene.floor is not None and scene.floor.friction == "infinite"
-        self._turning_slip_of = scene if scene.floor is not None and 0.0 < scene.floor.coefficient < np.inf and not form.multibody else None
-        self._idle = _idle.setdefault(form.default, [])
+        self._is_maximal, slips = form["coordinates"] == "maximal", scene.floor is not None and 0.0 < scene.floor.coefficient < np.inf
+        self._turning_slip_of = scene if slips and self._is_maximal else None
+        self._idle = _idle.setdefault(form["profile"], [])
         self._client, self._uses = self._idle.pop() if self._idle else (int(self._bullet.connect(self._bullet.DIRECT)), 0)
         if self._client < 0:
             raise RuntimeError("PyBullet returned no connection")
+        self.settings = {"version": version("pybullet"), **form, **parameters, **dynamics}
         try:
-            self._build(scene, dt, form)
+            self._bullet.setPhysicsEngineParameter(physicsClientId=self._client, **parameters)
+            self._bullet.setGravity(*map(float, scene.acceleration), physicsClientId=self._client)
+            if scene.floor is not None:
+                self._add_floor(floor, dynamics)
+            self._body, *_ = [self._add_body(one, form["body"], dynamics) for one in bodies_in(scene, form["beside"])]
         except BaseException:
             self._reset()
             raise
 
-    def _build(self, scene: Scenario, dt: float, form: Form) -> None:
-        bullet, client, default = self._bullet, self._client, form.default
-        parameters = {"fixedTimeStep": dt} if default else world_parameters(scene, dt)
-        bullet.setPhysicsEngineParameter(physicsClientId=client, **parameters)
-        bullet.setGravity(*map(float, scene.acceleration), physicsClientId=client)
-        contact = {} if scene.floor is None else contact_properties(scene, default)
-        if scene.floor is not None:
-            self._add_floor(scene, contact, form)
-        self._body, dynamics = self._add_body(scene, contact, form)
-        if form.beside == "heavy":
-            self._add_body(heavy_neighbour(scene), contact, form)
-        self.settings = {
-            "version": version("pybullet"),
-            "profile": "default" if default else "calibrated",
-            "coordinates": "multibody" if form.multibody else "maximal",
-            "body": form.body,
-            "floor": form.floor,
-            "beside": form.beside,
-            **parameters,
-            **dynamics,
-        }
-
-    def _add_body(self, scene: Scenario, contact: dict[str, float], form: Form) -> tuple[int, dict[str, float]]:
-        """Add a scene's body, and return its number and its dynamics."""
-        bullet, client = self._bullet, self._client
-        body = bullet.createMultiBody(
-            baseMass=scene.body.mass,
-            baseCollisionShapeIndex=-1 if scene.floor is None else self._shape(scene, form),
-            basePosition=scene.start.position,
-            baseOrientation=scene.start.orientation,
-            useMaximalCoordinates=not form.multibody,
-            physicsClientId=client,
+    def _add(self, mass: float, shape: int, position: Sequence[float], **given: Any) -> int:
+        """Add a body, and return its number."""
+        maximal, client = self._is_maximal, self._client
+        added = self._bullet.createMultiBody(
+            mass, shape, basePosition=position, useMaximalCoordinates=maximal, physicsClientId=client, **given
         )
-        dynamics = contact | damping_properties(scene, form.default)
-        if not form.default:
-            dynamics["activationState"] = bullet.ACTIVATION_STATE_DISABLE_SLEEPING
-        if form.unclamped:
-            dynamics["maxJointVelocity"] = FASTEST
-        bullet.changeDynamics(
-            body,
-            -1,
-            mass=scene.body.mass,
-            localInertiaDiagonal=[float(moment) for moment in np.diag(scene.body.inertia_tensor)],
-            physicsClientId=client,
-            **dynamics,
-        )
-        bullet.resetBaseVelocity(body, scene.start.velocity, scene.start.angular_velocity, physicsClientId=client)
-        return body, dynamics
+        return int(added)
 
-    def _shape(self, scene: Scenario, form: Form) -> int:
-        bullet, client = self._bullet, self._client
-        if form.body == "hull":
-            corners = scene.body.hull.tolist()
-            return int(bullet.createCollisionShape(bullet.GEOM_MESH, vertices=corners, physicsClientId=client))
-        if isinstance(scene.body, Vertices):
-            # Bullet gives a convex hull one contact point per step: a prism that rolls leaves its course by 0.07 m in 1.7 m, at 1 ms.
-            balls = [bullet.GEOM_SPHERE] * len(scene.body.hull)
-            radii, places = [BALL * scene.body.size] * len(balls), scene.body.hull.tolist()
-            return int(bullet.createCollisionShapeArray(balls, radii=radii, collisionFramePositions=places, physicsClientId=client))
-        if isinstance(scene.body, Sphere):
-            return int(bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=scene.body.radius, physicsClientId=client))
-        assert isinstance(scene.body, Box)
-        return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=scene.body.half_extents, physicsClientId=client))
+    def _shape(self, kind: int, **given: Any) -> int:
+        return int(self._bullet.createCollisionShape(kind, physicsClientId=self._client, **given))
 
-    def _add_floor(self, scene: Scenario, contact: dict[str, float], form: Form) -> None:
-        bullet, client, kind = self._bullet, self._client, form.floor_in(scene)
+    def _add_body(self, scene: Scenario, kind: str, dynamics: Mapping[str, float]) -> int:
+        body, start, client = scene.body, scene.start, self._client
+        shape = -1 if scene.floor is None else self._shape_of(body, kind)
+        added = self._add(body.mass, shape, start.position, baseOrientation=start.orientation)
+        moments = np.diag(body.inertia_tensor).tolist()
+        self._bullet.changeDynamics(added, -1, mass=body.mass, localInertiaDiagonal=moments, physicsClientId=client, **dynamics)
+        self._bullet.resetBaseVelocity(added, start.velocity, start.angular_velocity, physicsClientId=client)
+        return added
+
+    def _shape_of(self, body: Body, kind: str) -> int:
+        bullet, corners = self._bullet, body.hull.tolist()
+        if kind == "hull":
+            return self._shape(bullet.GEOM_MESH, vertices=corners)
+        if isinstance(body, Sphere):
+            return self._shape(bullet.GEOM_SPHERE, radius=body.radius)
+        if isinstance(body, Box):
+            return self._shape(bullet.GEOM_BOX, halfExtents=body.half_extents)
+        # Bullet gives a convex hull one contact point per step: a prism that rolls leaves its course by 0.07 m in 1.7 m, at 1 ms.
+        balls, radii = [bullet.GEOM_SPHERE] * len(corners), [BALL * body.size] * len(corners)
+        return int(bullet.createCollisionShapeArray(balls, radii=radii, collisionFramePositions=corners, physicsClientId=self._client))
+
+    def _add_floor(self, kind: str, dynamics: Mapping[str, float]) -> None:
+        bullet, top = self._bullet, 0.0
         if kind == "plane":
-            shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0], physicsClientId=client)
-            top = 0.0
+            shape = self._shape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0])
         elif kind == "mesh":
-            shape = bullet.createCollisionShape(bullet.GEOM_MESH, physicsClientId=client, flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH, **SQUARE)
-            top = 0.0
+            flags, indices = bullet.GEOM_FORCE_CONCAVE_TRIMESH, list(chain(*TRIANGLES))
+            shape = self._shape(bullet.GEOM_MESH, flags=flags, vertices=SQUARE, indices=indices)
         else:  # on a plane, Bullet gives a box one contact point per step
-            shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3, physicsClientId=client)
-            top = FLOOR_HALF_SIZE
-        floor = bullet.createMultiBody(
-            0, shape, basePosition=[0, -top, 0], useMaximalCoordinates=not form.multibody, physicsClientId=client
-        )
+            shape, top = self._shape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3), FLOOR_HALF_SIZE
         # Bullet multiplies the coefficients of the two bodies; with 1 for the floor, the product is the scene's value.
-        bullet.changeDynamics(floor, -1, **contact | {"restitution": 1.0, "lateralFriction": 1.0}, physicsClientId=client)
+        contact = {name: dynamics[name] for name in CONTACT if name in dynamics} | {"restitution": 1.0, "lateralFriction": 1.0}
+        bullet.changeDynamics(self._add(0.0, shape, [0, -top, 0]), -1, physicsClientId=self._client, **contact)
 
     def advance(self, steps: int) -> None:
         step, client = self._bullet.stepSimulation, self._client
@@ -221,8 +167,8 @@ class PyBulletSimulation(Simulation):
         self._idle.append((self._client, 0))
 
 
-_idle: dict[bool, list[tuple[int, int]]] = {}
-"""Unused connections, by profile (True: default), and how often each was used since it was reset; they give the bits that new ones give."""
+_idle: dict[str, list[tuple[int, int]]] = {}
+"""Unused connections, by profile, and how often each was used since it was reset; they give the bits that new ones give."""
 
 
 def _limitations_met(rows: Array, dt: float, fall: Array | None) -> Iterator[KnownLimitation]:

@@ -7,22 +7,19 @@ So a single contact rebounds exactly, several at once undo one another, and fric
 import os
 from collections.abc import Mapping
 from functools import cache
-from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
 import rapier3d
-from scipy.spatial.transform import Rotation
 
-from dropspin.comparisons.engines import base
-from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation, version
+from dropspin.comparisons.engines import mapping
+from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
 from dropspin.comparisons.measuring.predictions import spins_steadily
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
-from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.state import PARTS
-from dropspin.scenarios.variations import heavy_neighbour
 
 LARGEST = float(np.finfo(np.float32).max)
 FIRST_PROCESS = cache(os.getpid)  # the first one that simulates; it starts Rapier's threads, which all worlds share
@@ -50,7 +47,7 @@ class Rapier(Engine):
 
     name, order, precision, reasons = "rapier", 1.0, np.float32, REASONS
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": ("none", "heavy")}
+    choices: ClassVar = {"floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
 
     def declines(self, scene: Scenario) -> str | None:
@@ -72,22 +69,19 @@ class RapierSimulation(Simulation):
         parameters |= {"dt": dt, "normalized_prediction_distance": float(np.linalg.norm(scene.acceleration)) * dt**2}
         for name, value in parameters.items():
             setattr(self._world.integration_parameters, name, rapier3d.SpringCoefficients(*value) if isinstance(value, tuple) else value)
-        gyroscopic = base.may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
+        gyroscopic = mapping.may_tumble(scene) and (scene.floor is not None or not spins_steadily(scene))
         dynamics: dict[str, Any] = {"can_sleep": False, "allow_fast_rotation": True, "gyroscopic_forces": gyroscopic}
         dynamics |= {f"{motion}_damping": rate for motion, rate in damping_of(scene, dt).items()}
         surface = surface_of(scene)
-        self._body = self._add_body(scene, dynamics, surface)
+        self._body, *_ = [self._add_body(one, dynamics, surface) for one in mapping.bodies_in(scene, beside)]
         if surface:
             self._world.add_collider(_floor(floor, surface))
-        if beside == "heavy":
-            self._add_body(heavy_neighbour(scene), dynamics, surface)
         self.settings = {"version": version("rapier3d"), "floor": floor, "beside": beside, **parameters, **dynamics, **surface}
 
     def _add_body(self, scene: Scenario, dynamics: Mapping[str, Any], surface: Mapping[str, Any]) -> Any:
         """Add a scene's body with its collider, if the scene has a floor."""
         body, world = scene.body, self._world
-        moments, axes = principal_axes(body.inertia_tensor)
-        inertia = rapier3d.MassProperties(np.zeros(3), body.mass, moments, Rotation.from_matrix(axes).as_quat())
+        inertia = rapier3d.MassProperties(np.zeros(3), body.mass, *mapping.principal_frame(body.inertia_tensor))
         x, q, v, w = (scene.initial_state[part] for part in PARTS.values())
         moving = rapier3d.RigidBody.dynamic(**dynamics).position((x, q)).linvel(v).angvel(w).additional_mass_properties(inertia)
         handle = world.add_body(moving)
@@ -109,16 +103,15 @@ class RapierSimulation(Simulation):
         return np.array([x.x, x.y, x.z, q.i, q.j, q.k, q.w, v.x, v.y, v.z, w.x, w.y, w.z])
 
     def as_built(self) -> AsBuilt:
-        built = self._body.mass_properties
-        axes = Rotation.from_quat(built.principal_inertia_local_frame.to_tuple()).as_matrix()
-        return AsBuilt(built.mass, axes @ np.diag(built.principal_inertia.to_tuple()) @ axes.T, np.array(self._world.gravity.to_tuple()))
+        found = self._body.mass_properties
+        inertia = found.principal_inertia.to_tuple(), found.principal_inertia_local_frame.to_tuple()
+        return mapping.built(found.mass, *inertia, self._world.gravity.to_tuple())
 
 
 def _floor(kind: str, surface: Mapping[str, Any]) -> Any:
     """The collider of the floor."""
     if kind == "box":
-        return rapier3d.Collider.cuboid(base.FLOOR_HALF_SIZE, 1.0, base.FLOOR_HALF_SIZE, **surface).translation((0.0, -1.0, 0.0))
+        return rapier3d.Collider.cuboid(mapping.FLOOR_HALF_SIZE, 1.0, mapping.FLOOR_HALF_SIZE, **surface).translation((0.0, -1.0, 0.0))
     if kind == "mesh":
-        corners = [(x, 0.0, z) for x, z in product((-base.FLOOR_HALF_SIZE, base.FLOOR_HALF_SIZE), repeat=2)]
-        return rapier3d.Collider.trimesh(corners, [(0, 1, 2), (2, 1, 3)], **surface)
+        return rapier3d.Collider.trimesh(mapping.SQUARE, mapping.TRIANGLES, **surface)
     return rapier3d.Collider.halfspace((0.0, 1.0, 0.0), **surface)

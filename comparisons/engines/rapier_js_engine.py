@@ -9,17 +9,14 @@ from itertools import count
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import Array, AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.rapier_js_node import node
 from dropspin.comparisons.engines.rapier_scenes import WHY_DAMPING, WHY_FRICTION, damping_of, refusal, surface_of
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Sphere
-from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.state import PARTS
-from dropspin.scenarios.variations import heavy_neighbour
 
 NUMBERS = count()
 """Of the worlds in Node.js."""
@@ -43,7 +40,7 @@ class RapierJS(Engine):
 
     name, order, precision, reasons = "rapier-js", 1.0, np.float32, REASONS
     shapes: ClassVar = ("sphere", "box")
-    choices: ClassVar = {"profile": base.PROFILES, "floor": ("plane", "box", "mesh"), "beside": ("none", "heavy")}
+    choices: ClassVar = {"profile": mapping.PROFILES, "floor": ("plane", "box", "mesh"), "beside": mapping.BESIDE}
     representations: ClassVar = ("floor", "beside")
 
     def declines(self, scene: Scenario) -> str | None:
@@ -65,12 +62,12 @@ class RapierJSSimulation(Simulation):
             fall = float(np.linalg.norm(scene.acceleration)) * dt**2
             parameters |= {"normalizedPredictionDistance": fall / LENGTH, "predictionDistance": fall}  # the latter up to 0.12.0
             decay = damping_of(scene, dt)
-        scenes = [scene, heavy_neighbour(scene)] if options["beside"] == "heavy" else [scene]
-        ground = {"kind": options["floor"], "halfSize": base.FLOOR_HALF_SIZE, **surface_of(scene)} if scene.floor else {}
+        ground = {"kind": options["floor"], "halfSize": mapping.FLOOR_HALF_SIZE, **surface_of(scene)} if scene.floor else {}
         made = {f"{motion}Damping": rate for motion, rate in decay.items()} | {"canSleep": not calibrated}
         self._node, self._world = node(), next(NUMBERS)
+        bodies = [_body(one) for one in mapping.bodies_in(scene, options["beside"])]
         given = {"gravity": scene.acceleration.tolist(), "parameters": parameters, "ground": ground, "made": made}
-        answer, _ = self._node.ask("open", world=self._world, bodies=[_body(one) for one in scenes], **given)
+        answer, _ = self._node.ask("open", world=self._world, bodies=bodies, **given)
         self._built, self.velocity_lag = answer.get("built"), 0.5 * dt / answer["substeps"]
         self._state = self._ask(0)[0]
         self.settings = {"version": self._node.version, **options, **answer["parameters"], **made, **surface_of(scene)}
@@ -93,10 +90,7 @@ class RapierJSSimulation(Simulation):
         return self._state
 
     def as_built(self) -> AsBuilt | None:
-        if self._built is None:
-            return None
-        axes = Rotation.from_quat(self._built["axes"]).as_matrix()
-        return AsBuilt(self._built["mass"], axes @ np.diag(self._built["moments"]) @ axes.T, np.array(self._built["gravity"]))
+        return None if self._built is None else mapping.built(**self._built)
 
     def close(self) -> None:
         if not self._node.has_ended:
@@ -106,7 +100,7 @@ class RapierJSSimulation(Simulation):
 def _body(scene: Scenario) -> dict[str, Any]:
     """A scene's body, as the driver takes it."""
     body = scene.body
-    moments, axes = principal_axes(body.inertia_tensor)
+    moments, axes = mapping.principal_frame(body.inertia_tensor)
     shape = {"radius": body.size} if isinstance(body, Sphere) else {"halfExtents": body.vertices.max(0).tolist()}
-    inertia = {"mass": body.mass, "moments": moments.tolist(), "axes": Rotation.from_matrix(axes).as_quat().tolist()}
+    inertia = {"mass": body.mass, "moments": moments.tolist(), "axes": axes.tolist()}
     return shape | inertia | {name: scene.initial_state[part].tolist() for name, part in PARTS.items()}

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array
-from dropspin.comparisons.engines.npm_packages import npm_package
+from dropspin.comparisons.engines.packages import RAPIER_JS, npm_package
 
-PACKAGE = "@dimforge/rapier3d-compat"
 DRIVER = Path(__file__).with_suffix(".cjs")
 
 
@@ -35,7 +34,7 @@ class Node:
             for limit in (resource.RLIMIT_AS, resource.RLIMIT_CPU):
                 _, most = resource.prlimit(self._process.pid, limit)
                 resource.prlimit(self._process.pid, limit, (most, most))
-        self.version = self.ask("load", home=str(npm_package(PACKAGE)))[0]["version"]
+        self.version = self.ask("load", home=str(npm_package(RAPIER_JS)))[0]["version"]
 
     @property
     def pid(self) -> int:

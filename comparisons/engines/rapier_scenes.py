@@ -2,25 +2,22 @@
 
 import numpy as np
 
-from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines import mapping
 from dropspin.scenarios import Scenario, truth_for
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION
 
-FRICTION = {"none": 0.0, "infinite": 1e6}
-WHY_FRICTION = f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution: Rapier takes the average by default"
+GRIPPING = 1e6
+WHY_FRICTION = f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution: Rapier takes the average by default"
 WHY_DAMPING = "(exp(rate dt) - 1)/dt: Rapier divides by 1 + c dt, which gives the scene's decay"
 
 
 def refusal(scene: Scenario, kind: str) -> str | None:
     """Why Rapier cannot reproduce a scene on a floor of a kind, `plane`, `box` or `mesh`; None if it can."""
     body, floor = scene.body, scene.floor
-    if (unfit := base.refusal_of_floor(scene, kind)) is not None or floor is None:
+    unfit = mapping.refusal_of_floor(scene, kind) or mapping.refusal_of_rest_speed(scene, "Rapier")
+    if unfit is not None or floor is None or floor.restitution == 0.0:
         return unfit
-    if (unfit := base.refusal_of_rest_speed(scene, "Rapier")) is not None:
-        return unfit
-    if floor.restitution == 0.0:
-        return None
     if floor.friction != "none" and not (body.is_ball and floor.friction == "infinite"):
         return "Rapier's friction does not respond to the rebound; a rough floor needs restitution 0, or a ball that it grips"
     truth = truth_for(scene)
@@ -38,7 +35,5 @@ def damping_of(scene: Scenario, dt: float) -> dict[str, float]:
 
 def surface_of(scene: Scenario) -> dict[str, float]:
     """Restitution and coefficient of friction of body and floor; empty without a floor."""
-    if scene.floor is None:
-        return {}
-    friction = scene.floor.friction
-    return {"restitution": scene.floor.restitution, "friction": FRICTION[friction] if isinstance(friction, str) else friction}
+    floor = scene.floor
+    return {"restitution": floor.restitution, "friction": mapping.friction_of(floor, GRIPPING)} if floor else {}

@@ -7,12 +7,13 @@ from contextlib import redirect_stdout, suppress
 from importlib import import_module
 from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points
 from importlib.util import find_spec
+from operator import attrgetter
 from shutil import which
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from dropspin.comparisons.engines.exceptions import described
-from dropspin.comparisons.engines.npm_packages import is_npm, npm_package
+from dropspin.comparisons.engines.packages import RAPIER_JS, is_npm, npm_package
 from dropspin.scenarios.errors import DropspinError, UnknownName
 from dropspin.scenarios.model import EARLIER_NAMES
 from dropspin.scenarios.validation import shown
@@ -29,36 +30,26 @@ class _Home(NamedTuple):
 
 GROUP = "dropspin.engines"
 """The entry-point group in which other packages register engines: name = "module:Class"."""
-
-BUILT_IN = {
-    "wang": _Home("dropspin.comparisons.engines.wang", "Wang"),
-    "mujoco": _Home("dropspin.comparisons.engines.mujoco_engine", "MuJoCo", "mujoco", "pip install mujoco"),
-    "pybullet": _Home(
-        "dropspin.comparisons.engines.pybullet_engine",
-        "PyBullet",
-        "pybullet",
-        "pip install pybullet (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)",
-    ),
-    "rapier": _Home("dropspin.comparisons.engines.rapier_engine", "Rapier", "rapier3d", "pip install 'dropspin[rapier]'"),
-    "rapier-js": _Home(
-        "dropspin.comparisons.engines.rapier_js_engine",
-        "RapierJS",
-        "@dimforge/rapier3d-compat",
-        "npm install @dimforge/rapier3d-compat, in the working folder or a folder above it",
-    ),
-    "dart": _Home("dropspin.comparisons.engines.dart_engine", "Dart", "dartpy", "pip install 'dropspin[dart]'"),
-    "drake": _Home("dropspin.comparisons.engines.drake_engine", "Drake", "pydrake", "pip install 'dropspin[drake]'"),
-    "sapien": _Home("dropspin.comparisons.engines.sapien_engine", "Sapien", "sapien", "pip install 'dropspin[sapien]'"),
-    "exudyn": _Home("dropspin.comparisons.engines.exudyn_engine", "Exudyn", "exudyn", "pip install 'dropspin[exudyn]'"),
-    "jsbsim": _Home("dropspin.comparisons.engines.jsbsim_engine", "JSBSim", "jsbsim", "pip install 'dropspin[jsbsim]'"),
-    "mjx": _Home("dropspin.comparisons.engines.mjx_engine", "MJX", "jax", "pip install 'dropspin[mjx]'"),
-    "mujoco-warp": _Home(
-        "dropspin.comparisons.engines.mujoco_warp_engine", "MuJoCoWarp", "mujoco_warp", "pip install 'dropspin[mujoco-warp]'"
-    ),
-    "newton": _Home("dropspin.comparisons.engines.newton_engine", "Newton", "newton", "pip install 'dropspin[newton]'"),
-    "genesis": _Home("dropspin.comparisons.engines.genesis_engine", "Genesis", "genesis", "pip install 'dropspin[genesis]'"),
+FOLDER = "dropspin.comparisons.engines"
+WHEELS = "(it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere it needs a compiler)"
+BUILT_IN = {"wang": _Home(f"{FOLDER}.wang", "Wang")} | {
+    name: _Home(f"{FOLDER}.{name.replace('-', '_')}_engine", adapter, package, *how_to_install or [f"pip install 'dropspin[{name}]'"])
+    for name, adapter, package, *how_to_install in (
+        ("mujoco", "MuJoCo", "mujoco", "pip install mujoco"),
+        ("pybullet", "PyBullet", "pybullet", f"pip install pybullet {WHEELS}"),
+        ("rapier", "Rapier", "rapier3d"),
+        ("rapier-js", "RapierJS", RAPIER_JS, f"npm install {RAPIER_JS}, in the working folder or a folder above it"),
+        ("dart", "Dart", "dartpy"),
+        ("drake", "Drake", "pydrake"),
+        ("sapien", "Sapien", "sapien"),
+        ("exudyn", "Exudyn", "exudyn"),
+        ("jsbsim", "JSBSim", "jsbsim"),
+        ("mjx", "MJX", "jax"),
+        ("mujoco-warp", "MuJoCoWarp", "mujoco_warp"),
+        ("newton", "Newton", "newton"),
+        ("genesis", "Genesis", "genesis"),
+    )
 }
-
 CURES = {
     r"libGL\.so|libEGL\.so|libOSMesa": "install the system's OpenGL libraries (Debian, Ubuntu: apt-get install libgl1 libegl1)",
     r"libstdc\+\+.*GLIBCXX|GLIBC_\d": "its wheel needs a newer system; install a release that was built for this one",
@@ -95,8 +86,7 @@ def engine(name: str) -> Engine:
         EngineBroken: It cannot be imported or constructed.
         DropspinError: It is not an engine.
     """
-    base, options = parsed(name)
-    return constructed(base, options)
+    return constructed(*parsed(name))
 
 
 def parsed(name: str) -> tuple[str, dict[str, str]]:
@@ -133,12 +123,11 @@ def _adapter(base: str) -> type[Engine]:
         if home.package and (absence := _absence(home)):
             raise EngineMissing(f"{base} is not installed: {absence}.")
         try:
-            adapter: type[Engine] = getattr(import_module(home.module), home.adapter)
+            return getattr(import_module(home.module), home.adapter)
         except (Exception, SystemExit) as error:
             text = described(error)
             cure = next((f"; {cure}" for pattern, cure in CURES.items() if re.search(pattern, text)), "")
             raise EngineBroken(f"{base} is installed, but {home.package} cannot be imported: {text}{cure}.") from error
-        return adapter
     if ":" in base:
         module, _, attribute = base.partition(":")
         return _imported(base, module, attribute)
@@ -180,14 +169,13 @@ def _imported(name: str, module_name: str, attribute: str) -> type[Engine]:
         raise EngineMissing(f"{name} needs the module {error.name}, which is not installed.") from None
     except (Exception, SystemExit) as error:
         raise EngineBroken(f"{name} cannot be used: its module {module_name} cannot be imported: {described(error)}.") from error
-    found: object = module
-    for part in attribute.split("."):
-        if not hasattr(found, part):
-            raise UnknownName(f"{module_name}'s engine", attribute, [key for key, value in vars(module).items() if _is_engine(value)])
-        found = getattr(found, part)
-    if not _is_engine(found):
+    try:
+        adapter = attrgetter(attribute)(module)
+    except AttributeError:
+        known = [key for key, value in vars(module).items() if _is_engine(value)]
+        raise UnknownName(f"{module_name}'s engine", attribute, known) from None
+    if not _is_engine(adapter):
         raise DropspinError(f"engine {name!r}: {attribute} is not an engine; an engine is a class that inherits from dropspin.Engine.")
-    adapter = cast(type[Engine], found)
     given = getattr(adapter, "name", "")
     if not isinstance(given, str) or not re.fullmatch(r"[A-Za-z][\w-]*", given, re.ASCII):
         raise DropspinError(

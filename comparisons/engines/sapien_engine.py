@@ -8,19 +8,11 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from dropspin.comparisons.engines.base import (
-    SEMI_IMPLICIT_EULER,
-    AsBuilt,
-    Diverged,
-    Engine,
-    Simulation,
-    may_tumble,
-    version,
-)
+from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
+from dropspin.comparisons.engines.mapping import SEMI_IMPLICIT_EULER, built, friction_of, may_tumble, principal_frame
+from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.bodies import Body, Sphere
-from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.state import Array
 
@@ -31,7 +23,7 @@ with warnings.catch_warnings():
 
 TOLERANCE_LENGTH = 1e-3  # m
 ENGINE = physx.PhysxEngine(TOLERANCE_LENGTH, 0.2)  # the one of this process, as long as this holds it
-FRICTION = {"none": 0.0, "infinite": 1e6}
+GRIPPING = 1e6
 UPWARD = np.sqrt([0.5, 0.0, 0.0, 0.5])  # turns the plane's normal from x to y; w first, as in all poses here
 FASTEST = 1e16  # m/s and rad/s
 REASONS = {
@@ -43,7 +35,7 @@ REASONS = {
     "sleep_threshold": "never falls asleep; by default drop-box-corner, in metres per millisecond, stops in the air after one step",
     "max_angular_velocity": "rad/s; no clamp, by default at 100",
     "linear_damping": "(1 - exp(-rate dt))/dt: PhysX multiplies by 1 - c dt, which gives the scene's decay; angular_damping is the same",
-    "friction": f"{FRICTION['infinite']:g} where the floor grips; on both surfaces, as restitution: in SAPIEN, PhysX takes the average",
+    "friction": f"{GRIPPING:g} where the floor grips; on both surfaces, as restitution: in SAPIEN, PhysX takes the average",
 }
 """Effects were measured at 1 ms on the core catalogue and on a ball that slides with spin about its path, without the one setting."""
 
@@ -93,8 +85,8 @@ class SapienSimulation(Simulation):
         self._scene = sapien.Scene([self._system])
         offset = float(np.linalg.norm(scene.acceleration)) * dt**2 + 1e-6 * body.size
         surface = {} if floor is None else self._add_floor(floor, body, offset)
-        moments, axes = principal_axes(body.inertia_tensor)
-        frame = sapien.Pose(q=Rotation.from_matrix(axes).as_quat(scalar_first=True))
+        moments, axes = principal_frame(body.inertia_tensor)
+        frame = sapien.Pose(q=np.roll(axes, 1))
         assign(self._body, dynamics | {"mass": body.mass, "cmass_local_pose": frame, "inertia": moments})
         self._entity.add_component(self._body)
         self._entity.pose = sapien.Pose(scene.start.position, np.roll(scene.start.orientation, 1))
@@ -104,7 +96,7 @@ class SapienSimulation(Simulation):
         self.settings = versions | {"timestep": dt, "tolerance_length": TOLERANCE_LENGTH} | world | dynamics | surface
 
     def _add_floor(self, floor: Floor, body: Body, offset: float) -> dict[str, float]:
-        friction = FRICTION[floor.friction] if isinstance(floor.friction, str) else floor.friction
+        friction = friction_of(floor, GRIPPING)
         material = physx.PhysxMaterial(friction, friction, floor.restitution)
         ball, box = physx.PhysxCollisionShapeSphere, physx.PhysxCollisionShapeBox
         shape = ball(body.radius, material) if isinstance(body, Sphere) else box(body.vertices.max(0), material)
@@ -128,5 +120,5 @@ class SapienSimulation(Simulation):
         return np.concatenate([pose.p, np.roll(pose.q, -1), body.linear_velocity, body.angular_velocity], dtype=float)
 
     def as_built(self) -> AsBuilt:
-        axes = Rotation.from_quat(self._body.cmass_local_pose.q, scalar_first=True).as_matrix()
-        return AsBuilt(self._body.mass, axes @ np.diag(self._body.inertia) @ axes.T, np.array(self._system.config.gravity, dtype=float))
+        axes = np.roll(self._body.cmass_local_pose.q, -1)
+        return built(self._body.mass, self._body.inertia, axes, self._system.config.gravity)

@@ -9,12 +9,15 @@ from typing import Annotated, Any, ClassVar, NoReturn
 from pydantic import BaseModel, ConfigDict, Field
 
 from dropspin.comparisons.engines.adapter_code import adapter_code
-from dropspin.comparisons.engines.base import Engine, EngineBroken, NumericOption
+from dropspin.comparisons.engines.base import Engine, EngineBroken
+from dropspin.comparisons.engines.options import NumericOption
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.text import Text
 from dropspin.scenarios.validation import validated
 
 LONGEST_SUMMARY = 500
+STATED = ("name", "choices", "numbers", "accuracy", "compiles")
+"""Attributes of a class that a stand-in has too."""
 Short = Annotated[Text, Field(max_length=100)]
 
 
@@ -70,17 +73,9 @@ def traits(source: str, engine: Engine, loaded: frozenset[str]) -> Traits:
         EngineBroken: What it states of itself is not of the types that the protocol has.
     """
     kind = type(engine)
-    stated = {
-        "source": source,
-        "name": kind.name,
-        "summary": (kind.__doc__ or "").strip().partition("\n")[0][:LONGEST_SUMMARY],
-        "choices": _plain(kind.choices),
-        "numbers": _plain(kind.numbers),
-        "accuracy": _plain(kind.accuracy),
-        "options": _plain(engine.options),
-        "compiles": kind.compiles,
-        "code": adapter_code(kind, loaded),
-    }
+    summary = (kind.__doc__ or "").strip().partition("\n")[0][:LONGEST_SUMMARY]
+    stated = {"source": source, "summary": summary, "options": _plain(engine.options), "code": adapter_code(kind, loaded)}
+    stated |= {name: _plain(getattr(kind, name)) for name in STATED}
     try:
         found = validated(Traits, source, stated)
     except DropspinError as error:
@@ -105,8 +100,7 @@ def code_of(engine: Engine) -> str | None:
 
 def stand_in(known: Traits) -> StandIn:
     """The stand-in of an engine."""
-    stated = ("name", "choices", "numbers", "accuracy", "compiles")
-    members = {"traits": known} | {attribute: getattr(known, attribute) for attribute in stated}
+    members = {"traits": known} | {name: getattr(known, name) for name in STATED}
     kind: type[StandIn] = type("StandIn", (StandIn,), members)
     return kind(known.options)
 

@@ -7,7 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from dropspin import reference_impl
-from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation, may_tumble, version
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation
+from dropspin.comparisons.engines.mapping import may_tumble
+from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from dropspin.scenarios import DropspinError, Scenario, Truth
@@ -76,26 +78,20 @@ class WangSimulation(Simulation):
 
     def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt
-        self._body = reference_body(scene.body)
-        self._world = reference_world(scene)
+        self._body, self._world = reference_body(scene.body), reference_world(scene)
         self._simulator = reference_impl.Simulator(self._body, self._world, dt, methods)
-        self._state = scene.initial_state
-        self._steps = 0
+        self._state, self._steps = scene.initial_state, 0
         self.settings = {"version": version("dropspin"), "numba": version("numba"), **asdict(methods)}
 
     def advance(self, steps: int) -> None:
-        self._state = self._run(steps, max(steps, 1))[-1]
+        self.record(steps, max(steps, 1))
 
     def state(self) -> Array:
         return self._state.copy()
 
     def record(self, steps: int, every: int = 1) -> Array:
-        rows = self._run(steps, every)
-        self._state = rows[-1].copy()
-        return rows
-
-    def _run(self, steps: int, every: int) -> Array:
         rows = self._simulator.run(self._state, steps, every)
+        self._state = rows[-1].copy()
         self._steps += steps
         if self._simulator.unsolved_steps:
             self.known_limitations = [f"the contact was not solved in {self._simulator.unsolved_steps} of {self._steps} steps"]
@@ -111,16 +107,15 @@ class WangBatch(BatchSimulation):
 
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt
-        scene = members[0]
         if differ_in_start_alone(members):
-            body, world = reference_body(scene.body), reference_world(scene)
+            body, world = reference_body(members[0].body), reference_world(members[0])
         else:
-            body, world = _side_by_side(members)
+            body, world = reference_bodies([member.body for member in members]), _reference_worlds(members)
         self._simulator = reference_impl.Simulator(body, world, dt, methods)
         self._states = initial_states(members)
 
     def advance(self, steps: int) -> None:
-        self._states = self._simulator.run(self._states, steps, max(steps, 1))[:, -1]
+        self.record(steps, max(steps, 1))
 
     def states(self) -> Array:
         return self._states.copy()
@@ -129,18 +124,6 @@ class WangBatch(BatchSimulation):
         rows = self._simulator.run(self._states, steps, every)
         self._states = rows[:, -1].copy()
         return rows
-
-
-def _side_by_side(members: Sequence[Scenario]) -> tuple[reference_impl.Body, reference_impl.World]:
-    """The bodies and worlds of scenes of one structure, with a row for each scene."""
-    worlds = [reference_world(member) for member in members]
-    gravity, floor, damping = ([getattr(world, name) for world in worlds] for name in ("gravity", "floor", "damping"))
-    world = reference_impl.World(
-        gravity=None if gravity[0] is None else np.array(gravity),
-        floor=None if floor[0] is None else reference_impl.Floor(*np.transpose(floor)),
-        damping=None if damping[0] is None else (np.transpose(damping)[0], np.transpose(damping)[1]),
-    )
-    return reference_bodies([member.body for member in members]), world
 
 
 def reference_body(body: Body) -> reference_impl.Body:
@@ -176,4 +159,15 @@ def reference_world(scene: Scenario) -> reference_impl.World:
         gravity=None if scene.gravity is None else scene.acceleration,
         floor=None if floor is None else reference_impl.Floor(floor.restitution, floor.coefficient, floor.rest_speed),
         damping=None if scene.damping is None else (scene.damping.linear, scene.damping.angular),
+    )
+
+
+def _reference_worlds(scenes: Sequence[Scenario]) -> reference_impl.World:
+    """The same of scenes of one structure, with a row for each scene."""
+    worlds = [reference_world(scene) for scene in scenes]
+    gravity, floor, damping = ([getattr(world, part.name) for world in worlds] for part in fields(reference_impl.World))
+    return reference_impl.World(
+        gravity=None if gravity[0] is None else np.array(gravity),
+        floor=None if floor[0] is None else reference_impl.Floor(*np.transpose(floor)),
+        damping=None if damping[0] is None else (np.transpose(damping)[0], np.transpose(damping)[1]),
     )

@@ -1,50 +1,75 @@
 """Faults of conventions: frames, orders, signs and units of states, and parts of the start that are not set."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dropspin.comparisons.faults.fault_model import Change, FaultModel, Reported, changed_part, changed_start
+from dropspin.comparisons.faults.fault_model import (
+    Change,
+    FaultModel,
+    Reported,
+    Simulated,
+    changed_part,
+    changed_start,
+    unchanged_scene,
+    unchanged_states,
+)
 from dropspin.scenarios.rotations import about as rotation_about
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
-from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY, Array
+from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, RATES, SPIN, VELOCITY
+
+Array = NDArray[np.float64]
 
 
 def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Change) -> list[FaultModel]:
-    """Three faults of one convention: in what is read, in what is set at the start, and in both.
+    """Three faults of one convention: in what is read, in what is set at the start, and in both; of the orientation, six.
+
+    An adapter may also convert the angular velocity from the body frame by the wrong orientation.
 
     Args:
         part: The part of a state that has the convention.
-        fault: The fault in what is read.
-        expected: The convention of a state.
+        fault: The fault.
+        expected: The correct convention.
         wrong: Function from the part in the correct convention to the part in the faulty one.
         right: The inverse function.
     """
-    return _read_set_both(part, fault, expected, changed_part(part, wrong), changed_part(part, right))
+    messages = f"{fault}; {expected}", f"{fault} where it is set at the start; {expected}", f"{fault}, both set and read; {expected}"
+    changes = [(changed_part(part, wrong), changed_part(part, right))]
+    if part == ORIENTATION:
+        changes.append((_with_spin(wrong), _with_spin(right)))
+    faults = []
+    for reported, inverse in changes:
+        simulated: Simulated = changed_start(inverse)
+        both = (unchanged_scene, reported), (simulated, unchanged_states), (simulated, reported)
+        faults += [FaultModel(message, *change, about=str(part)) for message, change in zip(messages, both, strict=True)]
+    return faults
 
 
-def _read_set_both(part: slice, fault: str, expected: str, reported: Reported, inverse: Reported) -> list[FaultModel]:
-    simulated, about = changed_start(inverse), str(part)
-    return [
-        FaultModel(f"{fault}; {expected}", reported=reported, about=about),
-        FaultModel(f"{fault} where it is set at the start; {expected}", simulated, about=about),
-        FaultModel(f"{fault}, both set and read; {expected}", simulated, reported, about=about),
-    ]
+def _with_spin(change: Change) -> Reported:
+    """States with a changed orientation, by which the angular velocity is converted from the body frame too."""
+
+    def changed(states: Array) -> Array:
+        spin = unrotate(states[:, ORIENTATION], states[:, SPIN])
+        states = changed_part(ORIENTATION, change)(states)
+        states[:, SPIN] = rotate(states[:, ORIENTATION], spin)
+        return states
+
+    return changed
 
 
-def _orientation(fault: str, wrong: Change, right: Change) -> list[FaultModel]:
-    """Faults of the orientation, also where an adapter converts the angular velocity from the body frame by the wrong orientation."""
+def _rolled(by: int) -> Change:
+    return lambda part, _: np.roll(part, by, axis=1)
 
-    def with_spin(change: Change) -> Reported:
-        def changed(states: Array) -> Array:
-            spin = unrotate(states[:, ORIENTATION], states[:, SPIN])
-            states = changed_part(ORIENTATION, change)(states)
-            states[:, SPIN] = rotate(states[:, ORIENTATION], spin)
-            return states
 
-        return changed
+def _times(factor: float | Array) -> Change:
+    return lambda part, _: factor * part
 
-    expected = "a state has [x, y, z, w], body to world"
-    both = _read_set_both(ORIENTATION, fault, expected, with_spin(wrong), with_spin(right))
-    return _convention(ORIENTATION, fault, expected, wrong, right) + both
+
+def _to_body(vectors: Array, orientation: Array) -> Array:
+    return unrotate(orientation, vectors)
+
+
+def _to_world(vectors: Array, orientation: Array) -> Array:
+    return rotate(orientation, vectors)
 
 
 def _z_up(sign: float, but: slice | None = None) -> Reported:
@@ -67,55 +92,28 @@ def _left_handed(states: Array) -> Array:
     return states * [1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0]
 
 
-def _scalar_first(q: Array, _: Array) -> Array:
-    return np.roll(q, 1, axis=1)
+def _not_set(part: slice) -> Simulated:
+    """The scene with a part of its start at the origin, not turned, or at rest."""
+    return changed_start(changed_part(part, lambda values, _: np.eye(13)[[6], part]))
 
 
-def _scalar_last(q: Array, _: Array) -> Array:
-    return np.roll(q, -1, axis=1)
-
-
-def _inverted(q: Array, _: Array) -> Array:
-    return conjugate(q)
-
-
-def _in_body(vectors: Array, orientation: Array) -> Array:
-    return unrotate(orientation, vectors)
-
-
-def _in_world(vectors: Array, orientation: Array) -> Array:
-    return rotate(orientation, vectors)
-
-
-def _negative(vectors: Array, _: Array) -> Array:
-    return -vectors
-
-
-def _swapped(rates: Array, _: Array) -> Array:
-    return np.roll(rates, 3, axis=1)
-
-
-def _zero(values: Array, _: Array) -> Array:
-    return 0.0 * values
-
-
-def _identity(values: Array, _: Array) -> Array:
-    return np.eye(4)[[3]]
-
-
-def _not_set(name: str, part: slice, default: Change = _zero) -> FaultModel:
-    return FaultModel(f"the {name} at the start is not set", changed_start(changed_part(part, default)), about="start")
-
-
-WORLD = "a state has it in the world frame"
-SPIN_FROM_BODY = "angular velocity appears to be converted from the body frame, in which it was not"
+REORDERED = "the quaternion appears to be reordered from [w, x, y, z], which was not its order"
+CONVERTED = "angular velocity appears to be converted from the body frame, in which it was not"
+BODY_TO_WORLD = "a state has [x, y, z, w], body to world"
+IN_WORLD = "a state has it in the world frame"
 CONVENTIONS = (
-    *_orientation("the quaternion appears to be ordered [w, x, y, z]", _scalar_first, _scalar_last),
-    *_orientation("the quaternion appears to be reordered from [w, x, y, z], which was not its order", _scalar_last, _scalar_first),
-    *_orientation("the orientation appears to be inverted, world to body", _inverted, _inverted),
-    *_convention(SPIN, "angular velocity appears to be in the body frame", WORLD, _in_body, _in_world),
-    *_convention(SPIN, SPIN_FROM_BODY, WORLD, _in_world, _in_body),
-    *_convention(VELOCITY, "velocity appears to be in the body frame", WORLD, _in_body, _in_world),
+    *_convention(ORIENTATION, "the quaternion appears to be ordered [w, x, y, z]", BODY_TO_WORLD, _rolled(1), _rolled(-1)),
+    *_convention(ORIENTATION, REORDERED, BODY_TO_WORLD, _rolled(-1), _rolled(1)),
+    *_convention(
+        ORIENTATION,
+        "the orientation appears to be inverted, world to body",
+        BODY_TO_WORLD,
+        wrong=lambda q, _: conjugate(q),
+        right=lambda q, _: conjugate(q),
+    ),
+    *_convention(SPIN, "angular velocity appears to be in the body frame", IN_WORLD, _to_body, _to_world),
+    *_convention(SPIN, CONVERTED, IN_WORLD, _to_world, _to_body),
+    *_convention(VELOCITY, "velocity appears to be in the body frame", IN_WORLD, _to_body, _to_world),
     *_convention(
         SPIN,
         "angular velocity appears to be in degrees per second",
@@ -123,9 +121,9 @@ CONVENTIONS = (
         wrong=lambda w, _: np.rad2deg(w),
         right=lambda w, _: np.deg2rad(w),
     ),
-    *_convention(SPIN, "angular velocity has the opposite sign", "it is right-handed", _negative, _negative),
-    *_convention(VELOCITY, "velocity has the opposite sign", "it is the rate of the position", _negative, _negative),
-    *_convention(RATES, "velocity and angular velocity appear to be swapped", "velocity comes first", _swapped, _swapped),
+    *_convention(SPIN, "angular velocity has the opposite sign", "it is right-handed", _times(-1.0), _times(-1.0)),
+    *_convention(VELOCITY, "velocity has the opposite sign", "it is the rate of the position", _times(-1.0), _times(-1.0)),
+    *_convention(RATES, "velocity and angular velocity appear to be swapped", "velocity comes first", _rolled(3), _rolled(3)),
     FaultModel(
         "y and z appear to be swapped; y is up",
         reported=lambda states: states[:, [0, 2, 1, 3, 5, 4, 6, 7, 9, 8, 10, 12, 11]],
@@ -137,15 +135,11 @@ CONVENTIONS = (
         for part, but in ((None, ""), (ORIENTATION, ", except for the orientation"), (SPIN, ", except for the angular velocity"))
     ),
     FaultModel("states appear to be in a left-handed frame; a state is right-handed", reported=_left_handed, about="frame"),
-    FaultModel(
-        "lengths appear to be in millimetres; a state has m",
-        reported=changed_part(POSITION, lambda x, _: 1e3 * x),
-        about="frame",
+    FaultModel("lengths appear to be in millimetres; a state has m", reported=changed_part(POSITION, _times(1e3)), about="frame"),
+    *(
+        FaultModel(f"the {name.replace('_', ' ')} at the start is not set", simulated=_not_set(part), about="start")
+        for name, part in PARTS.items()
     ),
-    _not_set("position", POSITION),
-    _not_set("orientation", ORIENTATION, _identity),
-    _not_set("velocity", VELOCITY),
-    _not_set("angular velocity", SPIN),
-    FaultModel("velocity is reported as 0", reported=changed_part(VELOCITY, _zero)),
-    FaultModel("angular velocity is reported as 0", reported=changed_part(SPIN, _zero)),
+    FaultModel("velocity is reported as 0", reported=changed_part(VELOCITY, _times(0.0))),
+    FaultModel("angular velocity is reported as 0", reported=changed_part(SPIN, _times(0.0))),
 )

@@ -83,11 +83,6 @@ def _exact_states(scene: Scenario, times: Array) -> Array | None:
     return None if truth is None or not truth.covers(times).all() else truth(times).states
 
 
-def faults_of(about: str, *faults: tuple[str, Simulated]) -> list[FaultModel]:
-    """Faults of one thing in the scene that is simulated, each a message and a change of the scene."""
-    return [FaultModel(message, simulated, about=about) for message, simulated in faults]
-
-
 def changed_table(table: str, **values: Any) -> Simulated:
     """The scene with some values of a table changed, if it has that table; a callable is applied to the old value."""
     return lambda scene: with_values(scene, table, **values)
@@ -107,8 +102,3 @@ def changed_part(part: slice, change: Change) -> Reported:
         return states
 
     return changed
-
-
-def axis_names(order: tuple[int, ...]) -> str:
-    """Axes in an order, as text."""
-    return ", ".join("xyz"[axis] for axis in order)

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import EngineBroken, EngineMissing, engine_name
+from dropspin.comparisons.engines.base import EngineBroken, EngineMissing
+from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.registry import BUILT_IN, engine
 from dropspin.comparisons.judging.convergence import JUMPING, Claim, Convergence, SeriesPoint
 from dropspin.comparisons.judging.verdicts import Basis, Judgement, Verdict

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from dropspin.comparisons.engines.mujoco_versions import numbers_of
+from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.published.formulas import FORMULAS
 from dropspin.comparisons.published.quantities import quantity
 from dropspin.comparisons.published.results import ABSENT, SHOWN, Result, agreement

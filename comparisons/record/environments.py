@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from threading import Event
 from typing import Any
 
-from dropspin.comparisons.engines.npm_packages import is_npm
+from dropspin.comparisons.engines.packages import is_npm
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.running.processes import Closed

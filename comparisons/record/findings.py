@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.engines.mujoco_versions import numbers_of
+from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.measuring.tolerances import NEGLIGIBLE, scale, tolerance

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from dropspin.comparisons.engines.mujoco_versions import numbers_of
-from dropspin.comparisons.engines.npm_packages import is_npm
+from dropspin.comparisons.engines.packages import is_npm, numbers_of
 from dropspin.comparisons.results.folder import sha256
 from dropspin.scenarios import load
 from dropspin.scenarios.loading import read_toml

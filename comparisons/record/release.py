@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import Diverged, Engine, version
+from dropspin.comparisons.engines.base import Diverged, Engine
+from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.measuring.comparison import Comparison

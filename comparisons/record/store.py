@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.engines.registry import parsed
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.record.environments import without_paths

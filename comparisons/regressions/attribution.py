@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dropspin.comparisons.engines.base import engine_name
+from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.regressions.changes import Motion
 from dropspin.comparisons.results.provenance import MEASURING

@@ -16,7 +16,7 @@ import tomlkit
 from pydantic import Field
 from tomlkit.items import Item
 
-from dropspin.comparisons.engines.base import engine_name
+from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.comparisons.regressions.changes import KEY, Digests, leaves

@@ -13,10 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import FaultModel
-from dropspin.comparisons.faults.flight import FLIGHT
-from dropspin.comparisons.faults.impact import IMPACT
+from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.judging.convergence import JUMPING
 from dropspin.comparisons.measuring.comparison import Comparison, exactly
 from dropspin.comparisons.measuring.metrics import METRICS, metrics_for
@@ -88,7 +86,7 @@ def causes(results: Results, engine: str) -> Causes:
     for parameter in PARAMETERS:
         sizes = [size for size in _sizes(results.scenes[str(narrowest)], parameter, leading, dt) if holds(_with(parameter, size))]
         parameters += [WrongParameter(parameter, sizes[0], len(sizes) == 1)] if sizes else []
-    faults = [fault for fault in (*CONVENTIONS, *FLIGHT, *IMPACT) if fault.about != "start" and holds(fault)]
+    faults = [fault for fault in FAULT_MODELS if fault.about != "start" and holds(fault)]
     return Causes(parameters, faults)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import version
+from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.engines.registry import parsed
 from dropspin.scenarios import Trajectory
 from dropspin.scenarios.text import printable

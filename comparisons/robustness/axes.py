@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import may_tumble
+from dropspin.comparisons.engines.mapping import may_tumble
 from dropspin.comparisons.robustness import transformations as to
 from dropspin.comparisons.robustness.axis_values import (
     Between,

@@ -7,7 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import Engine, engine_name
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.options import engine_name
 from dropspin.comparisons.engines.registry import engine_names
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
 

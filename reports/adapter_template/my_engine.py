@@ -33,8 +33,8 @@ class MyEngine(ds.Engine):
         return None
 
     def prepare(self, scene: ds.Scenario, dt: float) -> ds.Simulation:
-        """Build one world."""
-        return MyEngineSimulation(scene, dt)
+        """Build one world: here a batch of one. An engine without batches subclasses `ds.Simulation`, which has `state` for `states`."""
+        return ds.OneWorld(scene, MyEngineBatch([scene], dt))
 
     def prepare_batch(self, members: Sequence[ds.Scenario], dt: float) -> ds.BatchSimulation:
         """Build many worlds that are stepped together; optional."""
@@ -48,6 +48,7 @@ class MyEngineBatch(ds.BatchSimulation):
         scene = members[0]
         self.dt, self.gravity, self.floor = dt, scene.acceleration, scene.floor  # floor is None: there is none
         self.velocity_lag = 0.5 * dt  # semi-implicit Euler: velocity lags position by half a step
+        self.settings = {"version": "0.1"}  # stored with the results: the version of the engine, and every setting that matters
         self.radius, self.mass, self.moments = scene.body.size, scene.body.mass, np.diag(scene.body.inertia_tensor)
         starts = np.array([member.initial_state for member in members])
         self.x, self.q, self.v, self.w = np.split(starts, [3, 7, 10], axis=1)  # q is [x, y, z, w]; all in the world frame, y up
@@ -90,26 +91,9 @@ class MyEngineBatch(ds.BatchSimulation):
         """Position, orientation, velocity and angular velocity, shape (size, 13), in memory of the processor, not of a GPU."""
         return np.concatenate([self.x, self.q, self.v, self.w], axis=1)
 
-
-class MyEngineSimulation(ds.Simulation):
-    """One world: here a batch of one."""
-
-    def __init__(self, scene: ds.Scenario, dt: float) -> None:
-        self.worlds = MyEngineBatch([scene], dt)
-        self.velocity_lag = self.worlds.velocity_lag
-        self.settings = {"version": "0.1"}  # stored with the results: the version of the engine, and every setting that matters
-
-    def advance(self, steps: int) -> None:
-        """Take time steps, and do nothing else: this is timed."""
-        self.worlds.advance(steps)
-
-    def state(self) -> Array:
-        """Position, orientation, velocity and angular velocity, shape (13,): a copy, never the engine's own memory."""
-        return np.array(self.worlds.states()[0])
-
     def as_built(self) -> ds.AsBuilt:
         """The mass, inertia and gravity that the engine has, which are compared with the scene; optional."""
-        return ds.AsBuilt(self.worlds.mass, np.diag(self.worlds.moments), self.worlds.gravity)
+        return ds.AsBuilt(self.mass, np.diag(self.moments), self.gravity)
 
 
 def product(w: Array, q: Array) -> Array:

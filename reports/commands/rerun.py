@@ -24,7 +24,7 @@ def rerun_command(engine: str, release: str, scene: str, folder: str, resources:
     temporary environment. The exit code is 1 if a motion differs from that of the record; then it is said which versions or which
     processor differ.
     """
-    from dropspin.comparisons.engines.base import engine_name
+    from dropspin.comparisons.engines.options import engine_name
     from dropspin.comparisons.record.plan import load_plan
     from dropspin.comparisons.record.rerun import rerun
     from dropspin.reports.stories import rerun as view

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.record import findings

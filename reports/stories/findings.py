@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS

@@ -10,7 +10,7 @@ import pytest
 
 from dropspin.comparisons import calibration
 from dropspin.comparisons.calibration import calibrate, drop
-from dropspin.comparisons.engines.mujoco_contact import damping_ratio
+from dropspin.comparisons.engines.mujoco_model import damping_ratio
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.recording import simulate
 from dropspin.scenarios import DropspinError, load

@@ -7,7 +7,7 @@ import pytest
 
 import dropspin.reference_impl.state
 import dropspin.scenarios.state
-from dropspin.comparisons.engines import base
+from dropspin.comparisons.engines import mapping
 from dropspin.reference_impl import Body, Floor, Methods, World, simulate
 from dropspin.reference_impl.methods import COLLIDE, CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 
@@ -65,9 +65,9 @@ def test_every_contact_works_with_the_laws_of_its_table_only():
 
 def test_discretisations_shared_with_other_engines_have_the_same_names():
     """Engines of the same discretisation must agree, so they must name it alike; this package cannot import the names."""
-    assert ROTATIONS["gyroscopic"].DISCRETISATION == base.EXPLICIT_GYROSCOPIC
-    assert ROTATIONS["implicit-gyroscopic"].DISCRETISATION == base.IMPLICIT_GYROSCOPIC
-    assert Methods(rotation="rk4").discretisation(tumbles=False) == base.SEMI_IMPLICIT_EULER
+    assert ROTATIONS["gyroscopic"].DISCRETISATION == mapping.EXPLICIT_GYROSCOPIC
+    assert ROTATIONS["implicit-gyroscopic"].DISCRETISATION == mapping.IMPLICIT_GYROSCOPIC
+    assert Methods(rotation="rk4").discretisation(tumbles=False) == mapping.SEMI_IMPLICIT_EULER
     assert Methods(rotation="rk4").discretisation(tumbles=True) == "rk4"
     assert len({leaf.DISCRETISATION for leaf in ROTATIONS.values()}) == len(ROTATIONS)
 

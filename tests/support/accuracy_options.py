@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from dropspin.comparisons.engines.base import Engine, NumericOption, Simulation
+from dropspin.comparisons.engines.base import Engine, Simulation
+from dropspin.comparisons.engines.options import NumericOption
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.scenarios.rotations import cross, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY

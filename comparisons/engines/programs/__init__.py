@@ -19,16 +19,12 @@ def rendered(template: str, scene: Scenario, **values: Any) -> str:
     """The text of a template for a ball or a flat box that falls onto a floor, with z up."""
     assert scene.floor is not None
     body = scene.body
-    if isinstance(body, Sphere):
-        shape, extents = "ball", [body.radius]
-    else:
-        assert isinstance(body, Box)
-        shape, extents = "box", [body.half_extents[axis] for axis in (2, 0, 1)]
+    extents = [body.radius] if isinstance(body, Sphere) else body.vertices.max(axis=0)[[2, 0, 1]].tolist()
     return (
         _templates()
         .get_template(template)
         .render(
-            shape=shape,
+            shape="ball" if isinstance(body, Sphere) else "box",
             extents=extents,
             lowest=extents[-1],
             mass=body.mass,

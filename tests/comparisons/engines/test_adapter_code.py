@@ -21,7 +21,7 @@ def _copied(folder):
         ("rapier_js_engine.py", "rapier_js_node.cjs"),
         ("rapier_js_engine.py", "rapier_scenes.py"),
         ("mujoco_engine.py", "mujoco_engine.py"),
-        ("mjx_engine.py", "mujoco_contact.py"),
+        ("mjx_engine.py", "mujoco_model.py"),
     ],
 )
 def test_a_changed_file_of_an_adapter_is_another_engine(tmp_path, adapter, changed):

@@ -9,7 +9,7 @@ import pytest
 from support.engines import QUICK
 
 from dropspin import scenarios
-from dropspin.comparisons.engines.mujoco_versions import refusal_of_meshes
+from dropspin.comparisons.engines import mujoco_engine
 from dropspin.comparisons.engines.registry import engine, engine_names
 from dropspin.comparisons.running.recording import simulate
 from dropspin.comparisons.running.run import measure
@@ -156,14 +156,16 @@ def test_body_of_vertices_lands_flat(name):
     assert np.abs(motion.orientation[:, :3]).max() < 1e-6
 
 
-def test_bodies_of_vertices_are_declined_where_an_engine_cannot_represent_them():
+def test_bodies_of_vertices_are_declined_where_an_engine_cannot_represent_them(monkeypatch):
     """A flat mesh, more parts than the adapter of PyBullet gives a compound shape, and MuJoCo's contact points before version 4."""
     assert "flat" in engine("mujoco").declines(prism(half_length=0.0))
     assert engine("pybullet").declines(prism(half_length=0.0)) is None
     assert "at most 16 parts; the convex hull has 24" in engine("pybullet").declines(prism(12))
     assert engine("pybullet[body=hull]").declines(prism(12)) is None
-    assert "three contact points" in refusal_of_meshes((3, 9))
-    assert refusal_of_meshes((4, 0)) is None
+    monkeypatch.setattr(mujoco_engine, "VERSION", (3, 9))
+    assert "three contact points" in engine("mujoco").declines(prism())
+    monkeypatch.setattr(mujoco_engine, "VERSION", (4, 0))
+    assert engine("mujoco").declines(prism()) is None
     assert engine("dart").refusal(prism()) == "the adapter maps the shapes sphere, box onto a floor, not vertices"
 
 

@@ -11,8 +11,9 @@ import pytest
 from dropspin import scenarios
 from dropspin.comparisons.calibration import calibrate
 from dropspin.comparisons.engines import mujoco_engine
-from dropspin.comparisons.engines.base import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
-from dropspin.comparisons.engines.mujoco_versions import flight_of, numbers_of
+from dropspin.comparisons.engines.mapping import EXPLICIT_GYROSCOPIC, IMPLICIT_GYROSCOPIC, MIDPOINT_GYROSCOPIC
+from dropspin.comparisons.engines.mujoco_engine import flight_of
+from dropspin.comparisons.engines.packages import numbers_of
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.regressions.comparing import compare, history
 from dropspin.comparisons.results.store import load_results
@@ -114,7 +115,7 @@ def test_only_flags_of_the_version_are_set(installed):
 
     def flags(scene_name):
         with engine("mujoco").prepare(scenarios.load(scene_name), 1e-3) as simulation:
-            model, _ = simulation.built
+            model = simulation.model
             exact = bool(model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_DIAGEXACT)
             no_islands = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ISLAND)
             assert exact == ("diagexact" in simulation.settings)

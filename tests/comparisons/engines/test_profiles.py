@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dropspin.comparisons.engines.base import calibrated_label
+from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.recording import record, simulate
 from dropspin.comparisons.running.run import run

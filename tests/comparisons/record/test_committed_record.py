@@ -33,7 +33,7 @@ def test_no_file_was_changed():
     ],
 )
 def test_releases_in_which_free_rotation_changed(integrator, metric, expected):
-    """As measured by MuJoCo's Python package alone; see comparisons/engines/mujoco_versions.py."""
+    """As measured by MuJoCo's Python package alone; see comparisons/engines/mujoco_engine.py."""
     label = "mujoco" if integrator == "euler" else f"mujoco[integrator={integrator}]"
     filters = [("label", "==", label), ("scene", "==", "spin-asymmetric"), ("metric", "==", metric), ("dt", "==", 4e-3)]
     values = pd.read_parquet(RECORD, columns=["release", "value"], filters=filters).set_index("release")["value"]

@@ -6,7 +6,7 @@ import pytest
 from support.accuracy_options import Adaptive, InnerStep, Substeps
 
 from dropspin.comparisons.conformance.checks import conform
-from dropspin.comparisons.engines.base import NumericOption
+from dropspin.comparisons.engines.options import NumericOption
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.running.run import run
 from dropspin.scenarios import load

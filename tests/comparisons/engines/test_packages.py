@@ -7,7 +7,8 @@ import pytest
 
 from dropspin.comparisons.engines import registry
 from dropspin.comparisons.engines.base import EngineMissing
-from dropspin.comparisons.engines.npm_packages import npm_package, npm_version
+from dropspin.comparisons.engines.packages import npm_package
+from dropspin.comparisons.engines.packages import version as version_of
 from dropspin.comparisons.results.provenance import versions
 
 PACKAGE = "@dimforge/rapier3d-compat"
@@ -37,7 +38,7 @@ def test_the_environment_comes_before_the_working_folder_and_the_folders_above_i
         npm_package(PACKAGE)
     for folder, version in ((project, "0.1.0"), (work, "0.2.0"), (environment, "0.3.0")):
         assert install(folder, version) == npm_package(PACKAGE)
-        assert npm_version(PACKAGE) == version
+        assert version_of(PACKAGE) == version
 
 
 def test_a_run_has_the_version(folders):

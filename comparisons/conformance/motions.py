@@ -1,0 +1,249 @@
+"""The check of a probe: the engine's motion equals the exact solution; if not, which fault or symptom explains the difference.
+
+A fault model changes the scene that is simulated, the states that are reported, or both. It explains an engine's motion if that motion is
+the exact solution of the changed scene, reported in the changed way. Faults that give the same motion of a probe cannot be distinguished by
+it, so that other probes are compared too. Two faults at once are recognised as well. Symptoms of a motion that no known fault explains are
+what differs from the exact solution, and by how much; what is right is left out.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
+from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences, exact_solution
+from dropspin.comparisons.engines.base import Engine, KnownLimitation
+from dropspin.comparisons.faults.fault_model import Exact, FaultModel
+from dropspin.comparisons.faults.parameters import FAULT_MODELS
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.running.recording import Breakdown, record, try_record
+from dropspin.scenarios import Scenario, Trajectory, truth_for
+from dropspin.scenarios.state import RATES, SPIN, VELOCITY
+from dropspin.scenarios.text import rounded
+from dropspin.scenarios.truths import LAWS, Law
+
+Array = NDArray[np.float64]
+
+NO_FAULT = FaultModel("")
+SINGLY = tuple(fault for fault in FAULT_MODELS if fault.about != "start")  # the start has a check of its own
+QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("angular velocity", "rad/s"))
+"""Those of `differences`."""
+CLEAR = 1e-3
+"""Share of a speed, and ratio of a friction impulse, from which a difference is stated."""
+TURNED = math.radians(1.0)
+"""Angle from which the direction of friction is stated to be wrong."""
+
+
+def check_motion(engine: Engine, probe: Probe) -> str:
+    """The motion of a probe."""
+    refusal = engine.refusal(probe.scene)
+    if refusal is not None:
+        raise Declined(refusal)
+    recording = record(engine, probe.scene, DT, verify=False)
+    found, exact = recording.motion.states[probe.rows], probe.exact
+    if probe.off(found, exact) <= 1.0:
+        position, attitude, velocity, spin = differences(found, exact)
+        return f"errors: {position:.2g} m, {attitude:.2g} rad, {velocity:.2g} m/s, {spin:.2g} rad/s"
+    explaining = [limitation.message for limitation in recording.limitations if _explains(limitation, found, exact, probe)]
+    if explaining:
+        raise Noted("; ".join(explaining))
+    law = _own_law(engine, probe, found)
+    if law is not None:
+        raise Noted(f"impacts follow the {law} law, as the engine states")
+    fault = explain_motion(probe, found, lambda other: _states(engine, other))
+    if fault is None:
+        raise CheckFailed("; ".join(symptoms(probe, recording.motion)))
+    raise Noted(fault.message) if fault.is_peculiarity else CheckFailed(fault.message)
+
+
+def _states(engine: Engine, probe: Probe) -> Array | None:
+    """The engine's states of a probe, shape (2, 13); None if it declines the scene or breaks down, which the check of that probe states."""
+    recording = try_record(engine, probe.scene, DT, verify=False)
+    return None if isinstance(recording, Breakdown) else recording.motion.states[probe.rows]
+
+
+def _own_law(engine: Engine, probe: Probe, found: Array) -> Law | None:
+    """The impact law that an engine names in its discretisation, if its motion follows that law."""
+    named = engine.discretisation(probe.scene) or ""
+    for law in LAWS:
+        truth = truth_for(probe.scene, law) if f"law {law}" in named else None
+        if truth is not None and probe.off(found, truth(probe.times).states) <= 1.0:
+            return law
+    return None
+
+
+def _explains(limitation: KnownLimitation, found: Array, exact: Array, probe: Probe) -> bool:
+    """Whether a known limitation explains the errors of position and attitude, and with them those of the velocities."""
+    position, attitude, _, _ = differences(found, exact)
+    allowed = [
+        max(limitation.explained_errors.get(f"{name}_error", 0.0), own)
+        for name, own in zip(("position", "orientation"), probe.allowed, strict=False)
+    ]
+    return bool(limitation.explained_errors) and bool(position <= allowed[0] and attitude <= allowed[1])
+
+
+def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Array | None]) -> FaultModel | None:
+    """The fault, or the two, that give an engine's states of a probe, shape (2, 13); None if there are none.
+
+    Several faults may give the same motion of a probe. A fault is no explanation if it changes the motion of another probe in which the
+    engine is right; of those that are left, the one is taken that gives the motion of the most probes.
+
+    Args:
+        probe: The probe.
+        found: The engine's states of it.
+        motion_of: Function from another probe to the engine's states of it, or to None if the engine has none.
+    """
+    # The exact solution of a box on its corner takes too long for thousands of pairs.
+    counts = (1, 2) if _has_pairs(probe) else (1,)
+    for count in counts:
+        faults, motions = _motions_with_faults(probe, count)
+        if not faults:
+            continue
+        off = np.round(probe.off(found, motions), 3)
+        candidates = [faults[number] for number in np.argsort(off, kind="stable") if off[number] <= 1.0]
+        others = [other for other in PROBES if other != probe and (count == 1 or _has_pairs(other))]
+        best = _best(candidates, others, motion_of)
+        if best is not None:
+            return best
+    return None
+
+
+def _has_pairs(probe: Probe) -> bool:
+    return probe.scene.floor is None or probe.scene.body.is_ball
+
+
+def _best(candidates: Iterable[FaultModel], probes: Iterable[Probe], motion_of: Callable[[Probe], Array | None]) -> FaultModel | None:
+    """The fault that gives the engine's states of the most probes, without those that change a probe in which the engine is right."""
+    explained = dict.fromkeys(candidates, 0)
+    for probe in probes:
+        known: Exact = {}
+        exact = NO_FAULT.motion(probe.scene, probe.times, known)
+        assert exact is not None
+        motions = {fault: states for fault in explained if (states := fault.motion(probe.scene, probe.times, known)) is not None}
+        changed = {fault: states for fault, states in motions.items() if probe.off(states, exact) > 1.0}
+        found = motion_of(probe) if changed else None
+        if found is None:
+            continue
+        for fault, states in changed.items():
+            if probe.off(found, states) <= 1.0:
+                explained[fault] += 1
+            elif probe.off(found, exact) <= 1.0:
+                del explained[fault]
+    return max(explained, key=explained.__getitem__, default=None)
+
+
+@cache
+def _motions_with_faults(probe: Probe, count: int) -> tuple[list[FaultModel], Array]:
+    """All faults, or pairs of them, whose motion of a probe is known, and these motions, shape (faults, 2, 13)."""
+    known: Exact = {}
+    found = [
+        (fault, motion)
+        for fault in (SINGLY if count == 1 else _pairs())
+        if (motion := fault.motion(probe.scene, probe.times, known)) is not None
+    ]
+    return [fault for fault, _ in found], np.array([motion for _, motion in found])
+
+
+def explain_start(scene: Scenario, state: Array, allowed: float) -> FaultModel | None:
+    """The fault, or the two, that give a state at the start, shape (13,), within `allowed` times its largest number, if any."""
+    for candidates in (FAULT_MODELS, _pairs()):
+        for fault in candidates:
+            start, close = fault.start(scene), allowed * np.abs(scene.initial_state).max()
+            # A fault made both when setting and when reading a state cancels at the start, which then is no evidence of it.
+            if np.abs(start - state).max() <= close < np.abs(start - scene.initial_state).max():
+                return fault
+    return None
+
+
+def _pairs() -> Iterable[FaultModel]:
+    return (first.and_also(second) for first, second in combinations(FAULT_MODELS, 2) if first.about != second.about)
+
+
+def symptoms(probe: Probe, motion: Trajectory) -> list[str]:
+    """What is wrong in an engine's motion of a probe, the most specific first; at least one sentence."""
+    rows = motion.states
+    if not np.isfinite(rows).all():
+        return ["the state is not finite"]
+    exact = probe.exact
+    if probe.scene.floor is not None:
+        found = [*_of_first_contact(probe, Comparison.with_truth(probe.scene, motion, exact_solution(probe.scene)))]
+    elif not np.any(rows[-1, RATES]) and np.any(exact[-1, RATES]):
+        return ["the body stops: the engine puts it to sleep"]
+    else:
+        found = [*_of_flight(probe.scene, rows[-1], exact[-1])] if probe.scene.gravity is None else []
+    errors = differences(rows[probe.rows], exact)
+    beyond = [
+        f"{name} is off by {error:.{min(_digits(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
+        for (name, unit), error, allowed in zip(QUANTITIES, errors, probe.allowed, strict=True)
+        if not error <= allowed
+    ]
+    return [*found, *beyond]
+
+
+def _of_flight(scene: Scenario, end: Array, exact: Array) -> Iterator[str]:
+    """Speeds at the end of a motion without gravity and floor."""
+    for what, unit, part in (("speed", "m/s", VELOCITY), ("angular velocity", "rad/s", SPIN)):
+        final, expected = (float(np.linalg.norm(state[part])) for state in (end, exact))
+        if abs(final - expected) > CLEAR * expected:
+            too_fast, too_slow = "", "damping or a clamp that the scene does not have: "
+            if scene.damping is not None:
+                too_fast, too_slow = "damping is missing or too weak: ", "damping is too strong, or a clamp: "
+            yield f"{too_slow if final < expected else too_fast}the final {what} is {_instead(final, expected, unit)}"
+
+
+def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
+    """The place of the first contact, and its impulse along the normal and along the floor, over the mass."""
+    scene, first = probe.scene, case.first_contact
+    assert scene.floor is not None
+    if first is None:
+        yield "the floor does not change the velocity"
+        return
+    before, after = first
+    allowed_position, _, allowed, _ = probe.allowed
+    height = float(case.motion.position[before, 1])
+    if case.impacts:
+        times, step = case.motion.t, 2.0 * case.dt
+        impact = float(np.interp(case.impacts[0], case.exact.t, case.exact.position[:, 1]))
+        if abs(height - impact) > allowed_position + step * abs(float(case.motion.velocity[before, 1])):
+            yield f"the first contact begins at a height of {_instead(height, impact, 'm')}"
+        # The impact of the engine may be a step or two early or late; the next one is another.
+        before = min(before, int(np.searchsorted(times, case.impacts[0] - step)))
+        end = case.impacts[1] if len(case.impacts) > 1 else times[-1]
+        after = min(max(after, int(np.searchsorted(times, case.impacts[0] + step))), int(np.searchsorted(times, end - step)))
+    duration = (after - before) * case.dt
+    found, exact = (rows.velocity[after] - rows.velocity[before] - duration * scene.acceleration for rows in (case.motion, case.exact))
+    if case.impacts and abs(found[1] - exact[1]) > allowed:
+        sampled = Comparison(scene, case.exact, case.exact, case.impacts)
+        wrong, right = (METRICS["restitution_error"].value_or_nan([one]) for one in (case, sampled))
+        if abs(wrong - right) > CLEAR:
+            yield f"restitution is {_instead(scene.floor.restitution + wrong - right, scene.floor.restitution)}"
+    if float(np.linalg.norm((found - exact)[[0, 2]])) > allowed:
+        yield from _of_friction(found, exact)
+
+
+def _of_friction(found: Array, exact: Array) -> Iterator[str]:
+    """The size of the friction impulse over the normal one, and its direction."""
+    strength, expected = (float(np.linalg.norm(impulse[[0, 2]]) / impulse[1]) for impulse in (found, exact))
+    if abs(strength - expected) > CLEAR:
+        yield f"the impulse of friction over that of the normal force is {_instead(strength, expected)}"
+    angle = abs(math.remainder(math.atan2(found[0], found[2]) - math.atan2(exact[0], exact[2]), math.tau))
+    if strength > CLEAR and expected > CLEAR and angle > TURNED:
+        yield f"friction acts {rounded(math.degrees(angle), 2)}° from its exact direction"
+
+
+def _instead(found: float, expected: float, unit: str = "") -> str:
+    """Two numbers with so many digits that they differ, and the difference as a share of the expected one."""
+    value = f"{found:.{_digits(found, expected)}g}{f' {unit}' if unit else ''} instead of {rounded(expected, 6)}"
+    if expected == 0.0:
+        return value
+    return f"{value} ({rounded(100.0 * abs(found / expected - 1.0), 2)} % too {'high' if abs(found) > abs(expected) else 'low'})"
+
+
+def _digits(found: float, expected: float) -> int:
+    """Significant digits in which two numbers differ."""
+    return 2 + max(0, math.ceil(math.log10(abs(expected / (found - expected))))) if expected and found != expected else 3

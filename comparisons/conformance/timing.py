@@ -1,0 +1,231 @@
+"""Checks of time: of the length of steps, the time of each part of a row, `velocity_lag`, steps that are not awaited, and compilation."""
+
+import math
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial.polynomial import polyfit, polyval
+from numpy.typing import NDArray
+
+from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
+from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, accepted_scene, exact_solution, few_steps, recorded, state_after
+from dropspin.comparisons.conformance.protocol import relative_difference
+from dropspin.comparisons.engines.base import Engine, Simulation
+from dropspin.comparisons.running.recording import time_steps
+from dropspin.scenarios import Scenario, Trajectory
+from dropspin.scenarios.rotations import angle_between_orientations
+from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY
+from dropspin.scenarios.text import rounded
+
+Array = NDArray[np.float64]
+
+STEPS_TRIED = (0.01, 0.0025, 0.00025)
+NEAR_ENOUGH = 0.02
+"""The share of a step by which a row may be off its time; an engine with some damping is still on time."""
+LATE = 0.3
+"""The share of a step by which attitude or velocity may be off the time of their row."""
+LARGEST_LAG = 0.75
+"""In steps; the schemes of first order have ±1/2."""
+STARTED = 6
+"""The first step that counts: multistep methods begin with others."""
+MOST_SUBSTEPS = 8
+NO_SCHEME = "no known scheme has this lag: gravity, the time step or the precision of the state is wrong"
+LAG_TOLERANCE = 0.02
+"""In steps: eight sub-steps have a lag of 1/16."""
+LONG_ENOUGH = 0.02
+"""Wall time of the steps [s]; a shorter one could be hidden by the time that it takes to read a state."""
+MOST_STEPS = 1 << 16
+REPEATS = 2
+LARGEST_SHARE = 0.5
+"""Largest share of the time that may be spent waiting for the state."""
+PIECE = 32
+"""Steps of a short call."""
+FAR = 1e-3
+"""The difference, relative to the largest number, of states that are not of the same time; an adaptive integrator may differ by less."""
+MUCH = 10.0
+"""Compilation that should be stated [s], because it counts against limits of processor time otherwise."""
+
+
+def check_time(engine: Engine) -> str:
+    """Intervals between rows have the length asked for, and all parts of a row one time; free motions measure both."""
+    ticks = {dt: _ticks(engine, "coasting", dt, _by_position) for dt in STEPS_TRIED}
+    for dt, times in ticks.items():
+        between, late = np.diff(times), _late(times)
+        if np.ptp(between[1:]) <= NEAR_ENOUGH and abs(late) > LATE and abs(between[1:].mean() - 1.0) <= NEAR_ENOUGH:
+            raise CheckFailed(f"position is {_off(late)}")
+        if np.ptp(between) > NEAR_ENOUGH * max(abs(between.mean()), 1.0):
+            raise CheckFailed(
+                f"rows are not uniform in time: at dt = {dt:g} s intervals are {between.min() * dt:.4g} to {between.max() * dt:.4g} s long"
+            )
+    lengths = np.array([float(np.diff(times).mean()) * dt for dt, times in ticks.items()])
+    asked = ", ".join(f"{dt:g}" for dt in STEPS_TRIED)
+    if not np.allclose(lengths, STEPS_TRIED, rtol=NEAR_ENOUGH):
+        if np.ptp(lengths) <= NEAR_ENOUGH * abs(lengths[0]):
+            raise CheckFailed(f"a step is {lengths[0]:.5g} s long for every dt ({asked} s)")
+        found = ", ".join(f"{length:.5g}" for length in lengths)
+        raise CheckFailed(f"steps of {asked} s are {found} s long, by the motion of a free ball")
+    with suppress(Declined):
+        late = _late(_ticks(engine, "turning", STEPS_TRIED[0], _by_attitude))
+        if abs(late) > LATE:
+            raise CheckFailed(f"the attitude is {_off(late)}")
+    with suppress(Declined):
+        late = _late(_ticks(engine, "falling straight", STEPS_TRIED[0], _by_velocity))
+        if abs(late) > LATE and abs(_runs_ahead(*_fall(engine))[0] + late) < LATE:
+            count = "more steps than were taken, such as twice in the first one" if late < 0.0 else "fewer steps than were taken"
+            side = "ahead" if late < 0.0 else "behind"
+            raise CheckFailed(f"velocity and position of a fall run {side} by {_steps(late)}: gravity acts in {count}")
+        if abs(late) > LATE and abs(late - _velocity_lag(*_fall(engine))[1]) > LATE:
+            raise CheckFailed(f"velocity is {_off(late)}")
+    return f"steps have the length asked for, {asked} s"
+
+
+def _late(times: Array) -> float:
+    """By how many steps rows are later than the times that they should have, in steps since the start."""
+    return float(np.median(np.arange(len(times)) - times))
+
+
+def _steps(count: float) -> str:
+    return "1 step" if f"{abs(count):.2g}" == "1" else f"{abs(count):.2g} steps"
+
+
+def _off(late: float) -> str:
+    return f"{_steps(late)} {'late' if late > 0.0 else 'early'}: it does not belong to the time of its row"
+
+
+def _ticks(engine: Engine, probe: str, dt: float, clock: Callable[[Scenario, Array], Array]) -> Array:
+    """The time of each row by a clock, in steps since the start, shape (1 + A_FEW_STEPS,)."""
+    scene = accepted_scene(engine, probe)
+    ticks = clock(scene, recorded(engine, scene, dt)) / dt
+    if not np.isfinite(ticks).all():
+        raise CheckFailed(f"the state is not finite after {A_FEW_STEPS} steps of {dt:g} s")
+    return ticks
+
+
+def _by_position(scene: Scenario, rows: Array) -> Array:
+    speed = np.array(scene.start.velocity)
+    return (rows[:, POSITION] - scene.start.position) @ speed / (speed @ speed)
+
+
+def _by_attitude(scene: Scenario, rows: Array) -> Array:
+    turned = angle_between_orientations(np.broadcast_to(scene.start.orientation, (len(rows), 4)), rows[:, ORIENTATION])
+    return turned / np.linalg.norm(scene.start.angular_velocity)
+
+
+def _by_velocity(scene: Scenario, rows: Array) -> Array:
+    g = scene.acceleration
+    return (rows[:, VELOCITY] - scene.start.velocity) @ g / (g @ g)
+
+
+def check_velocity_lag(engine: Engine) -> str:
+    """`velocity_lag` is the time by which velocity lags position: how much faster a falling body moves than its velocity says, over g."""
+    fall = _fall(engine)
+    measured, stated = _velocity_lag(*fall)
+    ahead, noise = _runs_ahead(*fall)
+    if noise > LAG_TOLERANCE:
+        raise Noted(f"a fall does not lag by the same time throughout, but by {noise:.2g} steps more or less")
+    if abs(measured) > LARGEST_LAG:
+        raise Noted(f"velocity lags position by {measured:.3g} steps; known schemes have at most half a step")
+    if abs(measured - stated) > LAG_TOLERANCE:
+        raise CheckFailed(
+            f"velocity_lag is {stated:.3g} steps, but velocity lags position by {measured:.3g} steps, by how much faster a falling body "
+            f"moves than its velocity says; {_suggested_lag(measured)}"
+        )
+    if min(abs(ahead), abs(ahead - measured)) > LAG_TOLERANCE:  # one that lags is ahead by its lag, or not, as a leapfrog
+        raise CheckFailed(f"a fall runs ahead of the exact one by {ahead:.3g} steps; {NO_SCHEME}")
+    return f"velocity lags position by {stated:.3g} steps"
+
+
+def _fall(engine: Engine) -> tuple[Scenario, Trajectory]:
+    """A fall of few steps, so that rounding adds up to little."""
+    scene = accepted_scene(engine, "falling", "falling straight")
+    motion = few_steps(engine, scene, STEPS_TRIED[0])
+    if not np.isfinite(motion.states).all():
+        raise CheckFailed("the state is not finite after a fall")
+    return scene, motion
+
+
+def _velocity_lag(scene: Scenario, motion: Trajectory) -> tuple[float, float]:
+    """The lag of velocity behind position in a fall, measured and stated, in steps."""
+    g, dt = scene.acceleration, STEPS_TRIED[0]
+    moved = (motion.position[STARTED + 2 :] - motion.position[STARTED:-2]) / (2.0 * dt)
+    return float(np.mean((moved - motion.velocity[STARTED + 1 : -1]) @ g) / (g @ g * dt)), motion.velocity_lag / dt
+
+
+def _runs_ahead(scene: Scenario, motion: Trajectory) -> tuple[float, float]:
+    """By how many steps a fall runs ahead of the exact one, and the largest deviation from a constant number."""
+    t, g = motion.t[STARTED:], scene.acceleration
+    ahead = (motion.position[STARTED:] - exact_solution(scene)(t).position) @ g / (g @ g * STEPS_TRIED[0])
+    fitted = polyfit(t, ahead, 2)  # what remains of the first steps is constant; damping and wrong gravity grow with t²
+    noise = float(np.abs(ahead - polyval(t, fitted)).max() / t[-1])
+    return float(fitted[1]), noise
+
+
+def _suggested_lag(steps: float) -> str:
+    """The assignment that is right, for 0 and the inverse of an even number of sub-steps, of a step; no scheme has another lag."""
+    substeps = round(0.5 / abs(steps)) if abs(steps) > LAG_TOLERANCE else 0
+    if substeps > MOST_SUBSTEPS:
+        return NO_SCHEME
+    if not substeps:
+        return "set velocity_lag = 0.0"
+    is_of_substeps = abs(0.5 / substeps - abs(steps)) < LAG_TOLERANCE
+    return f"set self.velocity_lag = {math.copysign(0.5, steps):g} * dt" + (f" / {substeps}" if is_of_substeps and substeps > 1 else "")
+
+
+def check_waiting(engine: Engine) -> str:
+    """Most of the time of a run passes in `advance`, not in the first `state` after it, and a long call takes all of its steps."""
+    scene = accepted_scene(engine, "turning", "coasting", "falling straight")
+    with engine.prepare(scene, DT) as simulation:
+        _timed(simulation, 1)  # the first step may compile
+        steps, stepping, waiting = 64, 0.0, 0.0
+        while stepping + waiting < LONG_ENOUGH and steps < MOST_STEPS:
+            steps *= 4
+            stepping, waiting = _timed(simulation, steps)
+        # Other processes may delay a call now and then.
+        stepping, waiting = min([(stepping, waiting), *(_timed(simulation, steps) for _ in range(REPEATS))], key=lambda times: times[1])
+    if waiting > LARGEST_SHARE * (stepping + waiting) and waiting > LARGEST_SHARE * LONG_ENOUGH:
+        returned, took = (f"{rounded(1e3 * seconds, 2)} ms" for seconds in (stepping, waiting))
+        raise CheckFailed(
+            f"advance({steps}) returned after {returned}, and state() then took {took}: the steps were not done; wait for them in advance "
+            "(JAX: block_until_ready; Warp: synchronize)"
+        )
+    _verify_steps(engine, scene, steps)
+    return f"advance({steps}) returns when its steps are done"
+
+
+def _verify_steps(engine: Engine, scene: Scenario, steps: int) -> None:
+    """A long call ends where short calls end; a state that is read too early, or after fewer steps, is another."""
+    short_calls = [PIECE] * (steps // PIECE)
+    difference = relative_difference(state_after(engine, scene, [steps]), state_after(engine, scene, short_calls))
+    if not difference <= FAR:
+        raise CheckFailed(
+            f"the state after advance({steps}) is not that after {len(short_calls)} calls of advance({PIECE}), by {difference:.2g} of the "
+            "largest number: the long call takes fewer steps, or state() does not wait for them"
+        )
+
+
+def _timed(simulation: Simulation, steps: int) -> tuple[float, float]:
+    """The wall times of `advance`, and of the first `state` after it beyond that of the second one [s]."""
+    times = [time.perf_counter()]
+    for call in (lambda: simulation.advance(steps), simulation.state, simulation.state):
+        call()
+        times.append(time.perf_counter())
+    stepping, first, second = (later - earlier for earlier, later in pairwise(times))
+    return stepping, max(first - second, 0.0)
+
+
+def check_compilation(engine: Engine) -> str:
+    """An engine that compiles for long says so, and compiles a scene once."""
+    scene = accepted_scene(engine, "turning", "coasting", "falling straight")
+    first, second, other = (time_steps(engine, scene, DT, steps) for steps in (A_FEW_STEPS, A_FEW_STEPS, A_FEW_STEPS + 1))
+    later, compiling, again = second.whole, first.whole - second.whole, other.whole - second.whole
+    if not engine.compiles:
+        if compiling < MUCH:
+            return "the engine does not compile for long"
+        raise Noted(f"the first simulation takes {compiling:.2g} s longer than the second; set compiles = True")
+    found = f"a scene compiles in {max(compiling, 0.0):.2g} s; a simulation of {A_FEW_STEPS} steps then takes {rounded(1e3 * later, 2)} ms"
+    if again > 0.25 * compiling and again > MUCH / 10.0:  # the first simulation may compile for two numbers of steps, 1 and others
+        raise Noted(f"{found}; with another number of steps it compiles again, for {again:.2g} s")
+    return found

@@ -1,0 +1,171 @@
+"""Faults of parameters: of gravity, damping, mass and inertia, which show in flight, and of floor and shape, which show at an impact."""
+
+from collections.abc import Callable
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dropspin.comparisons.faults.conventions import CONVENTIONS
+from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, changed_table
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.bodies import Box
+from dropspin.scenarios.model import Gravity
+from dropspin.scenarios.variations import with_values
+
+Array = NDArray[np.float64]
+
+ORDERS = {order: ", ".join("xyz"[axis] for axis in order) for order in permutations(range(3)) if order != (0, 1, 2)}
+"""Other orders of the axes, and their names."""
+SLOW = 0.2  # m/s; Bullet drops restitution below it
+MULTIPLIES = "an engine that multiplies the values of two bodies needs 1 for the floor"
+AVERAGES = "an engine that averages the values of two bodies needs the scene's value on both"
+
+
+def _faults_of(about: str, faults: dict[str, Simulated]) -> list[FaultModel]:
+    """Faults of one thing in the scene that is simulated: a message and a change of the scene each."""
+    return [FaultModel(message, simulated, about=about) for message, simulated in faults.items()]
+
+
+def _gravity(change: Callable[[Array, float], Array]) -> Simulated:
+    """A change of gravity, by a function of the acceleration and of the mass."""
+
+    def changed(scene: Scenario) -> Scenario:
+        acceleration = tuple(float(value) for value in change(scene.acceleration, scene.body.mass))
+        return scene.model_copy(update={"gravity": Gravity(acceleration=acceleration)})
+
+    return changed
+
+
+def _angular_like_linear(scene: Scenario) -> Scenario:
+    return scene if scene.damping is None else with_values(scene, "damping", angular=scene.damping.linear)
+
+
+def _scaled_inertia(by: Callable[[float], float]) -> Simulated:
+    """Moments of inertia times a function of the mass."""
+    return lambda scene: with_values(scene, "body", inertia=tuple(by(scene.body.mass) * moment for moment in scene.body.moments))
+
+
+def _permuted_moments(order: tuple[int, ...]) -> Simulated:
+    return changed_table("body", inertia=lambda given: tuple(given[axis] for axis in order) if isinstance(given, tuple) else given)
+
+
+def _as_a_ball(scene: Scenario) -> Scenario:
+    """In flight, in which this is the motion without the gyroscopic term; in an impact it is another one."""
+    if scene.floor is not None:
+        return scene
+    mean = float(np.trace(scene.body.inertia_tensor)) / 3.0
+    return with_values(scene, "body", inertia=(mean, mean, mean))
+
+
+def _friction(change: Callable[[float], float]) -> Simulated:
+    """A changed coefficient; none and infinite stay."""
+    return changed_table("floor", friction=lambda mu: mu if isinstance(mu, str) else change(mu))
+
+
+def _permuted_extents(order: tuple[int, ...]) -> Simulated:
+    def permuted(scene: Scenario) -> Scenario:
+        if not isinstance(scene.body, Box):
+            return scene
+        extents = [scene.body.half_extents[axis] for axis in order]
+        return with_values(scene, "body", half_extents=extents, inertia=scene.body.moments)
+
+    return permuted
+
+
+def _scaled(size: str, by: float) -> Simulated:
+    """The radius of spheres or the half extents of boxes times a factor, with the same moments of inertia."""
+
+    def scaled(scene: Scenario) -> Scenario:
+        if scene.floor is None or size not in type(scene.body).model_fields:
+            return scene
+        larger = {size: lambda given: np.multiply(given, by).tolist()}
+        return with_values(scene, "body", inertia=scene.body.moments, **larger)
+
+    return scaled
+
+
+FAULT_MODELS = (
+    *CONVENTIONS,
+    *_faults_of(
+        "gravity",
+        {
+            "gravity is omitted": _gravity(lambda g, _: 0.0 * g),
+            "gravity has the opposite sign; the scene gives an acceleration, y up": _gravity(lambda g, _: -g),
+            "gravity is 9.81 m/s² along -y for every scene": _gravity(lambda g, _: 9.81 * np.array([0.0, -1.0, 0.0])),
+            "gravity is 9.81 m/s² along -z for every scene; y is up": _gravity(lambda g, _: 9.81 * np.array([0.0, 0.0, -1.0])),
+            "gravity acts along -z; y is up": _gravity(lambda g, _: np.linalg.norm(g) * np.array([0.0, 0.0, -1.0])),
+            "gravity acts along -y with the scene's magnitude; it is a vector": _gravity(
+                lambda g, _: np.linalg.norm(g) * np.array([0.0, -1.0, 0.0])
+            ),
+            "gravity's y and z appear to be swapped; y is up": _gravity(lambda g, _: g[[0, 2, 1]]),
+            "gravity appears to be given in a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, 1, -1]),
+            "gravity appears to be rotated into a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, -1, 1]),
+            "gravity is multiplied by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass),
+            "gravity is divided by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass**-1.0),
+            "gravity acts twice": _gravity(lambda g, _: 2.0 * g),
+        },
+    ),
+    *_faults_of(
+        "damping",
+        {
+            "damping is omitted": lambda scene: scene.model_copy(update={"damping": None}),
+            "angular damping is omitted": changed_table("damping", angular=0.0),
+            "linear damping is omitted": changed_table("damping", linear=0.0),
+            "linear damping acts on the angular velocity as well": _angular_like_linear,
+        },
+    ),
+    *_faults_of("mass", {"mass is 1 kg for every scene": changed_table("body", mass=1.0)}),
+    FaultModel(
+        "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball",
+        simulated=_as_a_ball,
+        is_peculiarity=True,
+        about="inertia",
+    ),
+    *_faults_of(
+        "inertia",
+        {
+            **{f"the moments of inertia appear to be permuted to ({named})": _permuted_moments(order) for order, named in ORDERS.items()},
+            "products of inertia are omitted: the body's own axes are not principal axes": _scaled_inertia(lambda mass: 1.0),
+            "inertia is twice as large": _scaled_inertia(lambda mass: 2.0),
+            "inertia is half as large": _scaled_inertia(lambda mass: 0.5),
+            "inertia is multiplied by the mass": _scaled_inertia(lambda mass: mass),
+            "inertia is divided by the mass": _scaled_inertia(lambda mass: 1.0 / mass),
+            "inertia is that of the solid shape for every scene": changed_table("body", inertia="solid"),
+        },
+    ),
+    *_faults_of("floor", {"the body falls through the floor": lambda scene: scene.model_copy(update={"floor": None})}),
+    *_faults_of(
+        "restitution",
+        {
+            "restitution is 0 for every scene": changed_table("floor", restitution=0.0),
+            "restitution is 1 for every scene": changed_table("floor", restitution=1.0),
+            f"restitution appears to be squared; {MULTIPLIES}": changed_table("floor", restitution=lambda e: e**2),
+            f"restitution appears to be halved; {AVERAGES}": changed_table("floor", restitution=lambda e: e / 2),
+            "restitution is the mean of the scene's value and 1": changed_table("floor", restitution=lambda e: (e + 1) / 2),
+            "restitution is 0 below a speed that the engine sets; the scene's rest_speed is 0": changed_table("floor", rest_speed=SLOW),
+        },
+    ),
+    *_faults_of(
+        "friction",
+        {
+            "friction is omitted": changed_table("floor", friction="none"),
+            "friction is infinite for every scene": changed_table("floor", friction="infinite"),
+            "friction is 0.5 for every scene": changed_table("floor", friction=0.5),
+            "friction is 1 for every scene": changed_table("floor", friction=1.0),
+            f"friction appears to be squared; {MULTIPLIES}": _friction(lambda mu: mu**2),
+            f"friction appears to be halved; {AVERAGES}": _friction(lambda mu: mu / 2),
+        },
+    ),
+    *_faults_of(
+        "size",
+        {
+            **{f"the box's extents appear to be permuted to ({named})": _permuted_extents(order) for order, named in ORDERS.items()},
+            "the sphere is half as large as it should be: is a radius read as a diameter?": _scaled("radius", 0.5),
+            "the sphere is twice as large as it should be: is a diameter read as a radius?": _scaled("radius", 2.0),
+            "the box is half as large as it should be: are half extents read as extents?": _scaled("half_extents", 0.5),
+            "the box is twice as large as it should be: are extents read as half extents?": _scaled("half_extents", 2.0),
+        },
+    ),
+)
+"""All faults of adapters that are known; earlier ones are preferred where several give the same motion."""

@@ -177,7 +177,7 @@ def test_mujoco_builds_the_floor_and_the_heavy_body_that_its_options_name():
     from mujoco import mjtGeom
 
     with engine("mujoco[beside=heavy,floor=mesh]").prepare(load("drop-box-edge"), DT) as simulation:
-        model, _ = simulation.built
+        model = simulation.model
     floor = model.geom("floor")
     assert floor.type[0] == mjtGeom.mjGEOM_MESH
     np.testing.assert_allclose(floor.pos, [0.0, -1e3, 0.0], atol=1e-9)

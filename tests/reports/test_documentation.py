@@ -14,7 +14,7 @@ from support.findings import PAGE, findings, heavy_engine, verify_findings
 
 import dropspin as ds
 from dropspin.reports.commands.main import dropspin
-from dropspin.scenarios import body, model
+from dropspin.scenarios import bodies, model
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "reference_impl" / "README.md"]
@@ -194,7 +194,7 @@ def public_members(kind):
 def test_page_on_adapters_documents_every_attribute_of_a_scene():
     """And no other; each once."""
     tables = {"start": [model.Start], "gravity": [model.Gravity], "floor": [model.Floor], "damping": [model.Damping]}
-    tables["body"] = [body.Sphere, body.Box, body.Vertices]
+    tables["body"] = [bodies.Sphere, bodies.Box, bodies.Vertices]
     parts = {f"{table}.{name}" for table, kinds in tables.items() for kind in kinds for name in public_members(kind)}
     [names] = rows_of("What a scene holds").values()
     assert sorted(names) == sorted(public_members(ds.Scenario) - {"start", "body"} | parts)

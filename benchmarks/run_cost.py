@@ -129,7 +129,7 @@ def run_cost(scenes: Sequence[ds.Scenario]) -> None:
             time_method(import_module(f"dropspin.comparisons.running.{module}"), name, stage)
     for module, name in (("engine_run", "record"), ("engine_run", "record_batch"), ("ensembles", "record_batch")):
         note_simulations(import_module(f"dropspin.comparisons.running.{module}"), name)
-    import_module("dropspin.comparisons.running.run").EngineProcesses = ProcessesHere
+    import_module("dropspin.comparisons.running.parallel").EngineProcesses = ProcessesHere
     ds.run(scenes[:1], "wang", jobs=1)  # compiles
     seconds.clear()
     simulated.clear()

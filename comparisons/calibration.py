@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, verify_time_step
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown, verify_accepted
 from dropspin.comparisons.running.start_phases import START_PHASES
-from dropspin.comparisons.running.verification import verified_refusal, verified_settings
+from dropspin.comparisons.running.verification import verified_settings
 from dropspin.scenarios import DropspinError, Scenario, load
 
 Array = NDArray[np.float64]
@@ -104,12 +104,12 @@ def calibrate(
     entry, scene = present_entry(engine), drop(restitution, friction, shape)
     verify_time_step(scene, dt)
     with EngineProcesses(resources) as processes:
-        try:
-            found = processes.call(entry, _calibrated, scene, dt)
-        except Failed as failure:
-            raise DropspinError(f"{entry.label} broke down with these settings: {failure.reason}.") from None
-    if isinstance(found, str):
-        raise DropspinError(f"{entry.label} {found}.")
+        found = processes.call(entry, _calibrated, scene, dt)
+    if isinstance(found, Breakdown):
+        what = "cannot be calibrated" if found.verdict == "declined" else "broke down with these settings"
+        raise DropspinError(f"{entry.label} {what}: {found.reason}.")
+    if found is None:
+        raise DropspinError(f"{entry.label} has no settings to calibrate; use mujoco or pybullet.")
     return found
 
 
@@ -127,15 +127,13 @@ def drop(restitution: float, friction: str | float = "none", shape: Shape = "bal
     )
 
 
-def _calibrated(entry: EngineEntry, scene: Scenario, dt: float) -> Calibration | str:
-    """The settings of the engine, the programs and their measurements, or the reason why there are none; runs in its process."""
+def _calibrated(entry: EngineEntry, scene: Scenario, dt: float) -> Calibration | None:
+    """The settings of the engine, the programs and their measurements; None if it has none; runs in its process."""
     engine = entry.adapter
-    refusal = verified_refusal(engine.refusal(scene))
-    if refusal is not None:
-        return f"cannot be calibrated: {refusal}"
+    verify_accepted(engine, scene)
     programs = engine.programs(scene, dt)
     if not programs:
-        return "has no settings to calibrate; use mujoco or pybullet"
+        return None
     with engine.prepare(scene, dt) as simulation:
         settings = verified_settings(simulation.settings)
     names: dict[str, Any] = {"__name__": "pasted"}

@@ -36,7 +36,7 @@ def uses_pybullet(item: pytest.Item) -> bool:
 def _timed_once():
     """Time the steps of engines once, not three times: no test asserts on a clock. Their processes are forked, and inherit it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("dropspin.comparisons.running.engine_run.TIMING_REPEATS", 1)
+        patch.setattr("dropspin.comparisons.running.timing.TIMING_REPEATS", 1)
         yield
 
 

@@ -10,10 +10,10 @@ from dropspin.comparisons.conformance.motions import check_motion
 from dropspin.comparisons.conformance.outcomes import CheckOutcome, CheckResult, NotPassed, described, whole_traceback
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.verification import BuildMismatch
 from dropspin.scenarios.errors import UnknownName
 
@@ -66,10 +66,10 @@ def conform(
     found = []
     with tempfile.TemporaryDirectory() as folder, EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
-            try:
-                found.append(processes.call(entry, _run_check, check, folder))
-            except Failed as failure:
-                found.append(CheckResult(check, cast(CheckOutcome, failure.verdict), failure.reason))
+            result = processes.call(entry, _run_check, check, folder)
+            if isinstance(result, Breakdown):
+                result = CheckResult(check, cast(CheckOutcome, result.verdict), result.reason)
+            found.append(result)
             if on_result is not None:
                 on_result(found[-1])
     return found

@@ -14,7 +14,7 @@ from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Not
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, accepted_scene, exact_solution, few_steps, recorded, state_after
 from dropspin.comparisons.conformance.protocol import relative_difference
 from dropspin.comparisons.engines.base import Engine, Simulation
-from dropspin.comparisons.running.recording import time_steps
+from dropspin.comparisons.running.timing import time_steps
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.rotations import angle_between_orientations
 from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY

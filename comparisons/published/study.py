@@ -8,11 +8,10 @@ from dropspin.comparisons.published.formulas import FORMULAS
 from dropspin.comparisons.published.quantities import quantity
 from dropspin.comparisons.published.results import ABSENT, SHOWN, Result, agreement
 from dropspin.comparisons.published.sources import Case, Group, Source, sources
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.running.recording import Breakdown, divergence, try_record
+from dropspin.comparisons.running.recording import Breakdown, finite, try_record
 from dropspin.scenarios import Scenario
 
 RESOURCES = ResourceLimits(processor_time=60.0)
@@ -54,24 +53,17 @@ def reproduce(
 
 def _measure(processes: EngineProcesses, entry: EngineEntry, source: Source, group: Group, dt: float) -> list[float] | Breakdown:
     """The quantities of a run in the engine's process."""
-    if entry.engine is None:
-        return Breakdown(entry.absence or "missing", entry.reason)
-    try:
-        return processes.call(entry, _measured, source.scene(group.scene), dt, group.quantities, group.since)
-    except Failed as failure:
-        return Breakdown(failure.verdict, failure.reason)
+    return processes.call(entry, _measured, source.scene(group.scene), dt, group.quantities, group.since)
 
 
-def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str], since: str) -> list[float] | Breakdown:
+def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str], since: str) -> list[float]:
     if since:
         with entry.adapter.prepare(scene, dt) as simulation:
             version = str(simulation.settings["version"])
         if numbers_of(version) < numbers_of(since):
-            return Breakdown("declined", f"it needs version {since} or later; {version} is installed")
-    recording = try_record(entry.adapter, scene, dt)
-    if isinstance(recording, Breakdown):
-        return recording
-    return divergence(recording.motion) or [quantity(name)(scene, recording.motion) for name in names]
+            raise Breakdown("declined", f"it needs version {since} or later; {version} is installed")
+    motion = finite(try_record(entry.adapter, scene, dt))
+    return [quantity(name)(scene, motion) for name in names]
 
 
 def _of_case(source: Source, group: Group, case: Case, measured: list[float] | Breakdown) -> Iterator[Result]:

@@ -21,13 +21,13 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.folder import sha256
 from dropspin.comparisons.results.provenance import STAMPED
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.running.recording import Breakdown, Recording, classify, divergence, record_batch, time_steps, try_record
+from dropspin.comparisons.running.recording import Breakdown, Recording, divergence, record, record_batch, verify_accepted
 from dropspin.comparisons.running.run import measure
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.comparisons.running.timing import time_steps
 from dropspin.scenarios import Scenario, load, truth_for
 
 Row = dict[str, Any]
@@ -66,10 +66,7 @@ def _rows(entry: EngineEntry, scenes: list[Scenario], dts: list[float], processe
 
 def _measured(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineProcesses) -> Iterator[Row]:
     """A row for each metric of one simulation; one row alone, with the reason, if there is no motion."""
-    try:
-        found = processes.call(entry, _simulated, scene, dt)
-    except Failed as failure:
-        found = Breakdown(failure.verdict, failure.reason)
+    found = processes.call(entry, _simulated, scene, dt)
     if isinstance(found, Breakdown):
         yield {"verdict": found.verdict, "reason": found.reason}
         return
@@ -84,18 +81,14 @@ def _measured(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineP
         yield hashed | (band if metric == leading_metric(scene) else {}) | of_metric
 
 
-def _simulated(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Recording, Row, Row] | Breakdown:
+def _simulated(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Recording, Row, Row]:
     """A motion, the range of the leading error over start phases, and the cost of the steps; runs in the engine's process."""
     engine = entry.adapter
-    recording = try_record(engine, scene, dt)
-    if isinstance(recording, Breakdown):
-        return recording
+    verify_accepted(engine, scene)
+    recording = record(engine, scene, dt)
     if divergence(recording.motion) is not None:
         return recording, {}, {}
-    try:
-        return recording, range_over_phases(engine, scene, dt), costs(engine, scene, dt)
-    except Exception as error:  # whatever an engine raises costs its own row only
-        return classify(error)
+    return recording, range_over_phases(engine, scene, dt), costs(engine, scene, dt)
 
 
 def range_over_phases(engine: Engine, scene: Scenario, dt: float) -> Row:

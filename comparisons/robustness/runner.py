@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,10 @@ from dropspin.comparisons.robustness.failure_modes import (
     held_speeds,
     worst,
 )
-from dropspin.comparisons.robustness.operating_point import OperatingPoint
-from dropspin.comparisons.robustness.transformations import in_nominal_units
-from dropspin.comparisons.running.engine_process import Failed
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_nominal_units
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown, Recording, try_record
+from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
 from dropspin.comparisons.running.start_phases import start_phases
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import RATES
@@ -49,59 +48,84 @@ SAME_MOTION = 1e-6
 Diagnose = Callable[[float], Diagnosis]
 
 
+@dataclass(frozen=True)
 class Runner:
-    """An engine in its process, and the tolerance with which it is judged."""
+    """An engine in its process, the scene and time step of which a quantity is varied, and the tolerance of its errors.
 
-    def __init__(self, entry: EngineEntry, within: float, processes: EngineProcesses) -> None:
-        self.label = entry.label
-        self._entry, self._within, self._processes = entry, within, processes
+    Attributes:
+        entry: The engine.
+        nominal: The scene and the time step.
+        within: The largest error that counts as accurate.
+        processes: The engine's process.
+        report: Called with a description of each run.
+    """
 
-    def along(self, nominal: OperatingPoint, axis: Axis) -> Diagnose:
+    entry: EngineEntry
+    nominal: OperatingPoint
+    within: float
+    processes: EngineProcesses
+    report: Callable[[str], None] = ignore
+
+    def along(self, axis: Axis) -> Diagnose:
         """The function from a value on an axis to a diagnosis."""
         if axis.name == "duration":
-            return _AlongDuration(self, nominal, axis)
-        unscaled = _Unscaled(self, nominal, axis) if axis.invariant else None
+            return self._along_duration(axis)
+        if axis.invariant:
+            unscaled, own = self._diagnosis(self.nominal), self._record([self.nominal.scene], self.nominal.dt, extend=False)
 
         def diagnose_at(value: float) -> Diagnosis:
             try:
-                moved = axis.at(nominal, value)
+                moved = axis.at(self.nominal, value)
             except DropspinError as error:
-                return _without_value("declined", str(error))
-            found = self.diagnosis(moved)
-            if unscaled is None or found.mode != unscaled.diagnosis.mode or found.mode in BROKEN:
+                return _without_motion(Breakdown("declined", str(error)))
+            found = self._diagnosis(moved)
+            if not axis.invariant or found.mode != unscaled.mode or found.mode in BROKEN:
                 return found
-            return unscaled.compare(moved, value)
+            other = self._record([moved.scene], moved.dt, extend=False)
+            if isinstance(own, Breakdown) or isinstance(other, Breakdown):
+                return unscaled
+            return self._dependence(axis, value, own[0], moved.scene, other[0])
 
         return diagnose_at
 
-    def diagnosis(self, point: OperatingPoint, extend: bool = True) -> Diagnosis:
+    def _along_duration(self, axis: Axis) -> Diagnose:
+        """Diagnoses of durations: the initial values are run, and those between them are beginnings of a longer run."""
+        nominal = self._diagnosis(self.nominal, extend=False)
+        runs: dict[float, list[Trajectory] | Breakdown] = {}
+
+        def diagnose_at(duration: float) -> Diagnosis:
+            scene, dt = axis.at(self.nominal, duration)
+            longer = [length for length in runs if length >= duration]
+            if not longer:
+                runs[duration] = self._record([scene], dt, extend=False)
+            found = runs[min(longer, default=duration)]
+            if isinstance(found, Breakdown):
+                return _without_motion(found)
+            interval = float(found[0].t[1] - found[0].t[0])
+            beginning = found[0][: 1 + math.floor(duration / interval + 1e-9)]
+            return worst([nominal, self._of_motions([ExtendedMotion(scene, dt, beginning, beginning, truth_for(scene))])])
+
+        return diagnose_at
+
+    def _diagnosis(self, point: OperatingPoint, extend: bool = True) -> Diagnosis:
         """The most severe diagnosis of a scene at a time step, over its start phases, and beyond its end if `extend`."""
         scene, dt = point
         phases = start_phases(scene, truth_for(scene), dt)
         starts = STARTS if scene.steps(dt) <= MOST_STEPS_PER_START else 1
-        some = phases[:: max(1, len(phases) // starts)]
-        recordings = self.record([phase.scene for phase in some], dt, extend)
-        if isinstance(recordings, Diagnosis):
-            return recordings
-        motions = [_extended(phase.scene, dt, one) for phase, one in zip(some, recordings, strict=True)]
-        return worst([diagnose(one, self._within) for one in motions] + self._clamps(point, motions[0]))
+        scenes = [phase.scene for phase in phases[:: max(1, len(phases) // starts)]]
+        motions = self._record(scenes, dt, extend)
+        if isinstance(motions, Breakdown):
+            return _without_motion(motions)
+        return self._of_motions([_extended(start, dt, motion) for start, motion in zip(scenes, motions, strict=True)])
 
-    def record(self, scenes: Sequence[Scenario], dt: float, extend: bool = True) -> "list[Recording] | Diagnosis":
+    def _record(self, scenes: Sequence[Scenario], dt: float, extend: bool = True) -> list[Trajectory] | Breakdown:
         """The engine's motions of scenes, or the reason why there are none."""
-        try:
-            return self._processes.call(self._entry, _record, scenes, dt, extend)
-        except Failed as failure:
-            return _without_value("timed_out" if failure.verdict == "timed_out" else "crashed", failure.reason)
+        return self.processes.call(self.entry, _recorded, scenes, dt, extend)
 
-    def beginning(self, point: OperatingPoint, recording: Recording) -> Diagnosis:
-        """The diagnosis of the beginning of a longer motion."""
-        interval = float(recording.motion.t[1] - recording.motion.t[0])
-        rows = 1 + math.floor(point.scene.duration / interval + 1e-9)
-        cut = replace(recording, motion=recording.motion[:rows], continuation=recording.continuation[:0])
-        motion = _extended(point.scene, point.dt, cut)
-        return worst([diagnose(motion, self._within), *self._clamps(point, motion)])
+    def _of_motions(self, motions: Sequence[ExtendedMotion]) -> Diagnosis:
+        return worst([*(diagnose(motion, self.within) for motion in motions), *self._clamps(motions[0])])
 
-    def _clamps(self, point: OperatingPoint, motion: ExtendedMotion) -> list[Diagnosis]:
+    def _clamps(self, motion: ExtendedMotion) -> list[Diagnosis]:
         """Speeds that are clamped: they are cut off, and have the same value from another initial state."""
         scene = motion.scene
         stays = scene.floor is not None and not scene.starts_above_floor and not any(scene.start.velocity)
@@ -111,76 +135,41 @@ class Runner:
         state[RATES] *= OTHER_START
         state[1] += (OTHER_START - 1.0) * (scene.clearance if scene.floor is not None else 0.0)
         other = scene.starting_at(state)
-        recordings = self.record([other], point.dt)
-        return [] if isinstance(recordings, Diagnosis) else clamped(motion.whole, _extended(other, point.dt, recordings[0]).whole)
+        motions = self._record([other], motion.dt)
+        return [] if isinstance(motions, Breakdown) else clamped(motion.whole, motions[0])
 
-
-class _Unscaled:
-    """The scene at its nominal scale, whose motion every other scale should reproduce in scaled units."""
-
-    def __init__(self, runner: Runner, nominal: OperatingPoint, axis: Axis) -> None:
-        self.diagnosis = runner.diagnosis(nominal)
-        self._runner, self._nominal, self._axis = runner, nominal, axis
-        self._recordings = runner.record([nominal.scene], nominal.dt)
-
-    def compare(self, moved: OperatingPoint, value: float) -> Diagnosis:
-        """Whether the scaled motion equals the nominal one, up to the end of the exact solution."""
-        recordings = self._runner.record([moved.scene], moved.dt)
-        if isinstance(recordings, Diagnosis) or isinstance(self._recordings, Diagnosis):
-            return self.diagnosis
-        scene = self._nominal.scene
-        own, other = self._recordings[0].motion, recordings[0].motion
-        found = in_nominal_units(other.states, self._axis.name, self._axis.base(self._nominal), value)
+    def _dependence(self, axis: Axis, value: float, own: Trajectory, moved: Scenario, other: Trajectory) -> Diagnosis:
+        """Whether the motion of a scaled scene equals the nominal one in its units, up to the end of the exact solution."""
+        scene = self.nominal.scene
+        found = in_nominal_units(other.states, axis.name, axis.base(self.nominal), value)
         rows = min(len(own), len(found))
-        for truth, times in ((truth_for(scene), own.t[:rows]), (truth_for(moved.scene), other.t[:rows])):
+        for truth, times in ((truth_for(scene), own.t[:rows]), (truth_for(moved), other.t[:rows])):
             if truth is not None:
                 rows = min(rows, int(np.count_nonzero(truth.covers(times))))
         difference = float(differences(scene, own.states[:rows], found[:rows]).max())
         if difference <= SAME_MOTION:
             return SOUND
-        message = f"the motion differs from the one at the nominal {self._axis.name} by {difference:.1e} of its sizes and speeds"
-        return Diagnosis("inaccurate", f"depends on {self._axis.name}", difference, message)
+        message = f"the motion differs from the one at the nominal {axis.name} by {difference:.1e} of its sizes and speeds"
+        return Diagnosis("inaccurate", f"depends on {axis.name}", difference, message)
 
 
-class _AlongDuration:
-    """Diagnoses of durations: the initial values are run, and those between them are beginnings of a longer run."""
-
-    def __init__(self, runner: Runner, nominal: OperatingPoint, axis: Axis) -> None:
-        self._runner, self._nominal, self._axis = runner, nominal, axis
-        self._beginning = runner.diagnosis(nominal, extend=False)
-        self._runs: dict[float, Recording | Diagnosis] = {}
-
-    def __call__(self, duration: float) -> Diagnosis:
-        moved = self._axis.at(self._nominal, duration)
-        longer = [length for length in self._runs if length >= duration]
-        if not longer:
-            recordings = self._runner.record([moved.scene], moved.dt, extend=False)
-            self._runs[duration] = recordings if isinstance(recordings, Diagnosis) else recordings[0]
-        found = self._runs[min(longer, default=duration)]
-        return found if isinstance(found, Diagnosis) else worst([self._beginning, self._runner.beginning(moved, found)])
-
-
-def _extended(scene: Scenario, dt: float, recording: Recording) -> ExtendedMotion:
-    """A recorded motion as a `Motion`: for the duration of the scene, and as a whole."""
-    own, more = recording.motion, recording.continuation
-    times, states = np.concatenate([own.t, more.t]), np.concatenate([own.states, more.states])
-    return ExtendedMotion(scene, dt, own, Trajectory.from_states(times, states, own.velocity_lag), truth_for(scene))
-
-
-def _without_value(mode: FailureMode, reason: str) -> Diagnosis:
-    return Diagnosis(mode, mode, math.nan, reason)
-
-
-def _record(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend: bool) -> list[Recording] | Diagnosis:
-    """The engine's motions of scenes, or the reason why there are none; runs in the engine's process."""
+def _recorded(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend: bool) -> list[Trajectory]:
+    """The engine's motions of scenes, beyond their end if `extend`; runs in the engine's process."""
     found = []
     for scene in scenes:
+        verify_accepted(entry.adapter, scene)
         steps = scene.steps(dt)
         extra = max(0, FEWEST_STEPS_WITHOUT_GRAVITY - steps) if extend and scene.gravity is None else 0
-        recording = try_record(entry.adapter, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra)
-        if isinstance(recording, Breakdown):
-            if recording.verdict == "diverged":
-                return Diagnosis("diverged", "gave up", math.inf, recording.reason)
-            return _without_value("declined" if recording.verdict == "declined" else "crashed", recording.reason)
-        found.append(recording)
+        found.append(record(entry.adapter, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra).motion)
     return found
+
+
+def _extended(scene: Scenario, dt: float, motion: Trajectory) -> ExtendedMotion:
+    """A recorded motion: for the duration of the scene, and as a whole."""
+    return ExtendedMotion(scene, dt, motion[: 1 + scene.steps(dt)], motion, truth_for(scene))
+
+
+def _without_motion(breakdown: Breakdown) -> Diagnosis:
+    if breakdown.verdict == "diverged":
+        return Diagnosis("diverged", "gave up", math.inf, breakdown.reason)
+    return Diagnosis(cast(FailureMode, breakdown.verdict), breakdown.verdict, math.nan, breakdown.reason)

@@ -1,17 +1,24 @@
-"""The study of the command `dropspin limits`: engines along every axis of a scene."""
+"""The study of the command `dropspin limits`: engines along every axis of a scene.
+
+An axis is scanned at its initial values, then by bisection between different failure modes. Which value comes next follows from the
+diagnoses so far, so the scan is a loop.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import product, takewhile
+from itertools import groupby, pairwise, product, takewhile
+from typing import Annotated
+
+from pydantic import Field, PlainSerializer, PlainValidator
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.robustness.axes import AXES, Axis
+from dropspin.comparisons.robustness.failure_modes import Diagnosis, FailureMode
 from dropspin.comparisons.robustness.operating_point import OperatingPoint
-from dropspin.comparisons.robustness.runner import Runner
-from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint, refine, scan_axis
-from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from dropspin.comparisons.robustness.runner import MOST_STEPS_PER_START, Runner
+from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry, SceneLike, as_scene, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.scenarios import DropspinError, Scenario
@@ -40,6 +47,58 @@ DT = 5e-3  # s
 WITHIN = 0.1
 RESOURCES = ResourceLimits(processor_time=60.0)
 ACCURATE, STABLE = ("sound",), ("sound", "inaccurate")
+
+NEAR = 1.03
+"""Largest ratio of the two values of a transition."""
+MOST_TRANSITIONS = 3
+"""Largest number of transitions between two initial values; more of them would be due to chance."""
+UNSTEADY = "timed_out"
+"""The failure mode whose transitions are not bisected, because they depend on the machine."""
+MOST_HALVINGS = 6
+FINAL = frozenset({"sound", "declined", "crashed", "timed_out"})
+"""Failure modes after which no smaller time step is tried."""
+
+
+@dataclass(frozen=True)
+class ScanPoint:
+    """The diagnosis of an engine at one value of an axis."""
+
+    value: Annotated[float, Field(allow_inf_nan=False)]
+    diagnosis: Diagnosis
+
+    @property
+    def mode(self) -> FailureMode:
+        """The failure mode."""
+        return self.diagnosis.mode
+
+
+@dataclass(frozen=True)
+class AxisScan:
+    """The scan of an engine along an axis: its diagnoses in the order of their values; `base` is the nominal value."""
+
+    axis: Annotated[
+        Axis, PlainValidator(lambda axis: AXES[axis] if isinstance(axis, str) else axis), PlainSerializer(lambda axis: axis.name)
+    ]
+    engine: str
+    base: float
+    points: tuple[ScanPoint, ...]
+
+    @property
+    def nominal(self) -> ScanPoint:
+        """The diagnosis at the nominal value."""
+        return next(point for point in self.points if point.value == self.base)
+
+    @property
+    def transitions(self) -> list[tuple[ScanPoint, ScanPoint]]:
+        """The pairs of neighbours between which the failure mode changes."""
+        return [(first, second) for first, second in pairwise(self.points) if first.mode != second.mode]
+
+    @property
+    def sound_range(self) -> tuple[int, int] | None:
+        """The indices of the first and the last value of the sound range around the nominal value; None if that value is not sound."""
+        by_mode = groupby(range(len(self.points)), lambda number: self.points[number].mode == "sound")
+        ranges = [list(numbers) for is_sound, numbers in by_mode if is_sound]
+        return next(((numbers[0], numbers[-1]) for numbers in ranges if self.points.index(self.nominal) in numbers), None)
 
 
 @dataclass(frozen=True)
@@ -114,20 +173,18 @@ def find_limits(
     if not 0.0 < within < math.inf:
         raise DropspinError(f"within: got {within!r}; give a number above 0, a ratio or an angle in radians.")
     chosen = _axes(scene, tuple(dict.fromkeys(axes)))
-    named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
-    entries = list({one.label: one for one in named}.values())
+    entries = engine_entries(engines, IN_FLIGHT if scene.floor is None else ON_A_FLOOR)
     left_out = {one.label: one.reason for one in entries if one.engine is None}
     present = [one for one in entries if one.engine is not None]
     nominal, callback = OperatingPoint(scene, dt), on_progress or ignore
 
     def refined(entry: EngineEntry, processes: EngineProcesses, report: Callable[[str], None]) -> tuple[ScanPoint, ...]:
-        return refine(Runner(entry, within, processes), nominal, lambda value: report(f"{entry.label}, dt {value:.3g}"))
+        return refine(Runner(entry, nominal, within, processes, report))
 
     def scanned(piece: tuple[EngineEntry, Axis], processes: EngineProcesses, report: Callable[[str], None]) -> AxisScan:
         entry, axis = piece
         known = refinements[entry.label] if axis.name == "step" else ()
-        runner = Runner(entry, within, processes)
-        return scan_axis(runner, nominal, axis, on_progress=lambda value: report(f"{entry.label}, {axis.name} {value:.3g}"), known=known)
+        return scan_axis(Runner(entry, nominal, within, processes, report), axis, known=known)
 
     pieces = list(product(present, chosen))
     with started_crews(jobs, len(pieces), present, resources) as crews:
@@ -147,3 +204,46 @@ def _axes(scene: Scenario, names: Sequence[str]) -> list[Axis]:
             has = ", ".join(axis.name for axis in AXES.values() if axis.applies(scene))
             raise DropspinError(f"axis {name!r}: {scene.name} does not have it; it has {has}.")
     return [AXES[name] for name in names] if names else [axis for axis in AXES.values() if axis.applies(scene)]
+
+
+def refine(runner: Runner) -> tuple[ScanPoint, ...]:
+    """The diagnoses of an engine at the nominal time step and at repeated halves of it, until it is sound; at most `MOST_HALVINGS`.
+
+    With a floor every step is recorded, because impacts can only be judged from all steps.
+    """
+    scene, dt = runner.nominal
+    diagnose = runner.along(AXES["step"])
+    most = MOST_STEPS if scene.floor is None else MOST_STEPS_PER_START
+    points: list[ScanPoint] = []
+    for smaller in (dt / 2**halving for halving in range(1 + MOST_HALVINGS)):
+        if points and (scene.duration / smaller > most or points[-1].mode in FINAL):
+            break
+        points.append(ScanPoint(smaller, diagnose(smaller)))
+        runner.report(f"{runner.entry.label}, dt {smaller:.3g}")
+    return tuple(points)
+
+
+def scan_axis(runner: Runner, axis: Axis, near: float = NEAR, known: Sequence[ScanPoint] = ()) -> AxisScan:
+    """Scan an axis with an engine: the initial values, then bisection between different failure modes; with diagnoses that are `known`."""
+    base, diagnose = axis.base(runner.nominal), runner.along(axis)
+    points = {one.value: one for one in known}
+
+    def point(value: float) -> ScanPoint:
+        if value not in points:
+            points[value] = ScanPoint(value, diagnose(value))
+            runner.report(f"{runner.entry.label}, {axis.name} {value:.3g}")
+        return points[value]
+
+    first = [point(value) for value in sorted({*axis.values(runner.nominal), base, *points})]
+    for start, high in pairwise(first):
+        low = start
+        for _ in range(MOST_TRANSITIONS):
+            if low.mode == high.mode or UNSTEADY in (low.mode, high.mode):
+                break
+            # Bisect to the value at which the failure mode of the lower point ends, and continue from there.
+            below, above = low, high
+            while (middle := axis.between(below.value, above.value, near)) is not None:
+                found = point(middle)
+                below, above = (found, above) if found.mode == low.mode else (below, found)
+            low = above
+    return AxisScan(axis, runner.entry.label, base, tuple(points[value] for value in sorted(points)))

@@ -15,32 +15,18 @@ from typing import Any
 
 from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.base import EngineBroken
-from dropspin.comparisons.engines.exceptions import described
 from dropspin.comparisons.engines.registry import constructed
 from dropspin.comparisons.engines.stand_in import StandIn
-from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import classify
 from dropspin.scenarios import Scenario
 
 PROCESSES = Path("/proc")
 
 
-class Failed(Exception):
-    """Work that did not finish: the verdict and the reason."""
-
-    def __init__(self, verdict: Verdict, reason: str) -> None:
-        super().__init__(verdict, reason)
-        self.verdict, self.reason = verdict, reason
-
-    def __str__(self) -> str:
-        return self.reason
-
-
-_busy: list["ctypes.c_long"] = []
-"""The shared number in which this process, the leader of its group, writes its process id while it works."""
-_counts: list["ctypes.Array[ctypes.c_long]"] = []
-"""The shared numbers of simulations that this process has done and is to do."""
+_shared: list["ctypes.Array[ctypes.c_long]"] = []
+"""Numbers that the parent reads: the id of this process, the leader of its group, since it works; simulations done and to do."""
 _entry: list[EngineEntry] = []
 """The engine of this process; empty in the parent."""
 
@@ -49,16 +35,15 @@ def run_and_count(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequen
     """Run a scene with an engine in this process, and share the numbers of simulations with the parent."""
 
     def on_simulations(done: int, total: int) -> None:
-        _counts[0][:] = [done, total]
+        _shared[0][1:] = [done, total]
 
     return run_engine(entry, scene, dt, starts, on_simulations, quick=quick)
 
 
-def start_process(entry: EngineEntry, memory: int, process: "ctypes.c_long", counts: "ctypes.Array[ctypes.c_long]") -> None:
+def start_process(entry: EngineEntry, memory: int, shared: "ctypes.Array[ctypes.c_long]") -> None:
     """Start a process: drop its output, leave interrupts to the parent, limit its memory."""
     _entry.append(entry)
-    _busy.append(process)
-    _counts.append(counts)
+    _shared.append(shared)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # by which the parent ends it, even if the parent handles its own
     faulthandler.disable()
@@ -94,12 +79,8 @@ def _end_with_parent() -> None:
 
 
 def call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:
-    """Call a function with this process's engine, within a limit of processor time [s].
-
-    Raises:
-        Failed: The engine cannot be constructed, or the function raised.
-    """
-    _busy[0].value = os.getpgrp() if hasattr(os, "getpgrp") else os.getpid()  # not a child that the engine forked
+    """Call a function with this process's engine, within a limit of processor time [s]; what it or the construction raises is returned."""
+    _shared[0][0] = os.getpgrp() if hasattr(os, "getpgrp") else os.getpid()  # not a child that the engine forked
     if sys.platform == "linux":
         import resource
 
@@ -107,11 +88,10 @@ def call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) 
         until = int(used.ru_utime + used.ru_stime + processor_time) + 1
         resource.setrlimit(resource.RLIMIT_CPU, (until, resource.RLIM_INFINITY))
     try:
-        if not _entry[0].absence:
-            _entry[0] = _constructed(_entry[0])
+        _entry[0] = _constructed(_entry[0])
         return work(_entry[0], *given)
-    except BaseException as error:  # an engine is somebody else's code; sys.exit() or an interrupt that it raises is not the user's
-        raise Failed("crashed", described(error)) from None
+    except BaseException as error:  # sys.exit() or an interrupt that an engine raises is not the user's
+        return classify(error)
 
 
 def _constructed(entry: EngineEntry) -> EngineEntry:

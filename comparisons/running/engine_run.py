@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,15 +12,11 @@ from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.tolerances import perturbed
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
 from dropspin.comparisons.running.ensembles import run_ensemble
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.progress import OnSimulations
-from dropspin.comparisons.running.recording import Breakdown, classify, record, record_batch, time_steps
-from dropspin.comparisons.running.verification import verified_claims, verified_predictions, verified_refusal
+from dropspin.comparisons.running.recording import Breakdown, classify, record, record_batch, verify_accepted
+from dropspin.comparisons.running.verification import verified_claims, verified_predictions
 from dropspin.scenarios import Scenario, Trajectory, truth_for
-
-TIMING_REPEATS = 3
-LONG_ENOUGH = 0.01
-"""A simulation that takes this long is timed once [s]: it has hundreds of steps, and engines are compared over many scenes."""
 
 
 @dataclass
@@ -61,7 +57,7 @@ def run_engine(
     scene: Scenario,
     dt: float,
     starts: Sequence[Scenario],
-    on_simulations: OnSimulations = lambda done, total: None,
+    on_simulations: OnSimulations = ignore,
     *,
     quick: bool = False,
 ) -> EngineRun:
@@ -75,16 +71,9 @@ def run_engine(
         on_simulations: Called after each simulation.
         quick: Whether perturbed starts are run only where verdicts need them, in single precision, and few members of an ensemble.
     """
-    engine, found = entry.engine, EngineRun(entry.label)
-    if entry.absence:
-        found.breakdown = Breakdown(entry.absence, entry.reason)
-        return found
-    assert engine is not None
+    engine, found = entry.adapter, EngineRun(entry.label)
     try:
-        refusal = verified_refusal(engine.refusal(scene))
-        if refusal is not None:
-            found.breakdown = Breakdown("declined", refusal)
-            return found
+        verify_accepted(engine, scene)
         found.discretisation, found.order, found.precision = verified_claims(engine, scene)
         sets = [] if quick and found.precision is np.float64 else perturbed(scene, starts, found.precision)
         others = [*(starts if len(starts) > 1 else []), *chain(*sets)]
@@ -102,40 +91,6 @@ def run_engine(
     except Exception as error:  # whatever an engine raises costs its own row only
         found.breakdown = classify(error)
     return found
-
-
-class Timing(NamedTuple):
-    """The time that an engine's steps take.
-
-    Attributes:
-        per_step: The least wall time of a native step [s].
-        compilation: What the first simulation took longer than later ones [s]; 0 for an engine that does not compile.
-        breakdown: Why there is no time; None if there is one, or if the engine cannot take part or declines the scene.
-        ended: Whether the engine's process ended.
-        in_batches: Whether the engine can step many starts together.
-    """
-
-    per_step: float = float("nan")
-    compilation: float = 0.0
-    breakdown: Breakdown | None = None
-    ended: bool = False
-    in_batches: bool = False
-
-
-def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
-    """Time whole simulations of a scene, native steps only, and compilation apart; a failure is part of the result."""
-    engine, steps = entry.adapter, scene.steps(dt)
-    try:
-        if verified_refusal(engine.refusal(scene)) is not None:
-            return Timing()
-        first = time_steps(engine, scene, dt, steps) if engine.compiles else None
-        timed = [time_steps(engine, scene, dt, steps)]
-        while len(timed) < TIMING_REPEATS and min(one.stepping for one in timed) < LONG_ENOUGH:
-            timed.append(time_steps(engine, scene, dt, steps))
-    except Exception as error:  # whatever an engine raises costs its own row only
-        return Timing(breakdown=classify(error))
-    compilation = 0.0 if first is None else max(first.whole - min(one.whole for one in timed), 0.0)
-    return Timing(min(one.per_step for one in timed), compilation, in_batches=engine.steps_batches)
 
 
 def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:

@@ -18,13 +18,14 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
-from dropspin.comparisons.running.engine_run import EngineRun, Timing
+from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.measured import breakdown_of, compare, measure, phases_at
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress, Progress, reporter
 from dropspin.comparisons.running.start_phases import StartPhase
+from dropspin.comparisons.running.timing import Timing
 
 FEWEST_STEPS = 8
 """A run of fewer steps is not worth adding."""

@@ -1,20 +1,19 @@
 """From the names of engines to entries of a run: an engine of one's own is imported and constructed in a process of its own only."""
 
 import sys
-from typing import Literal
+from collections.abc import Iterable, Sequence
 
 from dropspin.comparisons.engines.base import Engine, EngineBroken, EngineMissing
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.engines.registry import is_foreign, parsed
 from dropspin.comparisons.engines.stand_in import Traits, stand_in, traits
-from dropspin.comparisons.running.engine_process import Failed
-from dropspin.comparisons.running.inputs import EngineEntry, described_value
+from dropspin.comparisons.running.inputs import EngineEntry, described_value, several
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 
 CONSTRUCTION = ResourceLimits(processor_time=60.0)
 """What the import and the construction of an engine may use."""
-Refusal = tuple[Literal["missing", "broken", "wrong"], str]
 
 
 def engine_entry(engine: Engine | str, resources: ResourceLimits = CONSTRUCTION) -> EngineEntry:
@@ -33,13 +32,15 @@ def engine_entry(engine: Engine | str, resources: ResourceLimits = CONSTRUCTION)
         raise DropspinError(f"engine: got {described_value(engine)}; give a name such as 'mujoco', or an Engine.")
     name = engine.strip()
     try:
-        base, _ = parsed(name)
-        found = _stand_in(name, resources) if is_foreign(base) else engine_named(name)
-    except EngineMissing as error:
-        return EngineEntry(name, None, "missing", str(error))
-    except EngineBroken as error:
-        return EngineEntry(name, None, "broken", str(error))
+        found = _stand_in(name, resources) if is_foreign(parsed(name)[0]) else engine_named(name)
+    except (EngineMissing, EngineBroken) as error:
+        return EngineEntry(name, None, "missing" if isinstance(error, EngineMissing) else "broken", str(error))
     return EngineEntry(found.label, found)
+
+
+def engine_entries(engines: Engine | str | Iterable[Engine | str], default: Sequence[str] = ()) -> list[EngineEntry]:
+    """One engine or several, or default ones if none is given, each once."""
+    return list({entry.label: entry for entry in map(engine_entry, several("engines", engines) or default)}.values())
 
 
 def present_entry(engine: Engine | str) -> EngineEntry:
@@ -59,24 +60,20 @@ def present_entry(engine: Engine | str) -> EngineEntry:
 def _stand_in(name: str, resources: ResourceLimits) -> Engine:
     """The stand-in of an engine of one's own, described in a process of its own."""
     with EngineProcesses(resources) as processes:
-        try:
-            found = processes.call(EngineEntry(name, None), _describe, name)
-        except Failed as failure:
-            raise EngineBroken(f"{name} cannot be used: its import or construction failed: {failure.reason}.") from None
-    if isinstance(found, Traits):
-        return stand_in(found)
-    kind, text = found
-    raise {"missing": EngineMissing, "broken": EngineBroken, "wrong": DropspinError}[kind](text)
+        found = processes.call(EngineEntry(name, None), _describe, name)
+    if isinstance(found, Breakdown):
+        raise EngineBroken(f"{name} cannot be used: its import or construction failed: {found.reason}.")
+    if isinstance(found, DropspinError):
+        raise found
+    return stand_in(found)
 
 
-def _describe(entry: EngineEntry, name: str) -> Traits | Refusal:
+def _describe(entry: EngineEntry, name: str) -> Traits | DropspinError:
     """In a process of its own: what an engine states of itself, or why it cannot take part."""
     before = frozenset(sys.modules)
     try:
         return traits(parsed(name)[0], engine_named(name), frozenset(sys.modules) - before)
-    except EngineMissing as error:
-        return "missing", str(error)
-    except EngineBroken as error:
-        return "broken", str(error)
-    except DropspinError as error:
-        return "wrong", str(error)
+    except (EngineMissing, EngineBroken) as error:
+        return type(error)(str(error))
+    except DropspinError as error:  # of a type that may need more than a text
+        return DropspinError(str(error))

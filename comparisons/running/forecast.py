@@ -8,9 +8,9 @@ import numpy as np
 
 from dropspin.comparisons.measuring.tolerances import SETS_OF_STARTS, SIGNS
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
-from dropspin.comparisons.running.engine_run import Timing
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.start_phases import StartPhase, number_of_phases
+from dropspin.comparisons.running.timing import Timing
 
 MEASURING = 1e-5
 """Time to record and measure a step [s], beyond that of the step; 2 to 24 µs with wang, mujoco and pybullet."""

@@ -89,6 +89,19 @@ def as_scene(scene: SceneLike) -> Scenario:
         raise
 
 
+def as_scenes(scenes: SceneLike | Iterable[SceneLike], default: Iterable[str] = ()) -> list[Scenario]:
+    """One scene or several, or default ones if none is given.
+
+    Raises:
+        DropspinError: There is no such scene, or two have the same name.
+    """
+    chosen = [as_scene(scene) for scene in several("scenes", scenes) or default]
+    names = [scene.name for scene in chosen]
+    if len(set(names)) < len(names):
+        raise DropspinError(f"two scenes have the same name ({', '.join(names)}); rename a file, or give a mapping a 'name'.")
+    return chosen
+
+
 def verify_time_step(scene: Scenario, dt: float) -> None:
     """Raise `DropspinError` unless a scene is a sensible number of steps of dt [s]."""
     if isinstance(dt, bool) or not isinstance(dt, int | float | np.floating):

@@ -23,9 +23,9 @@ from pebble import ProcessExpired, ProcessPool
 from dropspin.comparisons.engines.exceptions import described
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
-from dropspin.comparisons.running.engine_process import PROCESSES, Failed, call, memory_for_data, run_and_count, start_process
-from dropspin.comparisons.running.engine_run import EngineRun, run_engine
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.engine_process import PROCESSES, call, memory_for_data, run_and_count, start_process
+from dropspin.comparisons.running.engine_run import EngineRun
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError, Scenario
@@ -82,8 +82,7 @@ class EngineProcesses:
         self._start_method = start_method or ("fork" if "fork" in get_all_start_methods() else "spawn")
         self._resources = resources
         self._pools: dict[str, ProcessPool] = {}
-        self._processes: dict[str, ctypes.c_long] = {}
-        self._counts: dict[str, ctypes.Array[ctypes.c_long]] = {}
+        self._shared: dict[str, ctypes.Array[ctypes.c_long]] = {}
         self._closed = False
 
     def run_engine(
@@ -92,7 +91,7 @@ class EngineProcesses:
         scene: Scenario,
         dt: float,
         starts: Sequence[Scenario],
-        on_simulations: OnSimulations = lambda done, total: None,
+        on_simulations: OnSimulations = ignore,
         *,
         quick: bool = False,
     ) -> EngineRun:
@@ -106,13 +105,8 @@ class EngineProcesses:
             on_simulations: Called while the engine works, twice a second.
             quick: As for `run_engine`.
         """
-        if entry.absence:
-            return run_engine(entry, scene, dt, starts)
-        try:
-            counts = self._counts
-            return self.call(entry, run_and_count, scene, dt, starts, quick, while_waiting=lambda: on_simulations(*counts[entry.label]))
-        except Failed as failure:
-            return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
+        found = self.call(entry, run_and_count, scene, dt, starts, quick, on_simulations=on_simulations)
+        return EngineRun(entry.label, found) if isinstance(found, Breakdown) else found
 
     def start(self, entries: Sequence[EngineEntry]) -> None:
         """Start the processes of engines: a process that is forked while another thread compiles or imports may wait for it forever."""
@@ -128,86 +122,82 @@ class EngineProcesses:
         entry: EngineEntry,
         work: Callable[[EngineEntry, *Given], Result],
         *given: *Given,
-        while_waiting: Callable[[], None] = lambda: None,
-    ) -> Result:
-        """Call a function in an engine's process; its first argument is the entry.
+        on_simulations: OnSimulations = ignore,
+    ) -> Result | Breakdown:
+        """The result of a function that is called in an engine's process with the entry, or why there is none.
+
+        There is none if the engine cannot take part, or if the call ended the process, ran out of time or memory, or raised.
 
         Args:
             entry: The engine.
             work: The function.
             given: Its other arguments.
-            while_waiting: Called twice a second until the work is done.
+            on_simulations: Called twice a second until the work is done, with the numbers of simulations that it counts.
 
         Raises:
-            Failed: The call ended the process, ran out of time or memory, or raised.
             Closed: Another thread has abandoned it.
         """
+        if entry.absence:
+            return Breakdown(entry.absence, entry.reason)
         if self._closed:
             raise Closed
-        if entry.label in self._pools and not self._pools[entry.label].active:  # the engine broke its process after its last work
-            self.renew(entry)
-        if entry.label not in self._pools:
-            with _system_errors_named(entry):
-                self._pools[entry.label] = self._pool(entry)
-        self._processes[entry.label].value = 0
-        self._counts[entry.label][:] = [0, 0]
+        pool = self._ready(entry)
         allowed = self._resources.processor_time + (COMPILATION if entry.engine is not None and entry.engine.compiles else 0.0)
         with _system_errors_named(entry), interrupts_deferred():
-            task = self._pools[entry.label].schedule(call, args=[work, given, allowed])
+            task = pool.schedule(call, args=[work, given, allowed])
         largest, start = 0, math.inf
+        while not finished([task], POLL):
+            if self._closed:
+                raise Closed
+            if self._has_exited(entry.label) and not finished([task], GRACE):
+                self.renew(entry)
+                return Breakdown("crashed", "its process exited with code 0 before the work was done")
+            if self._shared[entry.label][0]:
+                start = min(start, time.monotonic())  # of a clock that nobody sets
+            if time.monotonic() - start > WALL_TIME_FACTOR * allowed:
+                self._end_group(entry.label)
+                self.renew(entry)
+                return Breakdown("timed_out", f"not done after {WALL_TIME_FACTOR * allowed:g} s of wall time")
+            largest = max(largest, self._memory(entry.label))
+            on_simulations(*self._shared[entry.label][1:])
         try:
-            while not finished([task], POLL):
-                if self._closed:
-                    raise Closed
-                if self._has_exited(entry.label) and not finished([task], GRACE):
-                    self.renew(entry)
-                    raise Failed("crashed", "its process exited with code 0 before the work was done")
-                start = self._start_in_time(entry, start, WALL_TIME_FACTOR * allowed)
-                largest = max(largest, self._memory(entry.label))
-                while_waiting()
-            result: Result = task.result()
+            result: Result | Breakdown = task.result()
         except ProcessExpired as end:
             self._end_group(entry.label)
             verdict, reason = _verdict(end.exitcode, allowed)
             if largest > NEAR_LIMIT * self._resources.memory:
                 reason += f"; it used {largest / GIB:.1f} GiB of memory, and its limit is {self._resources.memory / GIB:g} GiB"
-            raise Failed(verdict, reason) from None
-        except (Failed, Closed):
-            raise
+            return Breakdown(verdict, reason)
         except Exception as error:  # what the adapter returns cannot be sent to this process
-            raise Failed("crashed", f"its result cannot be returned: {described(error)}") from None
+            return Breakdown("crashed", f"its result cannot be returned: {described(error)}")
         return result
 
-    def _start_in_time(self, entry: EngineEntry, start: float, limit: float) -> float:
-        """The time at which the work of an engine began, which was `start` if that is finite; by a clock that nobody sets [s].
-
-        Raises:
-            Failed: The limit of wall time [s] is exceeded; the process is ended.
-        """
-        if self._processes[entry.label].value:
-            start = min(start, time.monotonic())
-        if time.monotonic() - start > limit:
-            self._end_group(entry.label)
+    def _ready(self, entry: EngineEntry) -> ProcessPool:
+        """The pool of an engine's process, with another process if the engine broke the one of its last work."""
+        if entry.label in self._pools and not self._pools[entry.label].active:
             self.renew(entry)
-            raise Failed("timed_out", f"not done after {limit:g} s of wall time")
-        return start
+        if entry.label not in self._pools:
+            with _system_errors_named(entry):
+                self._pools[entry.label] = self._pool(entry)
+        self._shared[entry.label][:] = [0, 0, 0]
+        return self._pools[entry.label]
 
     def _memory(self, label: str) -> int:
         """The memory that an engine's process has for data [bytes], which is limited; 0 where the system does not say."""
         try:
-            return memory_for_data(self._processes[label].value)
+            return memory_for_data(self._shared[label][0])
         except OSError:
             return 0
 
     def _end_group(self, label: str) -> None:
         """End the processes that an engine started and left."""
-        if self._processes[label].value:
+        if self._shared[label][0]:
             with suppress(ProcessLookupError, PermissionError):
-                os.killpg(self._processes[label].value, signal.SIGKILL)
+                os.killpg(self._shared[label][0], signal.SIGKILL)
 
     def _has_exited(self, label: str) -> bool:
         """Whether the process that does the work has ended; the pool does not report one that exits with code 0."""
-        process = self._processes[label].value
+        process = self._shared[label][0]
         if not process or not PROCESSES.exists():
             return False
         try:
@@ -225,10 +215,9 @@ class EngineProcesses:
     def _pool(self, entry: EngineEntry) -> ProcessPool:
         context = get_context(self._start_method)
         # Without a lock: the parent would wait forever for a process that is killed while it holds one.
-        self._processes[entry.label] = process = context.RawValue("l", 0)
-        self._counts[entry.label] = counts = context.RawArray("l", 2)
-        shared = [entry, self._resources.memory, process, counts]
-        return ProcessPool(max_workers=1, initializer=start_process, initargs=shared, context=context)
+        self._shared[entry.label] = shared = context.RawArray("l", 3)
+        given = [entry, self._resources.memory, shared]
+        return ProcessPool(max_workers=1, initializer=start_process, initargs=given, context=context)
 
     def __enter__(self) -> Self:
         return self
@@ -243,7 +232,7 @@ class EngineProcesses:
     def abandon(self) -> None:
         """End the engines' processes at once, and with them any call that waits for them in another thread."""
         self._closed = True
-        for label in list(self._processes):
+        for label in list(self._shared):
             self._end_group(label)
 
 

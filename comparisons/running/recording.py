@@ -4,8 +4,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from dropspin.comparisons.engines.base import Diverged, Engine, KnownLimitation
 from dropspin.comparisons.engines.exceptions import described, short
 from dropspin.comparisons.engines.registry import engine as engine_named
 from dropspin.comparisons.judging.verdicts import Verdict
-from dropspin.comparisons.running.inputs import SceneLike, as_scene, verify_time_step
+from dropspin.comparisons.running.inputs import SceneLike, as_scene, ignore, verify_time_step
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.verification import (
     BuildMismatch,
@@ -33,12 +32,15 @@ from dropspin.scenarios.state import PARTS
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Breakdown:
-    """Why an engine has no motion for a scene."""
+@dataclass(eq=False)
+class Breakdown(Exception):
+    """Why an engine gave no motion, or did not finish other work: raised, and kept where the result would be."""
 
     verdict: Verdict
     reason: str
+
+    def __str__(self) -> str:
+        return self.reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +49,12 @@ class Recording:
 
     Attributes:
         motion: The states, the start first, `every` so many steps.
-        continuation: The states after each of the extra steps that were asked for, at later times; usually empty.
         limitations: The engine's known limitations that it met on the way.
         settings: The settings that the engine reported; a batch is not asked for them.
         seconds: Wall time of recording the motion [s]; in a batch, the mean over its motions.
     """
 
     motion: Trajectory
-    continuation: Trajectory
     limitations: tuple[KnownLimitation, ...]
     settings: dict[str, Any] = field(default_factory=dict)
     seconds: float = float("nan")
@@ -114,20 +114,18 @@ def record(engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_
         seconds = time.perf_counter() - start
         lag = simulation.velocity_lag
         limitations = verified_limitations(simulation.known_limitations)
-        more = states[:0]
         if extra_steps and np.isfinite(states[-1]).all():
-            more = verified_record(simulation.record(extra_steps), 1 + extra_steps)[1:]
-    times = dt * every * np.arange(len(states), dtype=float)
-    later = times[-1] + dt * np.arange(1, len(more) + 1, dtype=float)
-    motion, continuation = Trajectory.from_states(times, states, lag), Trajectory.from_states(later, more, lag)
-    return Recording(motion, continuation, limitations, settings, seconds)
+            states = np.concatenate([states, verified_record(simulation.record(extra_steps), 1 + extra_steps)[1:]])
+    times = dt * every * np.arange(1 + steps // every, dtype=float)
+    later = times[-1] + dt * np.arange(1, 1 + len(states) - len(times), dtype=float)
+    return Recording(Trajectory.from_states(np.concatenate([times, later]), states, lag), limitations, settings, seconds)
 
 
 def record_batch(
     engine: Engine,
     members: Sequence[Scenario],
     dt: float,
-    on_simulations: OnSimulations = lambda done, total: None,
+    on_simulations: OnSimulations = ignore,
     *,
     limitations: bool = False,
 ) -> list[Recording]:
@@ -161,28 +159,31 @@ def record_batch(
     times = dt * np.arange(steps + 1, dtype=float)
     verify_starts(engine, members, states[:, 0])
     on_simulations(size, size)
-    positions, orientations, velocities, spins = (states[..., part] for part in PARTS.values())
-    parts = zip(positions, orientations, velocities, spins, strict=True)
-    motions = [Trajectory(times, *of_one, velocity_lag=lag) for of_one in parts]
-    none = motions[0][:0]
-    return [Recording(motion, none, of_one, seconds=seconds) for motion, of_one in zip(motions, met or [()] * size, strict=True)]
+    parts = zip(*(states[..., part] for part in PARTS.values()), strict=True)
+    motions = [Trajectory(times, position, orientation, velocity, spin, lag) for position, orientation, velocity, spin in parts]
+    return [Recording(motion, of_one, seconds=seconds) for motion, of_one in zip(motions, met or [()] * size, strict=True)]
 
 
-def try_record(
-    engine: Engine, scene: Scenario, dt: float, every: int = 1, *, extra_steps: int = 0, verify: bool = True
-) -> Recording | Breakdown:
+def try_record(engine: Engine, scene: Scenario, dt: float, *, verify: bool = True) -> Recording | Breakdown:
     """Drive an engine through a scene; a refusal, a divergence or an exception is returned, not raised."""
     try:
-        refusal = verified_refusal(engine.refusal(scene))
-        if refusal is not None:
-            return Breakdown("declined", refusal)
-        return record(engine, scene, dt, every, extra_steps=extra_steps, verify=verify)
+        verify_accepted(engine, scene)
+        return record(engine, scene, dt, verify=verify)
     except Exception as error:
         return classify(error)
 
 
-def classify(error: Exception) -> Breakdown:
+def verify_accepted(engine: Engine, scene: Scenario) -> None:
+    """Raise `Breakdown` if an engine declines a scene."""
+    refusal = verified_refusal(engine.refusal(scene))
+    if refusal is not None:
+        raise Breakdown("declined", refusal)
+
+
+def classify(error: BaseException) -> Breakdown:
     """The verdict for what an adapter raised: an engine is somebody else's code, so any exception costs its own row only."""
+    if isinstance(error, Breakdown):
+        return error.with_traceback(None)
     if isinstance(error, Diverged):
         return Breakdown("diverged", short(str(error)))
     if isinstance(error, BuildMismatch):
@@ -190,59 +191,20 @@ def classify(error: Exception) -> Breakdown:
     return Breakdown("crashed", described(error))
 
 
+def finite(recording: Recording | Breakdown) -> Trajectory:
+    """The motion that was recorded.
+
+    Raises:
+        Breakdown: There is none, or it is not finite throughout.
+    """
+    broken = recording if isinstance(recording, Breakdown) else divergence(recording.motion)
+    if broken is not None:
+        raise broken
+    assert isinstance(recording, Recording)
+    return recording.motion
+
+
 def divergence(motion: Trajectory) -> Breakdown | None:
     """The verdict on a motion that is not finite throughout; None if it is."""
     bad = motion.first_bad_row
     return None if bad is None else Breakdown("diverged", f"the state is not finite at t = {motion.t[bad]:g} s")
-
-
-class TimedSteps(NamedTuple):
-    """Wall times of a simulation [s], and its last state.
-
-    Attributes:
-        building: Of building it.
-        call: Of a first call that takes one step, until the state is there.
-        stepping: Of a second call that takes `steps` steps, until the state is there.
-        steps: The number of these steps.
-        state: The last state, shape (13,).
-    """
-
-    building: float
-    call: float
-    stepping: float
-    steps: int
-    state: Array
-
-    @property
-    def whole(self) -> float:
-        """The time of it all [s]."""
-        return self.building + self.call + self.stepping
-
-    @property
-    def per_step(self) -> float:
-        """The time of a step [s], as `time_per_step`."""
-        return time_per_step(self.call, self.stepping, self.steps)
-
-
-def time_per_step(call: float, stepping: float, steps: int) -> float:
-    """The time of a step [s] without that of the call, unless a call of many steps [s] took hardly longer than one of a single step [s]."""
-    return (stepping - call) / (steps - 1) if stepping > 2.0 * call and steps > 1 else stepping / steps
-
-
-def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> TimedSteps:
-    """Time native steps: one, and then others in one call. The call itself may cost a compiled engine as much as hundreds of steps.
-
-    An engine may return from `advance` before its steps are done, and wait for them when the state is read.
-
-    Raises:
-        Diverged: The simulation broke down.
-    """
-    times = [time.perf_counter()]
-    with engine.prepare(scene, dt) as simulation:
-        times.append(time.perf_counter())
-        for number in (1, steps):
-            simulation.advance(number)
-            state = simulation.state()
-            times.append(time.perf_counter())
-    building, call, stepping = (later - earlier for earlier, later in pairwise(times))
-    return TimedSteps(building, call, stepping, steps, state)

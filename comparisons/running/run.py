@@ -1,11 +1,10 @@
 """A run: scenes × engines × time steps, measured against exact solutions and against each other, and judged."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from itertools import product
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.stand_in import code_of
@@ -16,18 +15,17 @@ from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.results.provenance import provenance
 from dropspin.comparisons.results.results import Results, joined
 from dropspin.comparisons.running.belonging import verify_motion
-from dropspin.comparisons.running.engine_process import Failed
-from dropspin.comparisons.running.engine_run import Timing, time_engine
-from dropspin.comparisons.running.entries import CONSTRUCTION, engine_entry
+from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import Forecast, forecast
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
-from dropspin.comparisons.running.parallel import as_jobs, work_in_parallel
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, as_scenes, ignore, several, verify_time_step
+from dropspin.comparisons.running.parallel import started_crews, work_in_parallel
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.progress import OnProgress, Progress
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.scene_run import Timings, run_scene
 from dropspin.comparisons.running.start_phases import StartPhase
-from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
+from dropspin.comparisons.running.timing import Timing, time_engine
+from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 
 DEFAULT_DTS = (4e-3, 2e-3, 1e-3)
 
@@ -72,12 +70,9 @@ def run(
     Raises:
         DropspinError: The request cannot be run: an unknown engine, an impossible time step, equal names.
     """
-    prepared = prepare_run(scenes, engines, dt, resources)
-    entries, dts = prepared.entries, prepared.dts
-    stamp = _stamp(prepared, resources, quick)
+    requested, entries, dts, stamp = _request(scenes, engines, dt, resources, quick)
     earlier = {scene.model_dump_json(): part for part in done for scene in part.scenes.values() if not what_changed(part.provenance, stamp)}
     parts: dict[str, Results] = {}
-    pending: list[StartPhase] = []
     lock, keep = Lock(), keep or ignore
 
     def report(progress: Progress) -> None:
@@ -85,20 +80,16 @@ def run(
             with lock:
                 on_progress(progress)
 
-    for scene, truth in zip(prepared.scenes, prepared.truths, strict=True):
-        if scene.model_dump_json() in earlier:
-            parts[scene.name] = replace(earlier[scene.model_dump_json()], scenes={scene.name: scene})
-            for entry, step in product(entries, dts):
-                report(Progress(scene.name, entry.label, step, finished=True))
-        else:
-            pending.append(StartPhase(scene, truth, quick))
-    number = min(as_jobs(jobs), max(len(pending), 1))
+    for scene in (own.scene for own in requested if own.scene.model_dump_json() in earlier):
+        parts[scene.name] = replace(earlier[scene.model_dump_json()], scenes={scene.name: scene})
+        for entry, step in product(entries, dts):
+            report(Progress(scene.name, entry.label, step, finished=True))
+    pending = [own for own in requested if own.scene.name not in parts]
     for own in pending[:1]:
         compile_states(own.scene)
-    with ExitStack() as stack:
-        crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(number)]
+    with started_crews(jobs, len(pending), entries, resources) as crews:
         timings = _timings([own.scene for own in pending], entries, dts, crews[0], report)
-        expected = forecast(pending, entries, dts, timings, number)
+        expected = forecast(pending, entries, dts, timings, len(crews))
         if on_forecast is not None:
             on_forecast(expected)
 
@@ -109,13 +100,47 @@ def run(
             parts[own.scene.name] = part
             keep(part)
 
-        for processes in crews[1:]:
-            processes.start([entry for entry in entries if not entry.absence])
         if len(crews) > 1:  # the longest first, so that no processor is idle while another one ends a long scene
             pending = sorted(pending, key=lambda own: -expected.by_scene[own.scene.name])
         work_in_parallel(iter(pending), of_scene, crews, on_done)
-    stamp["compilation"] = _compilation(timings)
-    return joined([parts[scene.name] for scene in prepared.scenes], stamp)
+    compiled = [(label, timing.compilation) for (_, label, _), timing in timings.items() if timing.compilation > 0.0]
+    stamp["compilation"] = {label: max(longest for one, longest in compiled if one == label) for label, _ in compiled}
+    return joined([parts[own.scene.name] for own in requested], stamp)
+
+
+def _request(
+    scenes: SceneLike | Iterable[SceneLike],
+    engines: Engine | str | Iterable[Engine | str],
+    dt: float | Iterable[float],
+    resources: ResourceLimits,
+    quick: bool,
+) -> tuple[list[StartPhase], list[EngineEntry], list[float], dict[str, Any]]:
+    """The scenes with their exact solutions, the engines, the time steps [s] and the provenance of a request.
+
+    Raises:
+        DropspinError: The request cannot be run.
+    """
+    chosen = as_scenes(scenes)
+    asked, dts = several("engines", engines), several("dt", dt)
+    entries = [engine_entry(one, resources) for one in asked]
+    for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
+        if not given:
+            raise DropspinError(f"{name}: got none; give at least one.")
+    labels = [entry.label for entry in entries]
+    requested = [StartPhase(scene, truth_for(scene), quick) for scene in chosen]
+    for scene, truth, *_ in requested:
+        verify_expectations(scene, truth, labels)
+        for step in dts:
+            verify_time_step(scene, step)
+    if len(set(dts)) < len(dts):
+        raise DropspinError(f"dt: a time step is given twice ({', '.join(f'{step:g}' for step in dts)}); give each once.")
+    if len(set(labels)) < len(labels):
+        raise DropspinError(f"an engine is given twice: {', '.join(labels)}; give each once.")
+    names = [scene.name for scene in chosen]
+    asked_for = {"scenes": names, "engines": labels, "dts": list(dts), "time_limit": resources.processor_time, "quick": quick}
+    adapters = {entry.label: code_of(entry.engine) for entry in entries if entry.engine is not None}
+    by_name = {entry.label: name.strip() for entry, name in zip(entries, asked, strict=True) if isinstance(name, str)}
+    return requested, entries, dts, provenance(asked_for) | {"names": by_name, "adapters": adapters}
 
 
 def _timings(
@@ -125,92 +150,9 @@ def _timings(
     found = {}
     for scene, entry, dt in product(scenes, entries, dts):
         on_progress(Progress(scene.name, entry.label, dt, timing=True))
-        timing = Timing()
-        if not entry.absence:
-            try:
-                timing = processes.call(entry, time_engine, scene, dt)
-            except Failed as failure:
-                timing = Timing(breakdown=Breakdown(failure.verdict, failure.reason), ended=True)
-        found[scene.name, entry.label, dt] = timing
+        timing = processes.call(entry, time_engine, scene, dt)
+        found[scene.name, entry.label, dt] = Timing(breakdown=timing, ended=True) if isinstance(timing, Breakdown) else timing
     return found
-
-
-def _compilation(timings: Timings) -> dict[str, float]:
-    """The longest time that each engine took to compile a scene [s], of engines that compile."""
-    found: dict[str, float] = {}
-    for (_, label, _), timing in timings.items():
-        if timing.compilation > 0.0:
-            found[label] = max(found.get(label, 0.0), timing.compilation)
-    return found
-
-
-class PreparedRun(NamedTuple):
-    """A request of a run that was checked: scenes with their exact solutions, engines, time steps [s]."""
-
-    scenes: list[Scenario]
-    truths: list[Truth | None]
-    entries: list[EngineEntry]
-    names: dict[str, str]
-    """By label: what each engine was asked for by, where that is a name."""
-    dts: list[float]
-
-
-def prepare_run(
-    scenes: SceneLike | Iterable[SceneLike],
-    engines: Engine | str | Iterable[Engine | str],
-    dt: float | Iterable[float],
-    resources: ResourceLimits = CONSTRUCTION,
-) -> PreparedRun:
-    """Check a request of a run, and find its engines and exact solutions.
-
-    Args:
-        scenes: As for `run`.
-        engines: As for `run`.
-        dt: As for `run`.
-        resources: What the import and the construction of an engine of one's own may use.
-
-    Raises:
-        DropspinError: The request cannot be run.
-    """
-    chosen = [as_scene(one) for one in several("scenes", scenes)]
-    asked = several("engines", engines)
-    entries = [engine_entry(one, resources) for one in asked]
-    dts = several("dt", dt)
-    for name, given in (("scenes", chosen), ("engines", entries), ("dt", dts)):
-        if not given:
-            raise DropspinError(f"{name}: got none; give at least one.")
-    labels = [entry.label for entry in entries]
-    truths = [truth_for(scene) for scene in chosen]
-    _verify_request(chosen, truths, dts, labels)
-    names = {entry.label: name.strip() for entry, name in zip(entries, asked, strict=True) if isinstance(name, str)}
-    return PreparedRun(chosen, truths, entries, names, dts)
-
-
-def _verify_request(scenes: Sequence[Scenario], truths: Sequence[Truth | None], dts: Sequence[float], labels: Sequence[str]) -> None:
-    names = [scene.name for scene in scenes]
-    if len(set(names)) < len(names):
-        raise DropspinError(f"two scenes have the same name ({', '.join(names)}); rename a file, or give a mapping a 'name'.")
-    for scene, truth in zip(scenes, truths, strict=True):
-        verify_expectations(scene, truth, labels)
-        for dt in dts:
-            verify_time_step(scene, dt)
-    if len(set(dts)) < len(dts):
-        raise DropspinError(f"dt: a time step is given twice ({', '.join(f'{dt:g}' for dt in dts)}); give each once.")
-    if len(set(labels)) < len(labels):
-        raise DropspinError(f"an engine is given twice: {', '.join(labels)}; give each once.")
-
-
-def _stamp(prepared: PreparedRun, resources: ResourceLimits, quick: bool) -> dict[str, Any]:
-    """The provenance of a run before it starts."""
-    asked = {
-        "scenes": [scene.name for scene in prepared.scenes],
-        "engines": [entry.label for entry in prepared.entries],
-        "dts": list(prepared.dts),
-        "time_limit": resources.processor_time,
-        "quick": quick,
-    }
-    adapters = {entry.label: code_of(entry.engine) for entry in prepared.entries if entry.engine is not None}
-    return provenance(asked) | {"names": prepared.names, "adapters": adapters}
 
 
 def what_changed(earlier: Mapping[str, Any], stamp: Mapping[str, Any]) -> str:

@@ -15,7 +15,6 @@ from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
 from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS, EnsembleOutcome
 from dropspin.comparisons.results.results import Results, TrajectoryKey
 from dropspin.comparisons.results.table import Measurement, as_table
-from dropspin.comparisons.running.engine_run import Timing
 from dropspin.comparisons.running.engine_study import EngineStudy, Outcome
 from dropspin.comparisons.running.ensembles import judge_differences, judge_means
 from dropspin.comparisons.running.inputs import EngineEntry
@@ -23,6 +22,7 @@ from dropspin.comparisons.running.measured import compare, exactly_at, phases_at
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress
 from dropspin.comparisons.running.start_phases import StartPhase
+from dropspin.comparisons.running.timing import Timing
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.truths import other_laws
 

@@ -14,7 +14,6 @@ import pyarrow as pa
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.results.provenance import code, provenance, versions
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
@@ -120,18 +119,17 @@ class Work:
 
         def outcome(number: int) -> Outcomes:
             verify_running()
-            try:
-                return processes.call(entry, _run_in_process, self.sweep, number, number + 1)
-            except Failed as failure:
-                verify_running()  # a process that ended with the sweep has not failed
-                broken = Outcomes.empty(1, len(self.sweep.metrics))
-                broken.set_breakdown(0, Breakdown(failure.verdict, failure.reason))
-                return broken
+            found = processes.call(entry, _run_in_process, self.sweep, number, number + 1)
+            if not isinstance(found, Breakdown):
+                return found
+            verify_running()  # a process that ended with the sweep has not failed
+            broken = Outcomes.empty(1, len(self.sweep.metrics))
+            broken.set_breakdown(0, found)
+            return broken
 
         verify_running()
-        try:
-            found = processes.call(entry, _run_in_process, self.sweep, first, last)
-        except Failed:
+        found = processes.call(entry, _run_in_process, self.sweep, first, last)
+        if isinstance(found, Breakdown):
             return concatenated([outcome(number) for number in range(first, last)])
         # An exception may be due to earlier jobs, for example to a leak. It counts if the job raises it in a new process as well.
         for index in np.flatnonzero(found.verdict == "crashed").tolist():

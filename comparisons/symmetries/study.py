@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, product
 
@@ -9,16 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.comparisons.engines.base import Engine
-from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES, Symmetry
 from dropspin.comparisons.measuring.tolerances import perturbed
-from dropspin.comparisons.running.engine_process import Failed
-from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.running.recording import Breakdown, classify, divergence, record_batch, try_record
+from dropspin.comparisons.running.recording import Breakdown, classify, finite, record_batch, try_record
 from dropspin.comparisons.symmetries.findings import Effects, Finding, Pairs, judged, not_run
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError, Scenario
@@ -66,10 +65,8 @@ def symmetries(
     Raises:
         DropspinError: A scene or an engine does not exist, a time step does not fit a scene, or two scenes have the same name.
     """
-    chosen = [as_scene(one) for one in several("scenes", scenes) or SCENES]
-    if len({scene.name for scene in chosen}) < len(chosen):
-        raise DropspinError("two scenes have the same name, which is that of the file; rename one of the files.")
-    entries = list({one.label: one for one in map(engine_entry, several("engines", engines) or ENGINES)}.values())
+    chosen = as_scenes(scenes, SCENES)
+    entries = engine_entries(engines, ENGINES)
     for scene in chosen:
         verify_time_step(scene, dt)
 
@@ -86,87 +83,85 @@ def symmetries(
 def _of_engine(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float) -> list[Finding]:
     """All findings for one engine and one scene; a crash costs those that one process would have given."""
     none = Finding(scene.name, entry.label, "", "not run")
-    if entry.engine is None:
-        absence: Verdict = entry.absence or "missing"
-        return [replace(none, symmetry=name, reason=entry.reason, verdict=absence) for name in NAMES]
-    try:
-        own, found = processes.call(entry, _compare, scene, dt)
-    except Failed as failure:
-        own, found = Breakdown(failure.verdict, failure.reason), []
-    if isinstance(own, Breakdown):
-        return [not_run(replace(none, symmetry=name), own) for name in NAMES]
-    for name, again in IN_NEW_PROCESSES.items():
-        repeated = replace(none, symmetry=name)
-        try:
-            processes.renew(entry)
-            found.append(processes.call(entry, again, scene, dt, own, repeated))
-        except Failed as failure:
-            found.append(not_run(repeated, Breakdown(failure.verdict, failure.reason)))
+    compared = processes.call(entry, _compare, scene, dt)
+    if isinstance(compared, Breakdown):
+        return [not_run(replace(none, symmetry=name), compared) for name in NAMES]
+    own, findings = compared
+    for name in IN_NEW_PROCESSES:
+        processes.renew(entry)
+        again = processes.call(entry, _in_new_process, scene, dt, own, name)
+        findings.append(not_run(replace(none, symmetry=name), again) if isinstance(again, Breakdown) else again)
     processes.renew(entry)  # the last one may use one processor only
-    return found
+    return findings
 
 
-def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array | Breakdown, list[Finding]]:
-    """All findings that one process can give."""
-    names = [name for name in NAMES if name not in IN_NEW_PROCESSES]
-    return findings_of(entry, scene, dt, [*names, *entry.adapter.represented_otherwise()])
-
-
-def findings_of(entry: EngineEntry, scene: Scenario, dt: float, names: Iterable[str]) -> tuple[Array | Breakdown, list[Finding]]:
-    """The engine's motion of a scene, and the findings on some symmetries that the scene has; runs in the engine's process."""
+def _compare(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array, list[Finding]]:
+    """The engine's motion, and all findings that one process can give."""
     own = states_of(entry, scene, dt)
-    if isinstance(own, Breakdown):
-        return own, []
-    having = [name for name in names if name not in SYMMETRIES or SYMMETRIES[name].applies(scene)]
-    return own, [_finding(entry, scene, dt, own, Finding(scene.name, entry.label, name, "not run")) for name in having]
+    names = [name for name in NAMES if name not in IN_NEW_PROCESSES]
+    return own, findings_of(entry, scene, dt, own, [*names, *entry.adapter.represented_otherwise()])
 
 
-def _finding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
-    """One finding; `none` is that of a symmetry that cannot be compared."""
-    try:
-        pairs, effects = _pairs(entry, scene, dt, own, none.symmetry)
-        return judged(none, scene, dt, pairs, effects, entry.adapter.precision)
-    except _NotComparable as error:
-        return not_run(none, error.breakdown)
-    except DropspinError as error:  # the transformed scene is no valid scene
-        return not_run(none, Breakdown("declined", str(error)))
-    except Exception as error:  # an engine is somebody else's code
-        return not_run(none, classify(error))
+def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> Finding:
+    """The finding of a repeated run in a process that did nothing before; for `ONE_CORE`, all its threads may use one processor."""
+    if name == ONE_CORE:
+        if not hasattr(os, "sched_setaffinity") or usable_cores() == 1:
+            raise Breakdown("declined", "the process cannot be restricted to fewer processors")
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
+    [found] = findings_of(entry, scene, dt, own, [IN_NEW_PROCESSES[name]])
+    return replace(found, symmetry=name)
 
 
-class _NotComparable(Exception):
-    """A run gave no motion."""
+def findings_of(entry: EngineEntry, scene: Scenario, dt: float, own: Array, names: Iterable[str]) -> list[Finding]:
+    """The findings on some symmetries that the scene has; runs in the engine's process.
 
-    def __init__(self, breakdown: Breakdown) -> None:
-        super().__init__(breakdown.reason)
-        self.breakdown = breakdown
+    Args:
+        entry: The engine.
+        scene: The scene.
+        dt: Time step [s].
+        own: The states of the engine's motion at each time step, shape (n, 13).
+        names: Names of symmetries, and of ways to repeat the run.
+    """
+    found = []
+    for name in names:
+        if name in SYMMETRIES and not SYMMETRIES[name].applies(scene):
+            continue
+        none = Finding(scene.name, entry.label, name, "not run")
+        try:
+            pairs, effects = _pairs(entry, scene, dt, own, name)
+            found.append(judged(none, scene, dt, pairs, effects, entry.adapter.precision))
+        except DropspinError as error:  # the transformed scene is no valid scene
+            found.append(not_run(none, Breakdown("declined", str(error))))
+        except Exception as error:  # an engine is somebody else's code
+            found.append(not_run(none, classify(error)))
+    return found
 
 
 def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> tuple[Pairs, Effects | None]:
     """The motions that should be equal, and the function that measures effects of rounding; None if it has no effect."""
+
+    def effects() -> list[Array]:
+        return effects_of_rounding(entry, scene, dt, own, perturbed_starts(entry, scene))
+
     if name == AGAIN:
-        return [(own, _motion(entry, scene, dt))], None
+        return [(own, states_of(entry, scene, dt))], None
     if name in SYMMETRIES:
         return _transformed(entry, scene, dt, own, SYMMETRIES[name])
     if name == HALVES:
         return _halves(entry, scene, dt, own)
     if name == BATCH:
         # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
-        effects = (lambda: effects_of_rounding(entry, scene, dt, own)) if entry.adapter.compiles else None
-        return _batched(entry, scene, dt, own), effects
+        return _batched(entry, scene, dt, own), effects if entry.adapter.compiles else None
     other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
-    return [(own, _motion(other, scene, dt))], lambda: effects_of_rounding(entry, scene, dt, own)
+    return [(own, states_of(other, scene, dt))], effects
 
 
 def _batched(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> Pairs:
     """Of a scene and two others: the motions of single runs, and those of a batch."""
     others = [batch_member(entry.adapter, scene, share) for share in FASTER]
-    together = [recording.motion for recording in record_batch(entry.adapter, [scene, *others], dt)]
-    for motion in together:
-        if (broken := divergence(motion)) is not None:
-            raise _NotComparable(broken)
-    alone = [own, *(_motion(entry, other, dt) for other in others)]
-    return list(zip(alone, (motion.states for motion in together), strict=True))
+    together = [finite(recording).states for recording in record_batch(entry.adapter, [scene, *others], dt)]
+    return list(zip([own, *(states_of(entry, other, dt) for other in others)], together, strict=True))
 
 
 def batch_member(engine: Engine, scene: Scenario, share: float) -> Scenario:
@@ -181,73 +176,51 @@ def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple
     """A motion that is stopped half way and continued."""
     half = len(own) // 2
     nominal = whole_steps(scene, dt, len(own) - 1 - half).starting_at(own[half])
-    rest = _motion(entry, nominal, dt)
+    rest = states_of(entry, nominal, dt)
 
-    def of_rest() -> list[Array]:
-        effects = effects_of_rounding(entry, nominal, dt, rest)
-        return [np.concatenate([np.zeros(half), effect]) for effect in effects]
+    def effects() -> list[Array]:
+        return [
+            np.concatenate([np.zeros(half), effect])
+            for effect in effects_of_rounding(entry, nominal, dt, rest, perturbed_starts(entry, nominal))
+        ]
 
-    return [(own, np.concatenate([own[:half], rest]))], of_rest
+    return [(own, np.concatenate([own[:half], rest]))], effects
 
 
 def _transformed(entry: EngineEntry, scene: Scenario, dt: float, own: Array, symmetry: Symmetry) -> tuple[Pairs, Effects]:
     """The motion of a transformed scene, transformed back."""
     times, transformed = dt * np.arange(len(own), dtype=float), symmetry.transformed(scene)
-    states = _motion(entry, transformed, symmetry.time * dt)
+    states = states_of(entry, transformed, symmetry.time * dt)
 
-    def of_transformed() -> list[Array]:
-        starts = [symmetry.back(times[:1], start.initial_state[np.newaxis])[0] for start in _perturbed(transformed, entry)]
+    def effects() -> list[Array]:
+        starts = [symmetry.back(times[:1], start.initial_state[np.newaxis])[0] for start in perturbed_starts(entry, transformed)]
         return effects_of_rounding(entry, scene, dt, own, map(scene.starting_at, starts))
 
-    return [(own, symmetry.back(times, states))], of_transformed
+    return [(own, symmetry.back(times, states))], effects
 
 
-def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
-    """The finding of a run in a process that did nothing before."""
-    return replace(_finding(entry, scene, dt, own, replace(none, symmetry=AGAIN)), symmetry=none.symmetry)
+def effects_of_rounding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario]) -> list[Array]:
+    """The differences of an engine's motion of a scene, states of shape (n, 13), and those from perturbed starts, each of shape (n,)."""
+    found = []
+    for start in starts:
+        with suppress(Breakdown):
+            found.append(differences(scene, own, states_of(entry, start, dt)))
+    return found
 
 
-def _on_one_core(entry: EngineEntry, scene: Scenario, dt: float, own: Array, none: Finding) -> Finding:
-    """The finding of a batch in a process all of whose threads may use one processor."""
-    if not hasattr(os, "sched_setaffinity") or usable_cores() == 1:
-        return not_run(none, Breakdown("declined", "the process cannot be restricted to fewer processors"))
-    for thread in os.listdir("/proc/self/task"):
-        os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
-    return replace(_finding(entry, scene, dt, own, replace(none, symmetry=BATCH)), symmetry=none.symmetry)
-
-
-def effects_of_rounding(
-    entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario] | None = None
-) -> list[Array]:
-    """The differences of an engine's motion and those from perturbed starts, by default the scene's own, each of shape (n,)."""
-    motions = (states_of(entry, start, dt) for start in (_perturbed(scene, entry) if starts is None else starts))
-    return [differences(scene, own, motion) for motion in motions if not isinstance(motion, Breakdown)]
-
-
-def _perturbed(scene: Scenario, entry: EngineEntry) -> list[Scenario]:
+def perturbed_starts(entry: EngineEntry, scene: Scenario) -> list[Scenario]:
     """A scene with its initial state perturbed by a few eps, in some ways."""
     return [one for [one] in perturbed(scene, [scene], entry.adapter.precision)]
 
 
-def _motion(entry: EngineEntry, scene: Scenario, dt: float) -> Array:
+def states_of(entry: EngineEntry, scene: Scenario, dt: float) -> Array:
     """The states of an engine's motion at each time step, shape (n, 13).
 
     Raises:
-        _NotComparable: There is no motion.
+        Breakdown: There is no motion, or it is not finite.
     """
-    states = states_of(entry, scene, dt)
-    if isinstance(states, Breakdown):
-        raise _NotComparable(states)
-    return states
+    return finite(try_record(entry.adapter, scene, dt)).states
 
 
-def states_of(entry: EngineEntry, scene: Scenario, dt: float) -> Array | Breakdown:
-    """The states of an engine's motion at each time step, shape (n, 13), or why there are none."""
-    recording = try_record(entry.adapter, scene, dt)
-    if isinstance(recording, Breakdown):
-        return recording
-    return divergence(recording.motion) or recording.motion.states
-
-
-IN_NEW_PROCESSES = {NEW_PROCESS: _in_new_process, ONE_CORE: _on_one_core}
-"""Runs of the same scene in processes that did nothing before."""
+IN_NEW_PROCESSES = {NEW_PROCESS: AGAIN, ONE_CORE: BATCH}
+"""Ways to repeat a run in a process that did nothing before, and those of the same process that do the same."""

@@ -7,7 +7,7 @@ in one of the two engines.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from itertools import chain, combinations
 
 import numpy as np
@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.differences import differences
 from dropspin.comparisons.measuring.motions import Motions
-from dropspin.comparisons.running.engine_process import Failed
-from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several, verify_time_step
+from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scenes, ignore, verify_time_step
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.symmetries.findings import Effects, Finding, Status, judged
-from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
+from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, perturbed_starts, states_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 
 Array = NDArray[np.float64]
@@ -89,8 +88,8 @@ def twins(
     Raises:
         DropspinError: A scene or an engine does not exist, there are fewer than two engines, or a time step does not fit a scene.
     """
-    chosen = [as_scene(one) for one in several("scenes", scenes)]
-    entries = list({one.label: one for one in map(engine_entry, several("engines", engines))}.values())
+    chosen = as_scenes(scenes)
+    entries = engine_entries(engines)
     if len(entries) < 2:
         raise DropspinError(f"twins: got {len(entries)} engine{'s' * (len(entries) != 1)}; name at least two, such as mujoco and mjx.")
     for scene in chosen:
@@ -106,48 +105,28 @@ def twins(
 
 def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene: Scenario, dt: float) -> list[TwinFinding]:
     """The findings for all pairs of engines in one scene."""
-    motions = [(entry, _motion(processes, entry, scene, dt)) for entry in entries]
+    motions = {entry.label: processes.call(entry, states_of, scene, dt) for entry in entries}
+    effects: dict[str, list[Array]] = {}
 
-    @cache
-    def effects(label: str) -> list[Array]:
-        [entry] = [one for one in entries if one.label == label]
-        return processes.call(entry, _effects, scene, dt)
-
-    def effects_of_both(label: str, other: str) -> list[Array]:
-        return effects(label) + effects(other)
+    def effects_of(*both: tuple[EngineEntry, Array]) -> list[Array]:
+        """Of rounding, on each of two engines."""
+        for entry, own in both:
+            if entry.label not in effects:
+                found = processes.call(entry, effects_of_rounding, scene, dt, own, perturbed_starts(entry, scene))
+                effects[entry.label] = [] if isinstance(found, Breakdown) else found
+        return [effect for entry, _ in both for effect in effects[entry.label]]
 
     found = []
-    for (entry, own), (twin, other) in combinations(motions, 2):
-        broken = {one.label: motion for one, motion in ((entry, own), (twin, other)) if isinstance(motion, Breakdown)}
+    for entry, twin in combinations(entries, 2):
         none = TwinFinding(scene.name, entry.label, twin.label, "not run")
+        own, other = motions[entry.label], motions[twin.label]
         if isinstance(own, Breakdown) or isinstance(other, Breakdown):
-            reasons = [f"{label}: {one.reason.removesuffix('.')}" for label, one in broken.items()]
-            found.append(replace(none, reason="; ".join(reasons)))
-        else:
-            coarser = max(own[1], other[1], key=lambda precision: float(np.finfo(precision).eps))
-            found.append(_compared(none, scene, dt, (own[0], other[0]), partial(effects_of_both, entry.label, twin.label), coarser))
+            broken = [(one.label, motion) for one, motion in ((entry, own), (twin, other)) if isinstance(motion, Breakdown)]
+            found.append(replace(none, reason="; ".join(f"{label}: {one.reason.removesuffix('.')}" for label, one in broken)))
+            continue
+        coarser = max(entry.adapter.precision, twin.adapter.precision, key=lambda precision: float(np.finfo(precision).eps))
+        found.append(_compared(none, scene, dt, (own, other), partial(effects_of, (entry, own), (twin, other)), coarser))
     return found
-
-
-def _motion(processes: EngineProcesses, entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array, type] | Breakdown:
-    """The states at each time step, shape (n, 13), and the engine's precision; or why there are none."""
-    if entry.engine is None:
-        return Breakdown(entry.absence or "missing", entry.reason)
-    try:
-        return processes.call(entry, _recorded, scene, dt)
-    except Failed as failure:
-        return Breakdown(failure.verdict, failure.reason)
-
-
-def _recorded(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Array, type] | Breakdown:
-    states = states_of(entry, scene, dt)
-    return states if isinstance(states, Breakdown) else (states, entry.adapter.precision)
-
-
-def _effects(entry: EngineEntry, scene: Scenario, dt: float) -> list[Array]:
-    states = states_of(entry, scene, dt)
-    assert not isinstance(states, Breakdown)  # it gave a motion before
-    return effects_of_rounding(entry, scene, dt, states)
 
 
 def _compared(

@@ -7,26 +7,33 @@ import ctypes
 import math
 import os
 import re
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import Diverged, Engine, numpy_array
-from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
-from dropspin.comparisons.running.recording import TimedSteps, time_per_step, time_steps
+from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.timing import (
+    TIMING_REPEATS,
+    TimedSteps,
+    time_batch,
+    time_per_step,
+    time_steps,
+    timings,
+    timings_in_flight,
+)
 from dropspin.scenarios import Scenario
 
+FIRST_STEPS, FIRST_STEPS_OF_A_BATCH = 16, 4
 LONG_ENOUGH = 2e-3
-"""The smallest wall time of a timing [s]."""
-MUCH_LONGER = 10.0
-"""A timing in free flight takes at least so many times as long as that of one step: a call may cost as much as hundreds of steps."""
+"""The smallest wall time of a timing [s]; a cost is measured in several rounds."""
 MOST_RUNS = 200
 WORLDS = (256,)
 """Numbers of worlds in a batch."""
-TIMINGS = 3
-"""The least of so many timings in free flight counts in a round: other load can only add to a time."""
 BATCH_SECONDS = 0.02
 """The smallest wall time of a timing of a batch in free flight [s]."""
 LONGEST_BATCH = 4.0
@@ -48,91 +55,68 @@ def load() -> float:
 def cost(entry: EngineEntry, scene: Scenario, dt: float) -> float:
     """Wall time per simulated second of the engine's time steps [s/s]; NaN if the state after them is not finite.
 
-    The time of the call is left out, as by `TimedSteps.per_step`. In free flight every step takes the same time: so many are timed that the
-    call is short beside them, beyond the end of the scene if the engine does not break down there. With a floor the time depends on the
-    motion, so whole runs are timed.
+    In free flight every step takes the same time: so many are timed that the call is short beside them, beyond the end of the scene if the
+    engine does not break down there. With a floor the time depends on the motion, so whole runs are timed.
     """
+    timed = partial(_finite, time_steps, entry.adapter, scene, dt)
     if scene.floor is None:
-        steps = 16
-        while (timed := _timed(entry, scene, dt, steps)) is not None and steps < MOST_STEPS:
-            if timed.stepping >= (enough := max(LONG_ENOUGH, MUCH_LONGER * timed.call)):
-                again = (_timed(entry, scene, dt, steps) for _ in range(TIMINGS - 1))
-                return _least([timed, *filter(None, again)]) / dt
-            steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * enough / timed.stepping))))
-    steps, runs = scene.steps(dt), list[TimedSteps]()
-    while sum(run.stepping for run in runs) < LONG_ENOUGH and len(runs) < MOST_RUNS:
-        if (timed := _timed(entry, scene, dt, steps)) is None:
-            return math.nan
-        runs.append(timed)
-    return _least(runs) / dt
-
-
-def _least(runs: Sequence[TimedSteps]) -> float:
-    """The time of a step [s] by the least times of simulations of as many steps: other load on the machine can only add to each of them."""
-    return time_per_step(min(run.call for run in runs), min(run.stepping for run in runs), runs[0].steps)
-
-
-def _timed(entry: EngineEntry, scene: Scenario, dt: float, steps: int) -> TimedSteps | None:
-    """The wall times of some time steps; None if the state after them is not finite."""
-    try:
-        timed = time_steps(entry.adapter, scene, dt, steps)
-    except Diverged:
-        return None
-    return timed if np.isfinite(timed.state).all() else None
+        with suppress(Diverged):
+            return time_per_step(timings_in_flight(timed, FIRST_STEPS, TIMING_REPEATS, LONG_ENOUGH)) / dt
+    with suppress(Diverged):
+        return time_per_step(timings(lambda: timed(scene.steps(dt)), MOST_RUNS, LONG_ENOUGH)) / dt
+    return math.nan
 
 
 def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int) -> list[float]:
-    """Wall time per simulated second and world [s/s] of a batch at each time step; NaN if the engine cannot simulate batches.
+    """Wall time per simulated second and world [s/s] of a batch at each time step, as by `cost`; NaN if its states are not finite.
 
-    In free flight a step takes the same time at any dt, and that of a call is left out, as by `cost`; with a floor whole runs are timed,
-    unless they are too long.
+    In free flight a step takes the same time at any dt. With a floor, runs that are too long, judged by their first steps, are not timed.
+
+    Raises:
+        Breakdown: The engine cannot simulate batches.
     """
-    members = [scene] * worlds
-    if scene.floor is not None:
-        return [_cost_on_a_floor(entry.adapter, members, dt) / (dt * worlds) for dt in dts]
-    dt = dts[-1]
-    _timed_batch(entry.adapter, members, dt, 1)  # compiles
-    steps, one = 4, _timed_batch(entry.adapter, members, dt, 1)
-    while (taken := _timed_batch(entry.adapter, members, dt, steps)) < max(BATCH_SECONDS, MUCH_LONGER * one) and steps < MOST_STEPS:
-        steps *= 4
-    return [time_per_step(one, taken, steps) / (each * worlds) for each in dts]
+    found = []
+    for dt in dts[-1:] if scene.floor is None else dts:
+        timed, steps = partial(_finite, time_batch, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
+        found.append(math.nan)
+        with suppress(Diverged):
+            timed(1)  # compiles
+            if scene.floor is None:
+                found[-1] = time_per_step(timings_in_flight(timed, FIRST_STEPS_OF_A_BATCH, 1, BATCH_SECONDS))
+            elif timed(FIRST_STEPS).stepping * steps <= LONGEST_BATCH * FIRST_STEPS:
+                found[-1] = time_per_step([timed(steps)])
+    return [per_step / (dt * worlds) for dt, per_step in zip(dts, found * (len(dts) // len(found)), strict=True)]
 
 
-def _cost_on_a_floor(engine: Engine, members: Sequence[Scenario], dt: float) -> float:
-    """The wall time of a step of a batch [s] over a whole run; NaN if the run is too long, judged by its first steps."""
-    steps, few = members[0].steps(dt), 16
-    _timed_batch(engine, members, dt, 1)  # compiles
-    if not _timed_batch(engine, members, dt, few) * steps <= LONGEST_BATCH * few:
-        return math.nan
-    return _timed_batch(engine, members, dt, steps) / steps
+def _finite(time_them: Callable[..., TimedSteps], *given: Any) -> TimedSteps:
+    """A timing of steps after which the states are finite.
 
-
-def _timed_batch(engine: Engine, members: Sequence[Scenario], dt: float, steps: int) -> float:
-    """Wall time of some time steps of a batch [s]; NaN without a batch or if its states are not finite."""
-    batch = engine.prepare_batch(members, dt)
-    if batch is None:
-        return math.nan
-    with batch:
-        start = time.perf_counter()
-        batch.advance(steps)
-        states = numpy_array(batch.states())
-        taken = time.perf_counter() - start
-    return taken if np.isfinite(states).all() else math.nan
+    Raises:
+        Diverged: They are not.
+    """
+    timed = time_them(*given)
+    if not np.isfinite(timed.state).all():
+        raise Diverged("the state is not finite")
+    return timed
 
 
 def memory_per_world(entry: EngineEntry, scene: Scenario, dt: float, worlds: int) -> float:
-    """The largest memory that a batch takes while it steps, per world [bytes]; NaN if the system is not Linux, or without batches.
+    """The largest memory that a batch takes while it steps, per world [bytes]; NaN if the system is not Linux.
 
     The batch is simulated twice. Before the second time, memory that the process has free is given back to the system.
+
+    Raises:
+        Breakdown: The engine cannot simulate batches.
     """
     members = [scene] * worlds
-    if not (PROCESS / "clear_refs").exists() or math.isnan(_timed_batch(entry.adapter, members, dt, MEMORY_STEPS)):
+    if not (PROCESS / "clear_refs").exists():
         return math.nan
+    time_batch(entry.adapter, members, dt, MEMORY_STEPS)
     if hasattr(libc := ctypes.CDLL(None), "malloc_trim"):  # of glibc
         libc.malloc_trim(0)
     (PROCESS / "clear_refs").write_text("5")  # sets the peak to the present memory
     before = _process_memory("VmRSS")
-    _timed_batch(entry.adapter, members, dt, MEMORY_STEPS)
+    time_batch(entry.adapter, members, dt, MEMORY_STEPS)
     return (_process_memory("VmHWM") - before) / worlds
 
 

@@ -7,20 +7,20 @@ import math
 import os
 import time
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import pairwise, takewhile
+from typing import Literal
 
 import numpy as np
 
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.recording import record
+from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
-from dropspin.comparisons.running.verification import verified_refusal
-from dropspin.comparisons.tradeoff.ladder import Ending, Ladder
 from dropspin.scenarios import Scenario, truth_for
 
 DIVISIONS = (1, *(k * 2**j for j in range(22) for k in (2, 3)))
@@ -38,6 +38,28 @@ FEWEST_POINTS = 6
 CONVERGED = 0.3
 """The share of the largest error of the motion below which the smallest must be."""
 SMALL, PATIENCE, PATIENCE_WHILE_LARGE = 1e-6, 2, 6
+
+
+Ending = Literal["budget", "longest_run", "error_stopped_falling", "failed", "not_run"]
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """The time steps at which an engine was tried.
+
+    Attributes:
+        engine: Label of the engine.
+        steps: Each time step tried [s], from the coarsest, and the absolute value of the metric at it; NaN if it is undefined.
+        ended: The kind of reason why no smaller time step was tried.
+        reason: The reason why no smaller time step was tried, as a clause.
+        left_out: The reason why the engine is left out of the comparison; empty if it is not.
+    """
+
+    engine: str
+    steps: tuple[tuple[float, float], ...]
+    ended: Ending
+    reason: str
+    left_out: str = ""
 
 
 def output_interval(scene: Scenario) -> float:
@@ -65,41 +87,31 @@ def errors_over_steps(entry: EngineEntry, scene: Scenario, metrics: Sequence[str
         budget: Processor time for all time steps [s]; the time step at which it is exceeded is the last one.
         processes: The engine's process.
     """
-    try:
-        refusal = entry.reason if entry.absence else processes.call(entry, _refusal, scene)
-    except Failed as failure:
-        refusal = failure.reason
-    if refusal:
-        return Ladder(entry.label, (), "not_run", refusal, refusal)
     interval = output_interval(scene)
     most = MOST_STEPS if scene.floor is None else MOST_RECORDED
     tried: list[tuple[float, list[float]]] = []
     spent = 0.0
     ended: Ending = "longest_run"
     reason = f"a run at the next smaller time step would have more than {most:,} steps"
-    try:
-        processes.call(entry, _error, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
-        for division in takewhile(lambda division: scene.duration * division / interval <= most, DIVISIONS):
+    found = processes.call(entry, _errors, scene, interval, 1, metrics)  # compiles and warms up before anything is timed
+    if isinstance(found, Breakdown):
+        return Ladder(entry.label, (), "not_run", found.reason, found.reason)
+    for division in takewhile(lambda division: scene.duration * division / interval <= most, DIVISIONS):
+        found = processes.call(entry, _errors, scene, interval / division, division, metrics)
+        if isinstance(found, Breakdown):
             tried.append((interval / division, [math.nan] * len(metrics)))
-            errors, taken = processes.call(entry, _error, scene, interval / division, division, metrics)
-            if np.isfinite(errors).all():
-                tried[-1] = (interval / division, errors)
-            spent += taken
-            if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])]):
-                ended, reason = "error_stopped_falling", f"over the last {stalled} steps the error fell by less than a fifth per step"
-                break
-            if spent >= budget:
-                ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
-                break
-    except Failed as failure:
-        ended, reason = ("failed" if tried else "not_run"), failure.reason
+            ended, reason = "failed", found.reason
+            break
+        tried.append((interval / division, found[0]))
+        spent += found[1]
+        if stalled := _stalled([errors[0] for _, errors in tried if np.isfinite(errors[0])]):
+            ended, reason = "error_stopped_falling", f"over the last {stalled} steps the error fell by less than a fifth per step"
+            break
+        if spent >= budget:
+            ended, reason = "budget", f"the budget of {budget:g} s of processor time was spent"
+            break
     steps = tuple((dt, errors[0]) for dt, errors in tried)
     return Ladder(entry.label, steps, ended, reason, _left_out(tried, metrics[1], reason))
-
-
-def _refusal(entry: EngineEntry, scene: Scenario) -> str | None:
-    """The reason why the engine declines a scene; runs in the engine's process."""
-    return verified_refusal(entry.adapter.refusal(scene))
 
 
 def _stalled(errors: Sequence[float]) -> int:
@@ -111,8 +123,6 @@ def _stalled(errors: Sequence[float]) -> int:
 
 def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: str) -> str:
     """The reason why an engine is left out: no error is finite, or the errors of the motion do not fall; empty if it takes part."""
-    if not tried:
-        return reason
     first, last = (f"{1e3 * tried[place][0]:.4g} ms" for place in (0, -1))
     range_tried = f"{len(tried)} time steps tried, {first} to {last}" if len(tried) > 1 else f"only time step tried, {first}"
     errors = [motion for _, (_, motion) in tried if np.isfinite(motion)]
@@ -124,30 +134,21 @@ def _left_out(tried: Sequence[tuple[float, list[float]]], metric: str, reason: s
     return ""
 
 
-def _error(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
-    """Absolute values of metrics at a time step, NaN where undefined, and the processor time of their measurement [s]."""
+def _errors(entry: EngineEntry, scene: Scenario, dt: float, division: int, metrics: Sequence[str]) -> tuple[list[float], float]:
+    """Absolute values of metrics at a time step, NaN if one is undefined, and the processor time of their measurement [s]."""
     start = processor_time()
-    truth = truth_for(scene)
-    in_flight = scene.floor is None
-    phases = [StartPhase(scene, truth)] if in_flight else start_phases(scene, truth, dt)
-    cases = []
-    for phase in phases:
-        try:
-            motion = record(entry.adapter, phase.scene, dt, division if in_flight else 1).motion
-        except Diverged:
-            return [math.nan] * len(metrics), processor_time() - start
-        cases.append(Comparison.with_truth(phase.scene, motion, phase.truth))
-    return [_size(metric, cases) for metric in metrics], processor_time() - start
+    verify_accepted(entry.adapter, scene)
+    truth, every = truth_for(scene), division if scene.floor is None else 1
+    phases = [StartPhase(scene, truth)] if scene.floor is None else start_phases(scene, truth, dt)
+    errors = [math.nan] * len(metrics)
+    with suppress(Diverged, Unresolved):
+        motions = ((phase, record(entry.adapter, phase.scene, dt, every).motion) for phase in phases)
+        cases = [Comparison.with_truth(phase.scene, motion, phase.truth) for phase, motion in motions]
+        errors = [abs(METRICS[metric].average(cases).value) for metric in metrics]
+    return errors if np.isfinite(errors).all() else [math.nan] * len(metrics), processor_time() - start
 
 
 def processor_time() -> float:
     """Processor time of this process and of its children that have ended [s]."""
     times = os.times()
     return time.process_time() + times.children_user + times.children_system
-
-
-def _size(metric: str, cases: Sequence[Comparison]) -> float:
-    try:
-        return abs(METRICS[metric].average(cases).value)
-    except Unresolved:
-        return math.nan

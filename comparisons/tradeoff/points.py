@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainSerializer, PlainValidator
 
 from dropspin.comparisons.tradeoff.costs import WORLDS
-from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.errors import Ladder
 from dropspin.scenarios import Scenario
 
 Array = NDArray[np.float64]

@@ -6,21 +6,21 @@ of a round equally.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.measuring.metrics import leading_metric, metrics_for
-from dropspin.comparisons.running.engine_process import Failed
-from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore, several
+from dropspin.comparisons.running.entries import engine_entries
+from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene, ignore
 from dropspin.comparisons.running.parallel import as_jobs, results_in_parallel
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, load, memory_per_world
-from dropspin.comparisons.tradeoff.errors import BUDGET, errors_over_steps
-from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.errors import BUDGET, Ladder, errors_over_steps
 from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff, spread
 from dropspin.scenarios import DropspinError, Scenario, truth_for
 from dropspin.scenarios.errors import UnknownName
@@ -52,6 +52,7 @@ LARGE_BATCH = 1024
 """The smallest batch of which the memory is measured: that of fewer worlds is a few pages."""
 NO_COST = "its cost could not be measured: its time steps fail, or do not give a finite state"
 
+Result = TypeVar("Result")
 OnProgress = Callable[[str, float], None]
 """Called with a description of the current work, and the fraction of the study that is done."""
 
@@ -103,8 +104,9 @@ def tradeoff(
     known = [one.name for one in metrics_for(scene, truth)]
     if chosen not in known:
         raise UnknownName(f"{scene.name}'s metric", chosen, known)
-    named = [engine_entry(name) for name in several("engines", engines) or (IN_FLIGHT if scene.floor is None else ON_A_FLOOR)]
-    entries = {one.label: one for entry in named for one in _with_accuracy_levels(entry)}
+    asked = engine_entries(engines, IN_FLIGHT if scene.floor is None else ON_A_FLOOR)
+    levels = {entry.label: [] if entry.engine is None else entry.engine.accuracy_levels() for entry in asked}
+    entries = {one.label: one for entry in asked for one in (entry, *engine_entries(levels[entry.label]))}
     report = on_progress or ignore
 
     def errors(entry: EngineEntry, processes: EngineProcesses, report_errors: Callable[[str], None]) -> Ladder:
@@ -118,7 +120,7 @@ def tradeoff(
         ladders = results_in_parallel(list(entries.values()), errors, crews, lambda what, share: report(what, 0.5 * share))
         compared = [(entries[one.engine], one) for one in ladders if not one.left_out]
         points, others = _with_costs(compared, scene, sizes, processes, report)
-        memory = _memory([entries[one.engine] for one in ladders], points, scene, sizes[-1], processes)
+        memory = _memory(entries, points, scene, sizes[-1], processes)
     measured = {point.engine for point in points}
     ladders = [one if one.left_out or one.engine in measured else replace(one, left_out=NO_COST) for one in ladders]
     found = TradeOff(scene, chosen, points, tuple(ladders), sizes, memory, others)
@@ -126,12 +128,6 @@ def tradeoff(
         reasons = "; ".join(f"{label}: {why.removesuffix('.')}" for label, why in found.left_out.items())
         raise DropspinError(f"no engine runs {scene.name}: {reasons}.")
     return found
-
-
-def _with_accuracy_levels(entry: EngineEntry) -> list[EngineEntry]:
-    """An engine, and the engine with each value of the options that set its accuracy."""
-    levels = [] if entry.engine is None else entry.engine.accuracy_levels()
-    return [entry, *map(engine_entry, levels)]
 
 
 def _with_costs(
@@ -146,59 +142,42 @@ def _with_costs(
     And the mean `load` of the machine.
     """
     steps = [(entry, dt, error) for entry, ladder in ladders for dt, error in ladder.steps if np.isfinite(error)]
-    costs: list[list[float]] = [[] for _ in steps]
-    loads = []
+    costs, loads = np.full((len(steps), ROUNDS), np.nan), []
     for number in range(ROUNDS):
-        for rounds, (entry, dt, _) in zip(costs, steps, strict=True):
+        for row, (entry, dt, _) in enumerate(steps):
             loads.append(load())
-            rounds.append(math.nan if rounds and math.isnan(rounds[-1]) else _cost(entry, scene, dt, processes))
+            if number == 0 or np.isfinite(costs[row, number - 1]):
+                costs[row, number] = _or_nan(processes.call(entry, cost, scene, dt))
         on_progress(f"round {number + 1} of {ROUNDS}", 0.5 + 0.4 * (number + 1) / ROUNDS)
-    batches: list[dict[int, list[float]]] = [{size: [] for size in worlds} for _ in steps]
+    batches = np.full((len(steps), len(worlds), BATCH_ROUNDS), np.nan)
     for number in range(BATCH_ROUNDS):
         for entry, ladder in ladders:
             rows = [row for row, (owner, _, _) in enumerate(steps) if owner is entry]
-            for size in worlds:
-                found = _costs_per_world(entry, scene, [steps[row][1] for row in rows], size, processes)
-                for row, value in zip(rows, found, strict=True):
-                    batches[row][size].append(value)
+            dts = [steps[row][1] for row in rows]
+            for column, size in enumerate(worlds):
+                batches[rows, column, number] = _or_nan(processes.call(entry, costs_per_world, scene, dts, size))
             on_progress(f"batches of {ladder.engine}", 0.9 + 0.1 * (number + 1) / BATCH_ROUNDS)
     points = []
     for (entry, dt, error), rounds, by_size in zip(steps, costs, batches, strict=True):
-        timed = {size: np.array(values) for size, values in by_size.items() if np.isfinite(values).all()}
-        least, spreads = ({size: of(values) for size, values in timed.items()} for of in (lambda values: float(values.min()), spread))
         if np.isfinite(rounds).all():
-            points.append(CostPoint(entry.label, dt, error, np.array(rounds), least, spreads))
+            timed = {size: values for size, values in zip(worlds, by_size, strict=True) if np.isfinite(values).all()}
+            least = {size: float(values.min()) for size, values in timed.items()}
+            points.append(CostPoint(entry.label, dt, error, rounds, least, {size: spread(values) for size, values in timed.items()}))
     return tuple(points), float(np.mean(loads)) if loads else math.nan
 
 
 def _memory(
-    entries: Sequence[EngineEntry], points: Sequence[CostPoint], scene: Scenario, worlds: int, processes: EngineProcesses
+    entries: Mapping[str, EngineEntry], points: Sequence[CostPoint], scene: Scenario, worlds: int, processes: EngineProcesses
 ) -> dict[str, float]:
     """The memory per world [bytes] of each engine in a large batch."""
-    found = {}
-    for entry in entries if worlds >= LARGE_BATCH else ():
-        finest = next((point.dt for point in points if point.engine == entry.label and worlds in point.costs_per_world), None)
-        if finest is not None:
-            found[entry.label] = _memory_per_world(entry, scene, finest, worlds, processes)
+    if worlds < LARGE_BATCH:
+        return {}
+    dts = {point.engine: point.dt for point in reversed(points) if worlds in point.costs_per_world}
+    found = {
+        label: _or_nan(processes.call(entries[label], memory_per_world, scene, dts[label], worlds)) for label in entries if label in dts
+    }
     return {label: memory for label, memory in found.items() if np.isfinite(memory)}
 
 
-def _memory_per_world(entry: EngineEntry, scene: Scenario, dt: float, worlds: int, processes: EngineProcesses) -> float:
-    try:
-        return processes.call(entry, memory_per_world, scene, dt, worlds)
-    except Failed:
-        return math.nan
-
-
-def _cost(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineProcesses) -> float:
-    try:
-        return processes.call(entry, cost, scene, dt)
-    except Failed:
-        return math.nan
-
-
-def _costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], worlds: int, processes: EngineProcesses) -> list[float]:
-    try:
-        return processes.call(entry, costs_per_world, scene, dts, worlds)
-    except Failed:
-        return [math.nan] * len(dts)
+def _or_nan(found: Result | Breakdown) -> Result | float:
+    return math.nan if isinstance(found, Breakdown) else found

@@ -136,7 +136,7 @@ def _run(
         options: The options `jobs`, `resources` and `quick` of `run`.
     """
     from dropspin.comparisons.running.run import DEFAULT_DTS, run, what_changed
-    from dropspin.comparisons.symmetries.rows import with_symmetries
+    from dropspin.comparisons.symmetries.findings import with_symmetries
     from dropspin.comparisons.symmetries.study import symmetries
     from dropspin.reports.run_folder import MeasuredScenes, fill, run_folder
     from dropspin.reports.stories.run import forecast_sentence

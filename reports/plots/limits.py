@@ -6,8 +6,7 @@ import numpy as np
 
 from dropspin.comparisons.robustness.axes import Axis
 from dropspin.comparisons.robustness.failure_modes import FAILURE_MODES
-from dropspin.comparisons.robustness.scan import AxisScan
-from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy
 from dropspin.reports.plots.chart import Chart, Line, draw
 
 if TYPE_CHECKING:
@@ -63,7 +62,7 @@ def _bars(scan: AxisScan, row: int) -> list[Line]:
     """A bar for each failure mode between two transitions."""
     place = scan.axis.coordinate
     left, bars = place(scan.points[0].value), []
-    for inside, outside in [*((edge.before, edge.after) for edge in scan.transitions), (scan.points[-1], scan.points[-1])]:
+    for inside, outside in [*scan.transitions, (scan.points[-1], scan.points[-1])]:
         right = 0.5 * (place(inside.value) + place(outside.value))
         bars.append(Line(_in_words(inside.mode), np.array([left, right]), np.full(2, float(row)), COLOURS[inside.mode], BAR))
         left = right

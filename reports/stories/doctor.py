@@ -4,11 +4,10 @@ import sys
 from collections.abc import Sequence
 
 from dropspin.comparisons.results.provenance import processor, versions
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.recording import Breakdown, simulate
 from dropspin.scenarios import DropspinError, load
 
 Rows = list[dict[str, str]]
@@ -27,9 +26,10 @@ def _health(name: str, processes: EngineProcesses) -> str:
     """Whether an engine can take a time step, tried in a separate process."""
     try:
         entry = engine_entry(name)
-        return f"{entry.absence}: {entry.reason}" if entry.absence else processes.call(entry, _fall)
-    except (DropspinError, Failed) as error:
+        found = processes.call(entry, _fall)
+    except DropspinError as error:
         return f"broken: {error}"
+    return f"{entry.absence or 'broken'}: {found}" if isinstance(found, Breakdown) else found
 
 
 def _fall(entry: EngineEntry) -> str:

@@ -7,8 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dropspin.comparisons.robustness.axes import AXES
-from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint
-from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.figures import limits_charts
 from dropspin.reports.stories.numbers import left_out
@@ -100,7 +99,7 @@ def _range(scan: AxisScan, nominal: str | None) -> dict[str, str]:
     count, sound = len(points), sum(point.mode == "sound" for point in points)
     none = {"sound from": "–", "to": "–"}
     if ends is None:
-        base = f"{_mode(scan.at(scan.base))} at the nominal value, {scan.base:.4g}"
+        base = f"{_mode(scan.nominal)} at the nominal value, {scan.base:.4g}"
         return none | {"beyond": f"{base}; sound at {sound} of {count} tested values"}
     first, last = ends
     least, most = (f"{points[number].value:.4g}" for number in ends)

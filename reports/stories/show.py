@@ -75,18 +75,18 @@ def built_rows(scene: Scenario, engine_name: str, dt: float) -> Rows:
     Raises:
         DropspinError: The engine cannot run, or breaks down while it builds the scene.
     """
-    from dropspin.comparisons.running.engine_process import Failed
     from dropspin.comparisons.running.entries import present_entry
     from dropspin.comparisons.running.inputs import verify_time_step
     from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+    from dropspin.comparisons.running.recording import Breakdown
 
     verify_time_step(scene, dt)
     entry = present_entry(engine_name)
     with EngineProcesses(ResourceLimits(processor_time=60.0)) as processes:
-        try:
-            return processes.call(entry, _built, scene, dt)
-        except Failed as failure:
-            raise EngineBroken(f"{entry.label} cannot build {scene.name}: {failure.reason}.") from None
+        found = processes.call(entry, _built, scene, dt)
+    if isinstance(found, Breakdown):
+        raise EngineBroken(f"{entry.label} cannot build {scene.name}: {found.reason}.")
+    return found
 
 
 def _built(entry: "EngineEntry", scene: Scenario, dt: float) -> Rows:

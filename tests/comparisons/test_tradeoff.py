@@ -10,12 +10,12 @@ from support.engines import Exact, ExactSimulation
 
 from dropspin.comparisons.engines.base import BatchSimulation, Diverged
 from dropspin.comparisons.measuring.metrics import METRICS, leading_metric
+from dropspin.comparisons.running import timing
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.recording import simulate
+from dropspin.comparisons.running.recording import Breakdown, simulate
 from dropspin.comparisons.running.run import measure
 from dropspin.comparisons.tradeoff import costs, errors, study
-from dropspin.comparisons.tradeoff.errors import DIVISIONS, output_interval
-from dropspin.comparisons.tradeoff.ladder import Ladder
+from dropspin.comparisons.tradeoff.errors import DIVISIONS, Ladder, output_interval
 from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff, spread
 from dropspin.comparisons.tradeoff.study import tradeoff
 from dropspin.scenarios import DropspinError, load
@@ -146,7 +146,7 @@ class CostlyBatch(BatchSimulation):
 @pytest.mark.parametrize("dt", [1e-2, 1e-3])
 def test_cost_of_a_step_in_flight_is_without_that_of_the_call(monkeypatch, dt):
     """To 1e-9, where one call costs as much as four hundred steps."""
-    monkeypatch.setattr(costs.time, "perf_counter", lambda: CostlyCalls.clock)
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: CostlyCalls.clock)
     entry = EngineEntry("costly-calls", CostlyCalls())
     assert costs.cost(entry, SPIN, dt) == pytest.approx(STEP / dt, rel=1e-9)
     assert costs.costs_per_world(entry, SPIN, [dt, 2 * dt], 4) == pytest.approx([STEP / dt, STEP / (2 * dt)], rel=1e-9)
@@ -161,7 +161,7 @@ def spin():
 
 def test_errors_do_not_depend_on_the_number_of_jobs_and_costs_are_measured_alone(monkeypatch):
     """No errors are being measured at the time."""
-    running, measure_errors, measure_cost = set(), study.errors_over_steps, study._cost
+    running, measure_errors, measure_costs = set(), study.errors_over_steps, study._with_costs
 
     def errors_over_steps(entry, *given):
         running.add(entry.label)
@@ -169,12 +169,12 @@ def test_errors_do_not_depend_on_the_number_of_jobs_and_costs_are_measured_alone
         running.remove(entry.label)
         return ladder
 
-    def cost_of(entry, *given):
+    def with_costs(*given):
         assert not running
-        return measure_cost(entry, *given)
+        return measure_costs(*given)
 
     monkeypatch.setattr(study, "errors_over_steps", errors_over_steps)
-    monkeypatch.setattr(study, "_cost", cost_of)
+    monkeypatch.setattr(study, "_with_costs", with_costs)
     monkeypatch.setattr(errors, "MOST_STEPS", 200)
     engines = ["mujoco[integrator=rk4]", "wang[rotation=rk4]", "wang[rotation=exact]"]
     one, two = (tradeoff(SHORT, engines, worlds=[2], jobs=jobs) for jobs in (1, 2))
@@ -395,7 +395,8 @@ def test_memory_per_world_is_the_peak_of_a_batch(worlds):
 
 
 def test_memory_of_an_engine_without_batches_is_unknown():
-    assert np.isnan(costs.memory_per_world(EngineEntry("exact", Exact()), SPIN, 1e-3, 1024))
+    with pytest.raises(Breakdown, match="cannot simulate batches"):
+        costs.memory_per_world(EngineEntry("exact", Exact()), SPIN, 1e-3, 1024)
 
 
 def test_empty_name_of_a_metric_is_refused_before_anything_runs():
@@ -433,7 +434,7 @@ CLOCK = {"now": 0.0, "calls": 0}
 
 def test_cost_of_a_round_is_that_of_the_least_disturbed_timing(monkeypatch):
     """By a clock that only the engine advances; the call, whose time is subtracted, is disturbed too."""
-    monkeypatch.setattr("dropspin.comparisons.running.recording.time.perf_counter", lambda: CLOCK["now"])
+    monkeypatch.setattr("dropspin.comparisons.running.timing.time.perf_counter", lambda: CLOCK["now"])
     assert costs.cost(EngineEntry("disturbed", Disturbed()), SPIN, 0.01) == pytest.approx(STEP / 0.01, rel=1e-9)
 
 

@@ -10,12 +10,11 @@ from contextlib import contextmanager
 from threading import RLock
 from unittest import mock
 
-from dropspin.comparisons.engines.exceptions import described
 from dropspin.comparisons.engines.stand_in import StandIn
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.engine_run import EngineRun, run_engine
+from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.processes import Closed, EngineProcesses
-from dropspin.comparisons.running.recording import Breakdown
+from dropspin.comparisons.running.recording import Breakdown, classify
 
 REAL = {name: getattr(EngineProcesses, name) for name in ("start", "run_engine", "call", "renew")}
 _one_at_a_time = RLock()
@@ -37,27 +36,27 @@ def renew(self, entry):
     REAL["start"](self, [entry])
 
 
-def run(self, entry, scene, dt, starts, on_simulations=lambda done, total: None, *, quick=False):
+def run(self, entry, scene, dt, starts, on_simulations=ignore, *, quick=False):
     if needs_process(self, entry):
         return REAL["run_engine"](self, entry, scene, dt, starts, on_simulations, quick=quick)
-    try:
-        return call(self, entry, run_engine, scene, dt, starts, on_simulations, quick=quick)
-    except Failed as failure:
-        return EngineRun(entry.label, Breakdown(failure.verdict, failure.reason))
+    found = call(self, entry, run_engine, scene, dt, starts, on_simulations, quick=quick)
+    return EngineRun(entry.label, found) if isinstance(found, Breakdown) else found
 
 
-def call(self, entry, work, *given, while_waiting=lambda: None, **options):
+def call(self, entry, work, *given, on_simulations=ignore, **options):
     """As `EngineProcesses.call`; one piece of work at a time, for not all that engines do is safe in threads."""
     if needs_process(self, entry):
-        return REAL["call"](self, entry, work, *given, while_waiting=while_waiting)
+        return REAL["call"](self, entry, work, *given, on_simulations=on_simulations)
+    if entry.absence:
+        return Breakdown(entry.absence, entry.reason)
     if self._closed:
         raise Closed
-    while_waiting()
+    on_simulations(0, 0)
     with _one_at_a_time, mock.patch.object(tempfile, "tempdir", tempfile.tempdir):
         try:
             return work(entry, *given, **options)
         except Exception as error:
-            raise Failed("crashed", described(error)) from None
+            return classify(error)
 
 
 @contextmanager

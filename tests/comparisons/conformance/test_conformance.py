@@ -22,8 +22,8 @@ from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.engines.wang import Wang
 from dropspin.comparisons.running import recording
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.recording import time_steps
 from dropspin.comparisons.running.run import run
+from dropspin.comparisons.running.timing import time_steps
 from dropspin.scenarios import load
 from dropspin.scenarios.errors import UnknownName
 

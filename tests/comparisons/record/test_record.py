@@ -22,7 +22,7 @@ from dropspin.comparisons.record.environments import NotInstallable, NotMeasured
 from dropspin.comparisons.record.plan import Plan, load_plan
 from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, machine, stored
 from dropspin.comparisons.results.folder import sha256
-from dropspin.comparisons.running.recording import TimedSteps
+from dropspin.comparisons.running.timing import TimedSteps
 from dropspin.scenarios import DropspinError, load
 
 RELEASES = ["1.0", "1.1", "1.2"]

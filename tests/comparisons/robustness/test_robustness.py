@@ -15,11 +15,9 @@ from support.engines import Exact, ExactSimulation, FrozenSimulation
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.robustness.axes import AXES
 from dropspin.comparisons.robustness.failure_modes import SOUND, ExtendedMotion, clamped, diagnose, held_speeds
-from dropspin.comparisons.robustness.operating_point import OperatingPoint
+from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_nominal_units
 from dropspin.comparisons.robustness.runner import Runner
-from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint, scan_axis
-from dropspin.comparisons.robustness.study import RobustnessStudy, find_limits
-from dropspin.comparisons.robustness.transformations import in_nominal_units
+from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint, find_limits, scan_axis
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.scenarios import DropspinError, Trajectory, load, truth_for
@@ -32,12 +30,12 @@ QUICK = ResourceLimits(processor_time=20.0)
 def along(scene_name, axis, name, near=1.03):
     """The scan of a catalogue scene's axis with an engine or its name."""
     with EngineProcesses(QUICK) as processes:
-        return scan_axis(Runner(engine_entry(name), 0.1, processes), OperatingPoint(load(scene_name), DT), AXES[axis], near)
+        return scan_axis(Runner(engine_entry(name), OperatingPoint(load(scene_name), DT), 0.1, processes), AXES[axis], near)
 
 
 def first(found, mode):
     """The values before and after the first transition to a failure mode."""
-    pairs = [(one.before.value, one.after.value) for one in found.transitions if one.after.mode == mode]
+    pairs = [(before.value, after.value) for before, after in found.transitions if after.mode == mode]
     assert pairs, [(point.value, point.mode) for point in found.points]
     return pairs[0]
 
@@ -284,7 +282,7 @@ def test_clamp_of_the_norm_is_found():
 
     thrown = load(load("fall-damped").model_dump(exclude={"expect", "damping"}, exclude_none=True))
     with EngineProcesses(QUICK) as processes:
-        found = scan_axis(Runner(engine_entry(Slow()), 0.1, processes), OperatingPoint(thrown, DT), AXES["duration"])
+        found = scan_axis(Runner(engine_entry(Slow()), OperatingPoint(thrown, DT), 0.1, processes), AXES["duration"])
     assert found.points[-1].mode == "clamped"
     assert found.points[-1].diagnosis.size == pytest.approx(30.0)
 

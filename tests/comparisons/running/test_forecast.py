@@ -4,11 +4,12 @@ import pytest
 from support import engines as made
 
 import dropspin as ds
-from dropspin.comparisons.running.engine_run import Timing, run_engine
+from dropspin.comparisons.running.engine_run import run_engine
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.forecast import MEASURING, Forecast, forecast, simulations
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
+from dropspin.comparisons.running.timing import Timing
 from dropspin.reports.stories.run import forecast_sentence
 
 DT = 8e-3

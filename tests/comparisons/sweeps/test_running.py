@@ -19,8 +19,8 @@ import pytest
 from support import engines as test_engines
 
 from dropspin.comparisons.engines.base import Diverged
-from dropspin.comparisons.running.engine_process import Failed
 from dropspin.comparisons.running.processes import Closed, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.sweeps.folder import read_sweep
 from dropspin.comparisons.sweeps.running import run_sweep
 from dropspin.comparisons.sweeps.spec import load_sweep
@@ -200,7 +200,7 @@ def test_process_that_ends_with_its_sweep_is_not_a_failure():
     class Ending:
         def call(self, *given):
             calls.append(True)
-            raise Failed("crashed", "its process was ended by SIGKILL")
+            return Breakdown("crashed", "its process was ended by SIGKILL")
 
     def verify_running():
         if len(calls) == 2:  # the second time the job is by itself

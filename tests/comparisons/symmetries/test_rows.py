@@ -10,8 +10,7 @@ from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.measuring.symmetries import AGAIN, BITWISE, NAMES
-from dropspin.comparisons.symmetries.findings import Finding
-from dropspin.comparisons.symmetries.rows import with_symmetries
+from dropspin.comparisons.symmetries.findings import Finding, with_symmetries
 from dropspin.comparisons.symmetries.study import symmetries
 from dropspin.reports.stories.failures import failures
 

@@ -10,7 +10,7 @@ from support import engines as made
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.measuring.symmetries import AGAIN, BATCH, HALVES, NAMES, NEW_PROCESS, ONE_CORE, SYMMETRIES
 from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.symmetries.study import SCENES, findings_of, symmetries
+from dropspin.comparisons.symmetries.study import SCENES, findings_of, states_of, symmetries
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError, load, truth_for
 
@@ -150,7 +150,8 @@ def test_unit_in_the_depth_of_a_contact_is_found_also_if_the_body_starts_in_cont
     tables = {"gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": {"restitution": 0.0, "friction": 1.0}}
     scene = load({"duration": 1.0, "body": box, "start": {"position": [0.0, height, 0.0]}, **tables})
     names = ["in millimetres", "in milliseconds", "in grams", "turned by 90°"]
-    _, found = findings_of(engine_entry("mujoco[profile=default]"), scene, 2e-3, names)
+    entry = engine_entry("mujoco[profile=default]")
+    found = findings_of(entry, scene, 2e-3, states_of(entry, scene, 2e-3), names)
     assert [one.status for one in found] == ["lost", "lost", "kept", "kept"]
 
 

@@ -10,8 +10,7 @@ from support.cli import TERMINAL
 
 from dropspin.comparisons.robustness.axes import AXES
 from dropspin.comparisons.robustness.failure_modes import Diagnosis
-from dropspin.comparisons.robustness.scan import AxisScan, ScanPoint
-from dropspin.comparisons.robustness.study import RobustnessStudy
+from dropspin.comparisons.robustness.study import AxisScan, RobustnessStudy, ScanPoint
 from dropspin.reports import plots
 from dropspin.reports.stories import limits
 from dropspin.reports.study_files import write_study

@@ -1,0 +1,149 @@
+"""The clock: the wall time of the native steps of an engine, of one world or of a batch, apart from building, the call, and compilation.
+
+An engine may return from `advance` before its steps are done, and wait for them when the state is read: a time ends with the state.
+"""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dropspin.comparisons.engines.base import BatchSimulation, Engine, Simulation, numpy_array
+from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
+from dropspin.comparisons.running.recording import Breakdown, classify, verify_accepted
+from dropspin.scenarios import Scenario
+
+TIMING_REPEATS = 3
+"""The least of so many timings counts: other load on the machine can only add to a time."""
+LONG_ENOUGH = 0.01
+"""A simulation that takes this long is timed once [s]: it has hundreds of steps, and engines are compared over many scenes."""
+MUCH_LONGER = 10.0
+"""Steps in free flight take at least so many times as long as a call of one step: a call may cost as much as hundreds of steps."""
+
+
+class TimedSteps(NamedTuple):
+    """Wall times of a simulation [s], and its last state.
+
+    Attributes:
+        building: Of building it.
+        call: Of a first call that takes one step, until the state is there.
+        stepping: Of a second call that takes `steps` steps, until the state is there.
+        steps: The number of these steps.
+        state: The last state, shape (13,); of a batch the last states, shape (size, 13).
+    """
+
+    building: float
+    call: float
+    stepping: float
+    steps: int
+    state: NDArray[np.float64]
+
+    @property
+    def whole(self) -> float:
+        """The time of it all [s]."""
+        return self.building + self.call + self.stepping
+
+
+def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> TimedSteps:
+    """Time native steps: one, and then others in one call. The call itself may cost a compiled engine as much as hundreds of steps.
+
+    Raises:
+        Diverged: The simulation broke down.
+    """
+    start = time.perf_counter()
+    simulation = engine.prepare(scene, dt)
+    return _timed(start, simulation, simulation.state, steps)
+
+
+def time_batch(engine: Engine, members: Sequence[Scenario], dt: float, steps: int) -> TimedSteps:
+    """As `time_steps`, of a batch.
+
+    Raises:
+        Breakdown: The engine cannot simulate batches.
+        Diverged: The simulation broke down.
+    """
+    start = time.perf_counter()
+    batch = engine.prepare_batch(members, dt)
+    if batch is None:
+        raise Breakdown("declined", "the engine cannot simulate batches")
+    return _timed(start, batch, lambda: numpy_array(batch.states()), steps)
+
+
+def _timed(start: float, simulation: Simulation | BatchSimulation, state: Callable[[], NDArray[np.float64]], steps: int) -> TimedSteps:
+    times = [start, time.perf_counter()]
+    with simulation:
+        for number in (1, steps):
+            simulation.advance(number)
+            last = state()
+            times.append(time.perf_counter())
+    building, call, stepping = (later - earlier for earlier, later in pairwise(times))
+    return TimedSteps(building, call, stepping, steps, last)
+
+
+def timings(once: Callable[[], TimedSteps], most: int, enough: float) -> list[TimedSteps]:
+    """Timings of the same steps: at most so many, and no more when they have taken long enough together [s]."""
+    found: list[TimedSteps] = []
+    while len(found) < most and sum(timed.stepping for timed in found) < enough:
+        found.append(once())
+    return found
+
+
+def timings_in_flight(timed: Callable[[int], TimedSteps], steps: int, repeats: int, enough: float) -> list[TimedSteps]:
+    """Timings of so many steps of equal cost that the call is short beside them.
+
+    Args:
+        timed: Times a number of steps.
+        steps: The number to begin with.
+        repeats: The number of timings.
+        enough: The smallest wall time of the steps [s].
+    """
+    while True:
+        first = timed(steps)
+        least = max(enough, MUCH_LONGER * first.call)
+        if first.stepping >= least or steps >= MOST_STEPS:
+            return [first, *(timed(steps) for _ in range(repeats - 1))]
+        steps = min(MOST_STEPS, math.ceil(steps * min(16.0, max(2.0, 1.2 * least / first.stepping))))
+
+
+def time_per_step(runs: Sequence[TimedSteps]) -> float:
+    """The time of a step [s] by the least times of simulations of as many steps.
+
+    The time of the call is left out, unless a call of many steps took hardly longer than one of a single step.
+    """
+    call, stepping, steps = min(run.call for run in runs), min(run.stepping for run in runs), runs[0].steps
+    return (stepping - call) / (steps - 1) if stepping > 2.0 * call and steps > 1 else stepping / steps
+
+
+class Timing(NamedTuple):
+    """The time that an engine's steps take.
+
+    Attributes:
+        per_step: The least wall time of a native step [s].
+        compilation: What the first simulation took longer than later ones [s]; 0 for an engine that does not compile.
+        breakdown: Why there is no time; None if there is one.
+        ended: Whether the engine cannot take part, or its process ended.
+        in_batches: Whether the engine can step many starts together.
+    """
+
+    per_step: float = float("nan")
+    compilation: float = 0.0
+    breakdown: Breakdown | None = None
+    ended: bool = False
+    in_batches: bool = False
+
+
+def time_engine(entry: EngineEntry, scene: Scenario, dt: float) -> Timing:
+    """Time whole simulations of a scene, native steps only, and compilation apart; a failure is part of the result."""
+    engine, steps = entry.adapter, scene.steps(dt)
+    try:
+        verify_accepted(engine, scene)
+        first = time_steps(engine, scene, dt, steps) if engine.compiles else None
+        runs = timings(lambda: time_steps(engine, scene, dt, steps), TIMING_REPEATS, LONG_ENOUGH)
+    except Exception as error:  # whatever an engine raises costs its own row only
+        return Timing(breakdown=classify(error))
+    compilation = 0.0 if first is None else max(first.whole - min(run.whole for run in runs), 0.0)
+    return Timing(time_per_step(runs), compilation, in_batches=engine.steps_batches)

@@ -66,7 +66,11 @@ class KnownLimitation(NamedTuple):
 
 @dataclass(frozen=True)
 class Engine(Configured, ABC):
-    """An engine with its options; `name` and `prepare` are required."""
+    """An engine with its options; `name` and `prepare` are required.
+
+    Attributes:
+        options: The options that differ from the defaults.
+    """
 
     @abstractmethod
     def prepare(self, scene: Scenario, dt: float) -> "Simulation":

@@ -20,7 +20,7 @@ from dropspin.comparisons.engines.base import KnownLimitation, Simulation
 from dropspin.comparisons.engines.pybullet_engine import PyBullet
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.engines.wang import Wang
-from dropspin.comparisons.running import recording
+from dropspin.comparisons.running import timing as clock_of_engines
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.run import run
 from dropspin.comparisons.running.timing import time_steps
@@ -533,7 +533,7 @@ def test_engine_that_does_not_wait_for_its_steps_is_found(monkeypatch):
 
 def test_timing_ends_when_the_state_is_there(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr(recording, "time", clock)
+    monkeypatch.setattr(clock_of_engines, "time", clock)
     seconds = time_steps(working_in(clock, 1e-6, 2e-4), load("spin-principal"), 1e-3, 10).stepping
     assert seconds == pytest.approx(10 * (1e-6 + 2e-4))
 
@@ -573,7 +573,7 @@ def compiling_in(clock, compiles, first, again=0.0):
 )
 def test_compilation_is_measured_and_stated(monkeypatch, compiles, first, again, outcome, message):
     clock = Clock()
-    monkeypatch.setattr(recording, "time", clock)
+    monkeypatch.setattr(clock_of_engines, "time", clock)
     engine_ = compiling_in(clock, compiles, first, again)
     found = run_check(EngineEntry(engine_.label, engine_), "compilation")
     assert found.outcome == outcome

@@ -78,8 +78,9 @@ def test_benchmark_of_a_run_prints_its_parts():
         "stepping and recording",
         "metrics",
         "judging over time steps",
-        "all of the run",
-        "the report, after the run",
+        "all else",
+        "report",
+        "the run and its report",
     ]
 
 

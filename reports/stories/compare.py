@@ -73,7 +73,8 @@ def _line(row: Mapping[str, str]) -> str:
     ratio = "" if row["ratio"] == "–" else f", {row['ratio']} times"
     away = "" if row["tolerances"] == "–" else f", {row['tolerances']} times its tolerance away"
     others = "" if row["others"] == "–" else f"; and {row['others']}"
-    change = f"{row['result']} at {row['step']} from {row['before']} to {row['now']}"
+    when = "as dt → 0" if row["step"] == "→ 0" else f"at {row['step']}"
+    change = f"{row['result']} {when} from {row['before']} to {row['now']}"
     return f"  {row['scene']} · {row['engine']}: {change}{ratio}{away}{others}"
 
 

@@ -92,3 +92,11 @@ def test_frozen_motion_is_measured():
     t, rows = times_and_states(BALL)
     frozen = np.tile(rows[0], (len(rows), 1))
     assert measure(BALL, Trajectory.from_states(t, frozen))["position_error"] > 0.5
+
+
+def test_body_that_stays_up_to_rounding_is_measured():
+    """Its velocities, whose squares are 0, tell nothing of the unit of the times."""
+    t, rows = times_and_states(FLIGHT)
+    rows[1:, :3] += 1e-16 * np.random.default_rng(0).normal(size=(len(rows) - 1, 3))
+    rows[1:, 7:10] = 1e-170
+    assert measure(FLIGHT, Trajectory.from_states(t, rows))["orientation_error"] < 1e-12

@@ -106,7 +106,7 @@ def work_in_parallel(
 def started_crews(
     jobs: int | None, pieces: int, entries: Sequence[EngineEntry], resources: ResourceLimits
 ) -> Iterator[list[EngineProcesses]]:
-    """Engine processes for each of the pieces of work that are done at a time, all of them started.
+    """Engine processes for each of the pieces of work that are done at a time, all of them started, if there is any work.
 
     Args:
         jobs: Number of pieces to do at a time, as for `as_jobs`.
@@ -116,7 +116,7 @@ def started_crews(
     """
     with ExitStack() as stack:
         crews = [stack.enter_context(EngineProcesses(resources)) for _ in range(min(as_jobs(jobs), max(pieces, 1)))]
-        for processes in crews:
+        for processes in crews if pieces else ():
             processes.start([entry for entry in entries if not entry.absence])
         yield crews
 

@@ -134,15 +134,20 @@ def _spelled(value: float | str) -> str:
     return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
 
 
+def parts_of(label: str) -> tuple[str, list[str]]:
+    """The name of an engine and its options, such as `integrator=rk4`, in the order of its label."""
+    name, _, listed = label.removesuffix("]").partition("[")
+    return name, listed.split(",") if listed else []
+
+
 def engine_name(label: str) -> str:
     """The name of an engine without the options in its label."""
-    return label.partition("[")[0]
+    return parts_of(label)[0]
 
 
 def calibrated_label(label: str) -> str | None:
     """The label of the calibrated profile of an engine whose label has profile=default; None for any other label."""
-    name, _, listed = label.removesuffix("]").partition("[")
-    options = listed.split(",")
+    name, options = parts_of(label)
     if "profile=default" not in options:
         return None
     left = ",".join(option for option in options if option != "profile=default")

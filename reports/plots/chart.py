@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from dropspin.comparisons.engines.options import parts_of
 from dropspin.reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers, load_matplotlib
 
 if TYPE_CHECKING:
@@ -148,10 +149,9 @@ def _draw_line(chart: Chart, line: Line, label: str, axes: "Axes") -> None:
 
 def _in_lines(label: str) -> str:
     """The label of an engine, two options per line."""
-    name, _, listed = label.partition("[")
-    options = listed.removesuffix("]").split(",")
+    name, options = parts_of(label)
     lines = [",".join(options[first : first + 2]) for first in range(0, len(options), 2)]
-    return name if not listed else f"{name}[" + ",\n".join(lines) + "]"
+    return f"{name}[" + ",\n".join(lines) + "]" if options else name
 
 
 def figure_of(charts: Iterable[Chart], title: str = "") -> "Figure":

@@ -49,13 +49,13 @@ def _metric(
     return register
 
 
-def _at_end_of_each_flight(at_rows: Callable[[Comparison, list[int]], Array]) -> Components:
+def _at_end_of_each_flight(components: Callable[[Comparison, list[int]], Array]) -> Components:
     """Components at the last row of the middle half of each flight, shape (flights, 3).
 
     This time is the same at every time step, to within one step, and far from impacts, near which errors are errors in time. The time at
     which an error is largest depends on the time step, so the components at that time do not follow a power of the time step.
     """
-    return lambda case: at_rows(case, [int(rows[-1]) for rows in case.flights])
+    return lambda case: components(case, [int(rows[-1]) for rows in case.flights])
 
 
 @_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True, agreement=True)

@@ -4,6 +4,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import dropspin
+
 project = "dropspin"
 release = metadata.version(project)
 author = copyright = "The dropspin authors"
@@ -40,4 +42,6 @@ def write_catalogue(_: Any) -> None:
 
 def setup(app: Any) -> None:
     """Write the page of the catalogue before Sphinx reads the pages."""
+    for name in dropspin.__all__:  # autodoc imports with typing.TYPE_CHECKING set, which pydantic's models do not bear
+        getattr(dropspin, name)
     app.connect("builder-inited", write_catalogue)

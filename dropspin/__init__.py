@@ -8,6 +8,7 @@
 Names are imported on first use, so that `import dropspin` and `dropspin --help` load neither pandas nor an engine.
 """
 
+import ast
 import os
 import sys
 from contextlib import suppress
@@ -76,62 +77,17 @@ if TYPE_CHECKING:
 
     scene_names = _names  # mypy exports a name that is imported as another only if it is assigned
 
-_HOMES = {
-    "dropspin.comparisons.calibration": ("Calibration", "calibrate"),
-    "dropspin.comparisons.conformance.checks": ("conform",),
-    "dropspin.comparisons.conformance.outcomes": ("CheckResult",),
-    "dropspin.comparisons.engines.base": (
-        "AsBuilt",
-        "BatchSimulation",
-        "Diverged",
-        "Engine",
-        "EngineBroken",
-        "EngineMissing",
-        "KnownLimitation",
-        "OneWorld",
-        "Simulation",
-    ),
-    "dropspin.comparisons.engines.options": ("NumericOption",),
-    "dropspin.comparisons.engines.registry": ("engine", "engine_names"),
-    "dropspin.comparisons.judging.error_budget": ("ErrorBudget", "error_budget"),
-    "dropspin.comparisons.measuring.contacts": ("contacts",),
-    "dropspin.comparisons.measuring.metrics": ("METRICS",),
-    "dropspin.comparisons.regressions.baseline": ("Baseline", "load_baseline", "write_baseline"),
-    "dropspin.comparisons.regressions.checking": ("accept", "check"),
-    "dropspin.comparisons.regressions.comparing": ("compare", "history"),
-    "dropspin.comparisons.results.ensembles": ("ENSEMBLE_METRICS",),
-    "dropspin.comparisons.results.table": ("Measurement",),
-    "dropspin.comparisons.results.results": ("Results",),
-    "dropspin.comparisons.results.store": ("load_results",),
-    "dropspin.comparisons.robustness.study": ("RobustnessStudy", "find_limits"),
-    "dropspin.comparisons.running.processes": ("ResourceLimits",),
-    "dropspin.comparisons.running.recording": ("simulate",),
-    "dropspin.comparisons.running.run": ("DEFAULT_DTS", "measure", "run"),
-    "dropspin.comparisons.sweeps.folder": ("read_sweep", "read_sweep_parts"),
-    "dropspin.comparisons.sweeps.running": ("run_sweep",),
-    "dropspin.comparisons.sweeps.spec": ("load_sweep",),
-    "dropspin.comparisons.symmetries.study": ("symmetries",),
-    "dropspin.comparisons.symmetries.twins": ("twins",),
-    "dropspin.comparisons.tradeoff.points": ("TradeOff",),
-    "dropspin.comparisons.tradeoff.study": ("tradeoff",),
-    "dropspin.reports": ("plots",),
-    "dropspin.reports.run_folder": ("write_report",),
-    "dropspin.reports.terminal.run_table": ("print_table",),
-    "dropspin.scenarios.draw": ("draw",),
-    "dropspin.scenarios.errors": ("DropspinError", "SceneError", "UnknownName"),
-    "dropspin.scenarios.loading": ("load", ("scene_names", "names")),
-    "dropspin.scenarios.model": ("Scenario",),
-    "dropspin.scenarios.trajectory": ("Trajectory",),
-    "dropspin.scenarios.truths": ("truth_for",),
-    "dropspin.scenarios.truths.truth": ("Truth",),
-}
-_LOCATIONS = {
-    public: (module, home)
-    for module, names in _HOMES.items()
-    for public, home in ((name, name) if isinstance(name, str) else name for name in names)
-}
-"""For each public name, the module that defines it, and its name there."""
 
+def _locations() -> dict[str, tuple[str, str]]:
+    """For each public name, the module that defines it, and its name there: the imports above, which are made when a name is first used."""
+    with open(__file__, encoding="utf-8") as file:
+        [block] = [node for node in ast.parse(file.read()).body if isinstance(node, ast.If)]
+    imported = [(node.module, alias) for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names]
+    public = {str(alias.asname): (str(module), alias.name) for module, alias in imported}
+    return public | {"scene_names": public.pop("_names")}
+
+
+_LOCATIONS = _locations()
 __all__ = sorted(_LOCATIONS)  # noqa: PLE0605 - a list of strings, computed
 
 

@@ -4,24 +4,37 @@ A page begins with the summary; a terminal, on which the last lines are read fir
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
-    from dropspin.reports.plots.chart import Chart
+    from dropspin.reports.plots.chart import Chart, Drawing
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """A part of a document.
+
+    Attributes:
+        on_page: Whether a page shows it.
+        on_terminal: Whether a terminal shows it.
+    """
+
+    on_page: bool = True
+    on_terminal: bool = True
 
 
 @dataclass(frozen=True)
-class Heading:
+class Heading(Part):
     """A heading within a page; a terminal shows it as a sentence, or not at all."""
 
     kind: ClassVar = "heading"
     text: str
-    on_terminal: bool = False
+    on_terminal: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
-class Paragraph:
+class Paragraph(Part):
     """A text, followed by a command as code if there is one; `style` is that of a terminal, and bold is bold on a page too."""
 
     kind: ClassVar = "paragraph"
@@ -31,7 +44,7 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
-class Sentences:
+class Sentences(Part):
     """A list of sentences, on a page each with a command below it if there are any; `style` is that of a terminal."""
 
     kind: ClassVar = "sentences"
@@ -42,7 +55,7 @@ class Sentences:
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(Part):
     """Rows of texts by column. A terminal shows `lines` instead, if there are any.
 
     A narrow terminal leaves out the columns in `left_out_first`, in this order.
@@ -55,15 +68,13 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Charts:
-    """A picture of charts, which a terminal does not show; without charts, a picture that is drawn otherwise."""
+class Charts(Part):
+    """A picture of charts, or of what functions draw into axes, which a page in HTML does not show; a terminal shows neither."""
 
     kind: ClassVar = "charts"
     name: str
-    charts: "Sequence[Chart]"
-
-
-Part = Heading | Paragraph | Sentences | Table | Charts
+    charts: "Sequence[Chart]" = ()
+    drawings: "Sequence[Drawing]" = ()
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part
 
 def markdown(document: Document, level: int = 1) -> str:
     """The page, whose title is a heading of a level."""
-    parts = [_block(part, level + 1) for part in (*document.summary, *document.parts)]
+    parts = [_block(part, level + 1) for part in (*document.summary, *document.parts) if part.on_page]
     return "\n\n".join(filter(None, [_block(Heading(document.title), level), *parts])) + "\n"
 
 

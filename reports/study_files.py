@@ -13,7 +13,6 @@ from dropspin.reports.markdown import markdown
 from dropspin.reports.output import write_table
 from dropspin.reports.plots.chart import figure_of
 from dropspin.reports.plots.chart_data import chart_data
-from dropspin.reports.plots.figures import history_figure
 from dropspin.reports.plots.svg import save_svg
 from dropspin.reports.stories.history import document as history_document
 from dropspin.reports.stories.study import Study
@@ -33,8 +32,6 @@ def write_history(history: History, folder: Path) -> Document:
     """Write every result of every run as `history.csv` and `history.json`, `history.md` with a plot per scene, and return the page."""
     results = history.results.drop(columns="verdict").assign(run=[history.names[number] for number in history.results["run"]])
     write_table(folder, "history", results.merge(history.stamps, on="run").to_dict("records"))
-    for scene in history.results["scene"].unique():
-        save_svg(history_figure(history, scene), folder / f"{file_name(scene)}.svg")
     document = history_document(history)
     write_page(document, folder, "history")
     return document
@@ -43,8 +40,8 @@ def write_history(history: History, folder: Path) -> Document:
 def write_page(document: Document, folder: Path, stem: str) -> None:
     """Write a Markdown page and its pictures."""
     for part in document.parts:
-        if isinstance(part, Charts) and part.charts:
-            save_svg(figure_of(part.charts), folder / f"{file_name(part.name)}.svg")
+        if isinstance(part, Charts):
+            save_svg(figure_of([*part.charts, *part.drawings]), folder / f"{file_name(part.name)}.svg")
     (folder / f"{stem}.md").write_text(markdown(document), encoding="utf-8")
 
 

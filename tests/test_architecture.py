@@ -1,6 +1,5 @@
 """What is imported when, and what `import dropspin` offers."""
 
-import ast
 import importlib
 import subprocess
 import sys
@@ -59,17 +58,8 @@ def test_an_unknown_public_name_raises_attribute_error():
         dropspin.rnu  # noqa: B018
 
 
-def test_imports_for_type_checkers_agree_with_those_at_run_time():
-    """The same names, from the modules that define them; the first is for mypy and editors, the second for Python."""
-    tree = ast.parse(Path(dropspin.__file__).read_text(encoding="utf-8"))
-    [block] = [node for node in tree.body if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"]
-    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
-    declared = {alias.asname: (node.module, alias.name) for node in imports for alias in node.names}
-    for node in block.body:
-        if isinstance(node, ast.Assign):
-            declared[node.targets[0].id] = declared.pop(node.value.id)
-    assert declared == dropspin._LOCATIONS
-    for name, (module, home) in declared.items():
+def test_public_names_are_imported_from_the_modules_that_define_them():
+    for name, (module, home) in dropspin._LOCATIONS.items():
         found = getattr(importlib.import_module(module), home)
         assert getattr(found, "__module__", module) in (module, "builtins"), f"{name} is defined in another module"
 

@@ -42,10 +42,10 @@ def check_command(run: str, baseline: str | None, no_baseline: bool, junit: str 
         checked = check(results, None if file is None else file.baseline)
     except DropspinError as error:
         raise DropspinError(f"{baseline}: {error} With --no-baseline, only the expectations of the scenes are checked.") from None
-    failed = failures(checked.results, baseline)
+    document = story.document(checked, file, failures(checked.results, baseline))
     if junit is not None:
         write_text(junit, junit_xml(checked.results, baseline).decode())
     if summary is not None:
-        write_text(summary, markdown(story.page(checked, file, failed), level=2), append=True)
-    print_json_or(json_output, checked.results.table.to_dict("records"), story.output(checked, file, failed))
+        write_text(summary, markdown(document, level=2), append=True)
+    print_json_or(json_output, checked.results.table.to_dict("records"), document)
     return checked.results.exit_code()

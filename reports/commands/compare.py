@@ -23,12 +23,13 @@ def compare_command(old: str, new: str, summary: str | None, json_output: bool) 
     from dropspin.comparisons.regressions.comparing import compare
     from dropspin.comparisons.results.store import load_results
     from dropspin.reports.markdown import markdown
-    from dropspin.reports.stories.compare import as_data, output, page
+    from dropspin.reports.stories import compare as story
     from dropspin.reports.terminal.rows import print_json_or
 
     later = load_results(Path(new))
     changes = compare(load_results(Path(old)), later)
+    document = story.document(changes, later)
     if summary is not None:
-        write_text(summary, markdown(page(changes), level=2), append=True)
-    print_json_or(json_output, as_data(changes), output(changes, later))
+        write_text(summary, markdown(document, level=2), append=True)
+    print_json_or(json_output, story.as_data(changes), document)
     return int(bool(len(changes.regressions)))

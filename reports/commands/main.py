@@ -5,7 +5,6 @@ import sys
 import traceback
 import warnings
 from importlib import import_module
-from typing import Any
 
 import click
 
@@ -51,9 +50,10 @@ COMMANDS = {name: line for group in GROUPS.values() for name, line in group.item
 """The commands, each in `reports/commands/`, in a file with the last word of its name (`-` is `_` there); with their lines in the help."""
 MOVED = {name.rpartition(" ")[2]: name for name in COMMANDS if " " in name}
 """The commands that were commands of their own in earlier versions."""
-CITATION = """To cite: The dropspin authors, dropspin, version {version};
+VERSION = """dropspin, version %(version)s
+To cite: The dropspin authors, dropspin, version %(version)s;
 for the engine wang: Huamin Wang, Rigid Body Dynamics (lecture note)."""
-"""The text to cite; a test compares it with CITATION.cff."""
+"""The version and the text to cite; a test compares it with CITATION.cff."""
 LONGEST_ARGUMENT = 4096
 LONGEST_MESSAGE = 1500
 INTERRUPTED = 130  # 128 + SIGINT, as in shells
@@ -174,23 +174,7 @@ class _LazyGroup(click.Group):
                 formatter.write_dl(list(commands.items()))
 
 
-def _print_version(ctx: click.Context, parameter: click.Parameter, value: Any) -> None:
-    if value:
-        from importlib.metadata import version
-
-        number = version("dropspin")
-        click.echo(f"dropspin, version {number}\n{CITATION.format(version=number)}")
-        ctx.exit()
-
-
 @click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
-@click.option(
-    "--version",
-    is_flag=True,
-    expose_value=False,
-    is_eager=True,
-    callback=_print_version,
-    help="Show the version and what to cite, and exit.",
-)
+@click.version_option(package_name="dropspin", message=VERSION, help="Show the version and what to cite, and exit.")
 def dropspin() -> None:
     """Run drop and spin scenes with rigid-body engines and compare them with exact solutions."""

@@ -105,7 +105,7 @@ def run_command(
         else:
             if file is not None:
                 accepted = [failure for failure in failures(checked.results, baseline) if failure.accepted]
-                print_document(story.output(checked, file, accepted))
+                print_document(story.document(checked, file, accepted))
             echo(f"Report: {os.path.join(output, 'report.html')}")
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"the run is written: {output}") from None

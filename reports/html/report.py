@@ -27,8 +27,7 @@ from dropspin.reports.stories import numbers
 from dropspin.reports.stories.contacts import worst_contacts
 from dropspin.reports.stories.error_budget import error_budgets
 from dropspin.reports.stories.impact_laws import NOTE
-from dropspin.reports.stories.leading_errors import leading_errors, step_times
-from dropspin.reports.stories.matrix import legend_of_marks
+from dropspin.reports.stories.matrix import leading_errors, legend_of_marks, step_times
 from dropspin.reports.stories.run import Overview
 from dropspin.reports.stories.scene import left_out, modelled
 from dropspin.scenarios import truth_for
@@ -98,8 +97,8 @@ def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]],
         "metrics": list(own["metric"].unique()),
         "cells": {(row["metric"], row["engine"], row["dt"]): row for row in own.to_dict("records")},
         "trends": _trends(studies),
-        "budgets": [budget for budget in budgets if budget.cause != "discretisation"],
-        "converging": sum(budget.cause == "discretisation" for budget in budgets),
+        "budgets": [budget for budget in budgets if budget["cause"] != "discretisation"],
+        "converging": sum(budget["cause"] == "discretisation" for budget in budgets),
         "rows": _all_results(results, name, pd.concat([own, studies, frame[frame["kind"].isin(OF_SYMMETRIES)]])),
         "replay": None if motions is None else as_data(motions),
         "remarks": frame[frame["metric"] == ""].drop_duplicates(["engine", "reason"]).to_dict("records"),

@@ -4,53 +4,33 @@ A plot function creates no figure and no legend; it labels its lines, so that `a
 plot with the code that draws it.
 """
 
-from dropspin.reports.plots.bounces import bounce_ladder, plot_bounce_ladder
-from dropspin.reports.plots.chart import Chart, Line, draw, figure_of
-from dropspin.reports.plots.convergence import error_over_dt, plot_error_over_dt
-from dropspin.reports.plots.ensembles import (
-    angular_momentum_of_ensemble,
-    energy_of_ensemble,
-    plot_angular_momentum_of_ensemble,
-    plot_energy_of_ensemble,
-    plot_rest_of_ensemble,
-    rest_of_ensemble,
-)
-from dropspin.reports.plots.growth import error_growth, plot_error_growth
-from dropspin.reports.plots.history import plot_history
-from dropspin.reports.plots.limits import failure_modes, plot_failure_modes
-from dropspin.reports.plots.over_time import Quantity, angular_momentum_length, height, over_time, plot_over_time, quantities, tilt
-from dropspin.reports.plots.spins import plot_polhode, polhode
-from dropspin.reports.plots.tradeoff import error_over_cost, plot_tradeoff
-
-__all__ = [
-    "Chart",
-    "Line",
-    "Quantity",
-    "angular_momentum_length",
-    "angular_momentum_of_ensemble",
-    "bounce_ladder",
-    "draw",
-    "energy_of_ensemble",
-    "error_growth",
-    "error_over_cost",
-    "error_over_dt",
-    "failure_modes",
-    "figure_of",
-    "height",
-    "over_time",
-    "plot_angular_momentum_of_ensemble",
-    "plot_bounce_ladder",
-    "plot_energy_of_ensemble",
-    "plot_error_growth",
-    "plot_error_over_dt",
-    "plot_failure_modes",
-    "plot_history",
-    "plot_over_time",
-    "plot_polhode",
-    "plot_rest_of_ensemble",
-    "plot_tradeoff",
-    "polhode",
-    "quantities",
-    "rest_of_ensemble",
-    "tilt",
-]
+from dropspin.reports.plots.bounces import bounce_ladder as bounce_ladder
+from dropspin.reports.plots.bounces import plot_bounce_ladder as plot_bounce_ladder
+from dropspin.reports.plots.chart import Chart as Chart
+from dropspin.reports.plots.chart import Line as Line
+from dropspin.reports.plots.chart import draw as draw
+from dropspin.reports.plots.chart import figure_of as figure_of
+from dropspin.reports.plots.convergence import error_over_dt as error_over_dt
+from dropspin.reports.plots.convergence import plot_error_over_dt as plot_error_over_dt
+from dropspin.reports.plots.ensembles import angular_momentum_of_ensemble as angular_momentum_of_ensemble
+from dropspin.reports.plots.ensembles import energy_of_ensemble as energy_of_ensemble
+from dropspin.reports.plots.ensembles import plot_angular_momentum_of_ensemble as plot_angular_momentum_of_ensemble
+from dropspin.reports.plots.ensembles import plot_energy_of_ensemble as plot_energy_of_ensemble
+from dropspin.reports.plots.ensembles import plot_rest_of_ensemble as plot_rest_of_ensemble
+from dropspin.reports.plots.ensembles import rest_of_ensemble as rest_of_ensemble
+from dropspin.reports.plots.growth import error_growth as error_growth
+from dropspin.reports.plots.growth import plot_error_growth as plot_error_growth
+from dropspin.reports.plots.history import plot_history as plot_history
+from dropspin.reports.plots.limits import failure_modes as failure_modes
+from dropspin.reports.plots.limits import plot_failure_modes as plot_failure_modes
+from dropspin.reports.plots.over_time import Quantity as Quantity
+from dropspin.reports.plots.over_time import angular_momentum_length as angular_momentum_length
+from dropspin.reports.plots.over_time import height as height
+from dropspin.reports.plots.over_time import over_time as over_time
+from dropspin.reports.plots.over_time import plot_over_time as plot_over_time
+from dropspin.reports.plots.over_time import quantities as quantities
+from dropspin.reports.plots.over_time import tilt as tilt
+from dropspin.reports.plots.spins import plot_polhode as plot_polhode
+from dropspin.reports.plots.spins import polhode as polhode
+from dropspin.reports.plots.tradeoff import error_over_cost as error_over_cost
+from dropspin.reports.plots.tradeoff import plot_tradeoff as plot_tradeoff

@@ -1,7 +1,6 @@
 """A chart as data: the lines of a plot with their labels, scales and remarks. matplotlib and the script of the report draw it."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -154,36 +153,29 @@ def _in_lines(label: str) -> str:
     return f"{name}[" + ",\n".join(lines) + "]" if options else name
 
 
-def figure_of(charts: Iterable[Chart], title: str = "") -> "Figure":
-    """A figure with a panel for each chart, at most three in a row, and one legend."""
-    charts = list(charts)
-    with panels(len(charts), 3, (3.7, 2.9)) as (figure, axes):
-        for one, chart in zip(axes, charts, strict=True):
-            draw(chart, one)
-        axes[0].set_title(title)
-        add_legend(figure, axes)
-    return figure
+Drawing = Callable[["Axes"], None]
+"""A function that draws into axes."""
 
 
-@contextmanager
-def panels(count: int, across: int, size: tuple[float, float]) -> "Iterator[tuple[Figure, list[Axes]]]":
-    """A figure in the style of the report with `count` panels of a given size [inches], at most `across` in a row."""
+def figure_of(panels: Sequence[Chart | Drawing]) -> "Figure":
+    """A figure of panels in the style of the report, at most three in a row, with one legend."""
     load_matplotlib()
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    across = min(count, across)
-    down = -(-count // across)
-    with rc_context(REPORT):
-        figure = Figure(figsize=(size[0] * across, size[1] * down), layout=ConstrainedLayoutEngine(w_pad=0.12))
-        yield figure, [figure.add_subplot(down, across, place) for place in range(1, count + 1)]
-
-
-def add_legend(figure: "Figure", axes: "Sequence[Axes]") -> None:
-    """Add one legend of all labels in a figure's axes."""
+    across = min(len(panels), 3)
+    down = -(-len(panels) // across)
     named: dict[str, Any] = {}
-    for one in axes:
-        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
-    figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=min(len(named), 5), fontsize=9)
+    with rc_context(REPORT):
+        figure = Figure(figsize=(3.7 * across, 2.9 * down), layout=ConstrainedLayoutEngine(w_pad=0.12))
+        for place, panel in enumerate(panels, 1):
+            axes = figure.add_subplot(down, across, place)
+            if isinstance(panel, Chart):
+                draw(panel, axes)
+            else:
+                panel(axes)
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                named.setdefault(label, handle)
+        figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=min(len(named), 5), fontsize=9)
+    return figure

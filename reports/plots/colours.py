@@ -1,14 +1,13 @@
 """Labels and styles that all plots and tables share: a colour and a marker per engine, and the label of the exact solution."""
 
 from collections.abc import Sequence
-from itertools import product
 from zlib import crc32
 
 # Okabe & Ito (2008), Color Universal Design: distinguishable with any colour vision, on white and on near black.
 KNOWN = {"wang": ("#0072B2", "o"), "mujoco": ("#D55E00", "s"), "pybullet": ("#009E73", "D")}
 COLOURS = ("#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C", "#A6761D", "#7B5EA7", "#B33B24", "#3D8B8B")
 MARKERS = ("^", "v", "P", "X", "*")
-STYLES = tuple(product(MARKERS, COLOURS))
+STYLES = [(colour, marker) for marker in MARKERS for colour in COLOURS]
 EXACT = "exact solution"
 """Label of the exact solution in plots and replays."""
 
@@ -21,20 +20,14 @@ def engine_styles(engines: Sequence[str]) -> dict[str, tuple[str, str]]:
     """
     styles = {engine: KNOWN[engine] for engine in engines if engine in KNOWN}
     for engine in sorted(set(engines) - set(KNOWN)):
-        first = crc32(engine.encode("utf-8", "surrogatepass"))
-        candidates = [STYLES[(first + number) % len(STYLES)] for number in range(len(STYLES))]
+        first = crc32(engine.encode("utf-8", "surrogatepass")) % len(STYLES)
+        candidates = [*STYLES[first:], *STYLES[:first]]
         taken_colours = {colour for colour, _ in styles.values()}
-        unused = [(colour, marker) for marker, colour in candidates if (colour, marker) not in styles.values()]
-        fresh = [style for style in unused if style[0] not in taken_colours]
-        styles[engine] = (fresh or unused or [(candidates[0][1], candidates[0][0])])[0]
+        unused = [style for style in candidates if style not in styles.values()]
+        styles[engine] = next((style for style in unused if style[0] not in taken_colours), (unused or candidates)[0])
     return {engine: styles[engine] for engine in engines}
 
 
 def engine_colours(engines: Sequence[str]) -> dict[str, str]:
     """The colour of each engine, from `engine_styles`."""
     return {engine: colour for engine, (colour, _) in engine_styles(engines).items()}
-
-
-def engine_markers(engines: Sequence[str]) -> dict[str, str]:
-    """The marker of each engine, from `engine_styles`, so that a plot does not rely on colour."""
-    return {engine: marker for engine, (_, marker) in engine_styles(engines).items()}

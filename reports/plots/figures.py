@@ -1,4 +1,4 @@
-"""The charts of each scene of a report, of each trade-off and of each study of limits, and the figure of a history."""
+"""The charts of each scene of a report, of each trade-off and of each study of limits."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -7,11 +7,10 @@ from dropspin.comparisons.judging.verdicts import FAILURES
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.robustness.study import RobustnessStudy
 from dropspin.reports.plots.bounces import bounce_ladder
-from dropspin.reports.plots.chart import Chart, add_legend, panels
+from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.convergence import error_over_dt
 from dropspin.reports.plots.ensembles import angular_momentum_of_ensemble, energy_of_ensemble, rest_of_ensemble
 from dropspin.reports.plots.growth import error_growth
-from dropspin.reports.plots.history import plot_history
 from dropspin.reports.plots.limits import failure_modes
 from dropspin.reports.plots.over_time import over_time, quantities
 from dropspin.reports.plots.spins import polhode, wobbles_freely
@@ -19,9 +18,6 @@ from dropspin.reports.plots.tradeoff import error_over_cost, throughput
 from dropspin.scenarios import truth_for
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from dropspin.comparisons.regressions.comparing import History
     from dropspin.comparisons.tradeoff.points import TradeOff
 
 CONVERGENCE = (
@@ -96,17 +92,6 @@ def tradeoff_charts(found: "TradeOff") -> list[Chart]:
 def limits_charts(found: RobustnessStudy) -> list[Chart]:
     """The failure modes of all engines along each axis of a scene."""
     return [failure_modes(found, name) for name in dict.fromkeys(scan.axis.name for scan in found.scans)]
-
-
-def history_figure(history: "History", scene_name: str) -> "Figure":
-    """Each metric of a scene over runs."""
-    results = history.results[~history.results["kind"].isin(["order", "asymptotic_error"])]
-    metrics = list(dict.fromkeys(results.loc[results["scene"] == scene_name, "metric"]))
-    with panels(len(metrics), MOST_PANELS, (3.7, 2.9)) as (figure, drawn):
-        for axes, metric in zip(drawn, metrics, strict=True):
-            plot_history(history, scene_name, metric, axes)
-        add_legend(figure, drawn)
-    return figure
 
 
 def _errors(results: Results, scene_name: str, metrics: Sequence[str], worth: float) -> list[str]:

@@ -40,7 +40,7 @@ def plot_history(history: History, scene_name: str, metric: str, axes: "Axes") -
         line = shown[shown["engine"] == engine].sort_values("run")
         if line.empty:
             continue
-        width = thinner(3.8, 1.2, number, len(engines))
+        width = thinner(number, len(engines))
         axes.plot(line["run"], line["value"], color=colours[engine], linewidth=width, marker="o", markersize=width + 1.5, label=engine)
         moved = [move.run for move in history.moves if move.engine == engine and _has(move.results, scene_name, metric, steps)]
         at = line[line["run"].isin(moved)]

@@ -1,6 +1,5 @@
-"""The style of plots: colours, which the HTML page replaces; line widths at which coinciding lines stay visible; axis labels with units."""
+"""The style of plots: line widths at which coinciding lines stay visible; axis labels with units."""
 
-import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import chdir
@@ -26,20 +25,13 @@ Kept = TypeVar("Kept")
 ByStep = Mapping[tuple[str, str, float], Kept]
 """Trajectories or ensemble outcomes of a run, by scene, engine and time step."""
 
-INK, FAINT = "#010203", "#040506"
-"""Placeholders for the text colour, which the report replaces by that of the page, so that a plot suits the light and the dark scheme."""
 REPORT: Any = {
     "text.parse_math": False,  # dollar signs in names are text
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": FAINT,
-    "xtick.color": INK,
-    "ytick.color": INK,
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": FAINT,
+    "grid.color": "black",
     "grid.alpha": 0.15,
     "axes.facecolor": "none",
     "figure.facecolor": "none",
@@ -60,15 +52,8 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def load_matplotlib() -> None:
     """Import matplotlib without the settings of the working directory and the user; a damaged settings file prevents the import."""
     if "matplotlib" not in sys.modules:
-        named = os.environ.get("MATPLOTLIBRC")
-        os.environ["MATPLOTLIBRC"] = os.devnull
-        try:
-            with chdir(Path(__file__).parent):
-                import_module("matplotlib")
-        finally:
-            del os.environ["MATPLOTLIBRC"]
-            if named is not None:
-                os.environ["MATPLOTLIBRC"] = named
+        with chdir(Path(__file__).parent):  # of the places where matplotlib finds settings, the working directory is the first
+            import_module("matplotlib")
 
 
 def ink() -> str:
@@ -83,9 +68,9 @@ def stride(length: int) -> int:
     return max(1, -(-length // MOST_POINTS))
 
 
-def thinner(first: float, last: float, number: int, count: int) -> float:
-    """A size between first and last by the number of the engine, so that later lines do not hide coinciding earlier ones."""
-    return float(np.linspace(first, last, max(count, 2))[number])
+def thinner(number: int, count: int) -> float:
+    """The width of the line of an engine by its number [points], so that later lines do not hide coinciding earlier ones."""
+    return float(np.linspace(3.8, 1.2, max(count, 2))[number])
 
 
 def step_of(kept: ByStep[Kept], scene_name: str, which: Callable[..., float]) -> float:
@@ -103,7 +88,7 @@ def at_one_step(
         found = kept.get((scene_name, engine, dt))
         if found is not None:
             colour, marker = styles[engine]
-            yield found, {"label": engine, "colour": colour, "marker": marker, "width": thinner(3.8, 1.2, number, count)}
+            yield found, {"label": engine, "colour": colour, "marker": marker, "width": thinner(number, count)}
 
 
 def metric_label(metric: str) -> str:

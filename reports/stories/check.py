@@ -15,7 +15,7 @@ from dropspin.comparisons.regressions.checking import Checked
 from dropspin.comparisons.results.provenance import versions_behind
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Document, Paragraph, Sentences, Table
-from dropspin.reports.stories.failures import Failure, failure_parts, grouped
+from dropspin.reports.stories.failures import Failure, failure_parts
 from dropspin.reports.stories.findings import counts, verdict_sentence
 from dropspin.reports.stories.numbers import capitalized, failing
 from dropspin.scenarios.text import counted
@@ -23,8 +23,6 @@ from dropspin.scenarios.text import counted
 JUDGED = FAILURES | BREAKDOWNS | {"passed", "missing"}
 MOST_ANNOTATIONS = 10
 """The number of annotations that GitHub shows for one step."""
-MOST_SENTENCES, MOST_PRINTED = 24, 6
-"""Largest number of sentences on the failures of one engine, on a page and on a terminal; JUnit, JSON and the report have all failures."""
 
 
 class BaselineFile(NamedTuple):
@@ -40,21 +38,15 @@ class BaselineFile(NamedTuple):
         return shlex.join(["dropspin", "accept", self.run, "--baseline", self.path, "--reason"]) + ' "…"'
 
 
-def page(checked: Checked, file: BaselineFile | None, failures: Sequence[Failure]) -> Document:
-    """The outcome of a check as the title, the failures of each engine, and the numbers of its checks."""
-    results, groups = checked.results, grouped(checked.results, failures, file and file.path)
+def document(checked: Checked, file: BaselineFile | None, failures: Sequence[Failure]) -> Document:
+    """The failures of each engine, and the outcome of a check; on a page also the numbers of the checks and the versions."""
+    results, listed = checked.results, failure_parts(checked.results, failures, file and file.path)
     *notes, verdict = sentences(checked, file)
+    tallies = Table([_tally(results, engine) for engine in results.engines], on_terminal=False)
     versions = ", ".join(f"{name} {version}" for name, version in versions_behind(results.provenance).items())
-    tallies = Table([_tally(results, engine) for engine in results.engines])
-    parts = [*failure_parts(groups, MOST_SENTENCES), tallies, Paragraph(f"{versions} on {results.provenance['cpu']}")]
-    return Document(f"dropspin: {'✗' if groups else '✓'} {verdict}", parts, [Sentences([_scope(file), *notes])])
-
-
-def output(checked: Checked, file: BaselineFile | None, failures: Sequence[Failure]) -> Document:
-    """The failures and the outcome of a check, for a terminal."""
-    groups = grouped(checked.results, failures, file and file.path)
-    outcome = Sentences([_scope(file), *sentences(checked, file)])
-    return Document("Check", failure_parts(groups, MOST_PRINTED), [outcome, *_annotations(failures)])
+    machine = Paragraph(f"{versions} on {results.provenance['cpu']}", on_terminal=False)
+    outcome = [Sentences([_scope(file), *notes]), Paragraph(verdict, on_page=False), *_annotations(failures)]
+    return Document(f"dropspin: {'✗' if listed else '✓'} {verdict}", [*listed, tallies, machine], outcome)
 
 
 def _scope(file: BaselineFile | None) -> str:
@@ -143,7 +135,7 @@ def _annotations(failures: Sequence[Failure]) -> list[Paragraph]:
     for failure in failures[:MOST_ANNOTATIONS]:
         title = _escaped(f"{failure.scene} {failure.engine}", ":,")
         text = _escaped(f"{failure.sentence.removesuffix('.')}. Reproduce: {failure.reproduce}")
-        commands.append(Paragraph("", f"::error title={title}::{text}"))
+        commands.append(Paragraph("", f"::error title={title}::{text}", on_page=False))
     return commands
 
 

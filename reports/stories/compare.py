@@ -18,17 +18,15 @@ MOST_LINES = 12
 """Largest number of lines of a table; JSON has all lines."""
 
 
-def page(changes: Changes) -> Document:
-    """The verdict as the title, notes, and the changes of each kind."""
-    mark = "✗" if len(changes.regressions) else "✓"
-    return Document(f"dropspin: {mark} {_verdict(changes)}", _tables(changes), [Sentences(_notes(changes))])
-
-
-def output(changes: Changes, results: Results) -> Document:
-    """The changes of each kind, the commands that run the scenes of regressions again, notes, and the verdict, for a terminal."""
+def document(changes: Changes, results: Results) -> Document:
+    """The changes of each kind, notes, and the verdict; on a terminal also the commands that run the scenes of regressions again."""
     by_engine = changes.regressions.groupby("engine", sort=False)["scene"].unique()
-    commands = [Paragraph("Reproduce:", reproduce_scenes(results, list(scenes), str(engine))) for engine, scenes in by_engine.items()]
-    return Document("Changes", [*_tables(changes), *commands], [Sentences([*_notes(changes), _verdict(changes)])])
+    commands = [
+        Paragraph("Reproduce:", reproduce_scenes(results, list(scenes), str(engine)), on_page=False) for engine, scenes in by_engine.items()
+    ]
+    verdict, mark = _verdict(changes), "✗" if len(changes.regressions) else "✓"
+    summary = [Sentences(_notes(changes)), Paragraph(verdict, on_page=False)]
+    return Document(f"dropspin: {mark} {verdict}", [*_tables(changes), *commands], summary)
 
 
 def _verdict(changes: Changes) -> str:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -16,37 +15,12 @@ EXPLAINED = {"known": "Expected", "limited": "Known limitation"}
 """How the reason of an expected model error begins, by verdict."""
 
 
-@dataclass(frozen=True)
-class BudgetRow:
-    """An error of an engine in a scene at the finest time step.
+def error_budgets(results: Results, scene_name: str) -> list[dict[Hashable, Any]]:
+    """The errors of a scene at the finest time step, by metric, for engines that ran at enough time steps.
 
-    Attributes:
-        engine: Label of the engine.
-        metric: The metric.
-        unit: Unit of the values.
-        dt: Time step [s].
-        value: The error.
-        asymptotic: The asymptotic error; `asymptotic`, `lower` and `upper` are NaN where it is undefined.
-        lower: Lower end of the 95 % interval of the asymptotic error.
-        upper: Upper end of that interval.
-        cause: The cause to which the error is attributed.
-        sentence: The error budget in a sentence.
+    Negligible errors that vanish are left out. A row has the columns of the error, those of its asymptotic error and of its order (with
+    the endings `_of_limit` and `_of_order`; NaN where it is undefined), the cause to which the error is attributed, and a sentence.
     """
-
-    engine: str
-    metric: str
-    unit: str
-    dt: float
-    value: float
-    asymptotic: float
-    lower: float
-    upper: float
-    cause: str
-    sentence: str
-
-
-def error_budgets(results: Results, scene_name: str) -> list[BudgetRow]:
-    """The error budgets of a scene, by metric, for engines that ran at enough time steps; negligible errors that vanish are left out."""
     table = results.table[results.table["scene"] == scene_name]
     errors = table[table["kind"].isin(["truth", "invariant"]) & ~table["metric"].isin(ARTEFACTS)]
     columns = [*OF, "value", "lower", "upper", "cause", "verdict", "reason"]
@@ -56,20 +30,14 @@ def error_budgets(results: Results, scene_name: str) -> list[BudgetRow]:
     worth &= (errors["dt"] == errors["dt"].min()) & errors["engine"].isin(limits["engine"])
     both = errors[worth].merge(limits, on=OF, how="left", suffixes=("", "_of_limit"))
     both = both.merge(orders, on=OF, how="left", suffixes=("", "_of_order"))
+    both["cause"] = both["cause_of_limit"].where(both["value_of_limit"].notna(), "unresolved")
     places = {metric: number for number, metric in enumerate(dict.fromkeys(errors["metric"]))}
     ordered = both.sort_values("metric", key=lambda metrics: metrics.map(places), kind="stable")
-    return [_row(row) for row in ordered.to_dict("records")]
+    return [row | {"sentence": _sentence(row)} for row in ordered.to_dict("records")]
 
 
-def _row(row: Mapping[Hashable, Any]) -> BudgetRow:
-    limit, lower, upper = (float(row[f"{name}_of_limit"]) for name in ("value", "lower", "upper"))
-    cause = "unresolved" if math.isnan(limit) else str(row["cause_of_limit"])
-    sentence = _sentence(row, cause)
-    return BudgetRow(row["engine"], row["metric"], row["unit"], row["dt"], float(row["value"]), limit, lower, upper, cause, sentence)
-
-
-def _sentence(row: Mapping[Hashable, Any], cause: str) -> str:
-    value, limit = float(row["value"]), float(row["value_of_limit"])
+def _sentence(row: Mapping[Hashable, Any]) -> str:
+    value, limit, cause = float(row["value"]), float(row["value_of_limit"]), row["cause"]
     if cause == "unresolved":
         return _why_undecided(row)
     if cause == "rounding":

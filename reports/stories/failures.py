@@ -19,6 +19,8 @@ from dropspin.scenarios.text import counted, rounded
 Row = Mapping[Hashable, Any]
 MOST_NAMES = 4
 """Largest number of names in a sentence."""
+MOST_ON_PAGE, MOST_ON_TERMINAL = 24, 6
+"""Largest number of sentences on the failures of one engine; JUnit, JSON and the report have all failures."""
 
 
 @dataclass(frozen=True)
@@ -54,24 +56,6 @@ class Failure:
         """The failure in one line, without the command."""
         others = f" (and {self.others} other time {'step' if self.others == 1 else 'steps'})" if self.others else ""
         return f"{self.scene} · {self.engine}{self.where}: {self.what}{others}"
-
-
-@dataclass(frozen=True)
-class FailureGroup:
-    """The failures of one engine: a sentence for each scene, whose failures probably have one cause, and one command for all scenes.
-
-    Attributes:
-        engine: Label of the engine.
-        sentences: For each scene its first failure and the number of other failing results; for a breakdown, the scenes in which it occurs.
-        consistent_with: The causes of which each alone explains the asymptotic errors: wrong parameters, and known faults; empty if there
-            is no such cause.
-        reproduce: The command, or the call, that reproduces them.
-    """
-
-    engine: str
-    sentences: list[str]
-    consistent_with: str
-    reproduce: str
 
 
 def failures(results: Results, baseline: str | None = None) -> list[Failure]:
@@ -111,8 +95,11 @@ def _failure(results: Results, group: list[Row], baseline: str | None) -> Failur
     )
 
 
-def grouped(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> list[FailureGroup]:
-    """The failures of a run, grouped by engine and scene; equal breakdowns of an engine in several scenes are one failure."""
+def failure_parts(results: Results, failures: Sequence[Failure], baseline: str | None = None) -> list[Part]:
+    """The failures of each engine: what explains its asymptotic errors, a sentence for each cause, and one command for all its scenes.
+
+    The failures of a scene probably have one cause; equal breakdowns of an engine in several scenes are one failure.
+    """
     by_engine: dict[str, dict[tuple[bool, str], list[Failure]]] = {}
     broken = {(failure.scene, failure.engine) for failure in failures if failure.broke_down}
     for failure in failures:
@@ -120,35 +107,28 @@ def grouped(results: Results, failures: Sequence[Failure], baseline: str | None 
             continue  # its accepted results are gone because it broke down
         cause = failure.what if failure.broke_down else failure.scene
         by_engine.setdefault(failure.engine, {}).setdefault((failure.broke_down, cause), []).append(failure)
-    groups = []
-    for engine, by_cause in by_engine.items():
-        alike = [failure for group in by_cause.values() for failure in group]
-        scenes = list(dict.fromkeys(failure.scene for failure in alike))
-        of_baseline = baseline if any(failure.accepted for failure in alike) else None
-        symmetries = any(failure.of_symmetry for failure in alike)
-        command = reproduce_scenes(results, scenes, engine, baseline=of_baseline, symmetries=symmetries)
-        groups.append(FailureGroup(engine, list(map(_of_one_cause, by_cause.values())), _consistent_with(results, engine), command))
-    return groups
-
-
-def failure_parts(groups: Sequence[FailureGroup], most: int) -> list[Part]:
-    """The failures of each engine, at most so many, after what explains them, and one command that reproduces them."""
     parts: list[Part] = []
-    for group in groups:
-        explained = [group.consistent_with] if group.consistent_with else []
-        listed = [f"✗ {sentence}" for sentence in group.sentences[:most]]
-        more = len(group.sentences) - most
-        others = [f"✗ {group.engine} has {counted(more, 'more failure')}."] if more > 0 else []
-        parts += [Sentences([*explained, *listed, *others], style="red"), Paragraph("Reproduce:", group.reproduce)]
+    for engine, by_cause in by_engine.items():
+        explained, sentences = _consistent_with(results, engine), [f"✗ {_of_one_cause(alike)}" for alike in by_cause.values()]
+        for most, on_page in ((MOST_ON_PAGE, True), (MOST_ON_TERMINAL, False)):
+            more = len(sentences) - most
+            others = [f"✗ {engine} has {counted(more, 'more failure')}."] if more > 0 else []
+            parts.append(Sentences([*explained, *sentences[:most], *others], style="red", on_page=on_page, on_terminal=not on_page))
+        all_failures = [failure for alike in by_cause.values() for failure in alike]
+        scenes = list(dict.fromkeys(failure.scene for failure in all_failures))
+        of_baseline = baseline if any(failure.accepted for failure in all_failures) else None
+        symmetries = any(failure.of_symmetry for failure in all_failures)
+        command = reproduce_scenes(results, scenes, engine, baseline=of_baseline, symmetries=symmetries)
+        parts.append(Paragraph("Reproduce:", command))
     return parts
 
 
-def _consistent_with(results: Results, engine: str) -> str:
-    """The causes with which the errors of an engine are consistent, in a sentence; empty if there are none."""
+def _consistent_with(results: Results, engine: str) -> list[str]:
+    """A sentence with the wrong parameters and faults each of which alone explains the asymptotic errors of an engine, if any does."""
     parameters, faults = causes(results, engine)
     wrong = " or ".join(dict.fromkeys(map(_described, parameters)))
     listed = ", or with ".join(filter(None, [wrong, *(f"this fault: {fault.message}" for fault in faults)]))
-    return f"Consistent with {listed}." if listed else ""
+    return [f"Consistent with {listed}."] if listed else []
 
 
 def _described(wrong: WrongParameter) -> str:

@@ -14,7 +14,7 @@ from dropspin.comparisons.judging.convergence import ARTEFACTS, JUMPING
 from dropspin.comparisons.judging.error_budget import is_determined, is_sufficient
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 from dropspin.comparisons.results.results import SMALLEST_STATED, UNDECIDED, Results, Status, is_undecided, relative_sizes
-from dropspin.reports.stories.leading_errors import step_times
+from dropspin.reports.stories.matrix import step_times
 from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, quantity
 from dropspin.scenarios.text import counted
 
@@ -31,61 +31,38 @@ ENGINE_NAMES = {"wang": "wang (Wang's method)"}
 """Descriptive names of engines, by label, where the label is not descriptive."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Counts:
     """The checks of a run.
 
     Attributes:
         passed: Number of passed checks.
         failed: Number of failed checks.
-        known: Number of checks that show a fault, with an error that is not negligible, that the scene expects of the engine by name.
-        known_scenes: Number of scenes with such checks.
-        fixed: Number of passed checks for which such a fault is expected.
-        known_engines: The engines of these checks.
-        limited: Number of checks whose failure is explained by a known limitation of the engine.
-        limited_engines: The engines of these checks.
         broken: Number of rows that report a breakdown of an engine.
+        fixed: Number of passed checks for which a fault is expected.
+        known: The checks that show a fault, with an error that is not negligible, that the scene expects of the engine by name.
+        limited: The checks whose failure is explained by a known limitation of the engine.
     """
 
     passed: int
     failed: int
-    known: int
-    known_scenes: int
-    fixed: int
-    known_engines: tuple[str, ...]
-    limited: int
-    limited_engines: tuple[str, ...]
     broken: int
+    fixed: int
+    known: "pd.DataFrame"
+    limited: "pd.DataFrame"
 
 
 def counts(results: Results) -> Counts:
     """Count the verdicts of a run."""
-    table = results.table
-    verdicts = table["verdict"]
-    known = table[(verdicts == "known") & (table["value"].abs() > SMALLEST_STATED)]
-    limited = table[(verdicts == "limited") & (table["metric"] != "")]
-    known_engines, limited_engines = (
-        tuple(engine for engine in results.engines if (rows["engine"] == engine).any()) for rows in (known, limited)
-    )
+    table, verdicts = results.table, results.table["verdict"]
     return Counts(
         passed=int((verdicts == "passed").sum()),
         failed=int(verdicts.isin(FAILURES).sum()),
-        known=len(known),
-        known_scenes=known["scene"].nunique(),
-        fixed=int(((verdicts == "passed") & (table["basis"] == "fault_absent")).sum()),
-        known_engines=known_engines,
-        limited=len(limited),
-        limited_engines=limited_engines,
         broken=int(verdicts.isin(BREAKDOWNS).sum()),
+        fixed=int(((verdicts == "passed") & (table["basis"] == "fault_absent")).sum()),
+        known=table[(verdicts == "known") & (table["value"].abs() > SMALLEST_STATED)],
+        limited=table[(verdicts == "limited") & (table["metric"] != "")],
     )
-
-
-def asymptotic_errors(results: Results, cause: str) -> dict[str, list[str]]:
-    """For each engine, the scenes in which an error with this cause does not vanish as dt → 0; negligible errors are left out."""
-    rows = results.asymptotic_errors(cause)
-    worth = rows[rows["value"].abs() > SMALLEST_STATED]
-    pairs = set(zip(worth["engine"], worth["scene"], strict=True))
-    return {engine: [scene for scene in results.scenes if (engine, scene) in pairs] for engine in results.engines}
 
 
 @dataclass(frozen=True)
@@ -155,14 +132,14 @@ def orders(results: Results, scene: str, engine: str) -> str:
 
 def verdict_sentence(results: Results, tally: Counts) -> str:
     """The outcome of the checks in one sentence."""
-    judged, known = tally.passed + tally.failed, _known(tally)
+    judged, known = tally.passed + tally.failed, _known(results, tally)
     if tally.broken:
         judgement = f"; {failing(tally.failed, judged, 'check')}" if judged else ""
         return f"{counted(tally.broken, 'engine run')} broke down{judgement}{known}."
     if tally.failed:
         return f"{failing(tally.failed, judged, 'check')}{known}."
     passing = counted(judged, "check passes", "checks pass")
-    if tally.known or tally.limited:
+    if len(tally.known) or len(tally.limited):
         return f"No unexpected results: {passing}{known}." if judged else f"No check passes or fails{known}."
     if judged:
         return f"{'The check passes' if judged == 1 else f'All {passing}'}{known}."
@@ -175,21 +152,18 @@ def verdict_sentence(results: Results, tally: Counts) -> str:
     return f"{none}; {len(results.measurements):,} values were measured."
 
 
-def _known(tally: Counts) -> str:
+def _known(results: Results, tally: Counts) -> str:
     """The end of a sentence: how many values show known errors or are within limitations, how many expected faults do not occur."""
-    parts = []
-    if tally.known:
-        shows = counted(tally.known, "value shows a known error", "values show known errors")
-        parts.append(f"{shows} of {_named(tally.known_engines, 'engine')} in {counted(tally.known_scenes, 'scene')}")
-    if tally.limited:
-        shows = counted(tally.limited, "value shows a known limitation", "values show known limitations")
-        parts.append(f"{shows} of {_named(tally.limited_engines, 'engine')}")
-    if tally.fixed:
-        parts.append(f"{counted(tally.fixed, 'expected fault does', 'expected faults do')} not occur")
-    return "".join(f"; {part}" for part in parts)
+    parts = ""
+    for rows, what in ((tally.known, "error"), (tally.limited, "limitation")):
+        if len(rows):
+            shows = counted(len(rows), f"value shows a known {what}", f"values show known {what}s")
+            parts += f"; {shows} of {_named([engine for engine in results.engines if engine in set(rows['engine'])], 'engine')}"
+            parts += f" in {counted(rows['scene'].nunique(), 'scene')}" if what == "error" else ""
+    return parts + (f"; {counted(tally.fixed, 'expected fault does', 'expected faults do')} not occur" if tally.fixed else "")
 
 
-def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[str]]], profiles: Sequence[ProfileComparison]) -> list[str]:
+def finding_sentences(results: Results, profiles: Sequence[ProfileComparison]) -> list[str]:
     """One sentence for each engine, and one for all errors that the time steps leave undecided.
 
     The sentence gives the number of scenes in which the engine converges, the number with each other status, its largest error that
@@ -197,17 +171,17 @@ def finding_sentences(results: Results, lasting: Mapping[str, Mapping[str, list[
 
     Args:
         results: The run.
-        lasting: The scenes with errors that do not vanish as dt → 0, by cause and engine.
         profiles: Engines with default settings compared with the calibrated ones.
     """
     missing = results.table[results.table["verdict"] == "missing"].drop_duplicates("engine").set_index("engine")["reason"]
-    times, statuses = step_times(results), results.statuses()
+    times, statuses, lasting = step_times(results), results.statuses(), results.asymptotic_errors("model", "setting")
+    lasting = lasting[lasting["value"].abs() > SMALLEST_STATED]
     sentences, undecided, hidden = [], [], False
     for engine in results.engines:
         if engine in missing:
             sentences.append(str(missing[engine]))
             continue
-        remain = {scene for cause in ("model", "setting") for scene in lasting[cause][engine]}
+        remain = set(lasting.loc[lasting["engine"] == engine, "scene"])
         errors = results.table[(results.table["kind"] == "asymptotic_error") & (results.table["engine"] == engine)]
         opened = errors[is_undecided(errors) & ~errors["metric"].isin(JUMPING)]
         parts = [

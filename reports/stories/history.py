@@ -1,7 +1,10 @@
 """The output of `dropspin compare history`: the runs in which results changed."""
 
+from functools import partial
+
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
+from dropspin.reports.plots.history import plot_history
 from dropspin.reports.stories.numbers import capitalized, formatted, subject
 from dropspin.scenarios.text import counted
 
@@ -25,8 +28,10 @@ def document(history: History) -> Document:
         for row in changed
     ]
     parts: list[Part] = [Table(changed, lines=lines), Sentences(causes or [unchanged])]
+    drawn = history.results[~history.results["kind"].isin(["order", "asymptotic_error"])]
     for scene in history.results["scene"].unique():
-        parts += [Heading(scene), Charts(scene, ())]
+        metrics = drawn.loc[drawn["scene"] == scene, "metric"].unique()
+        parts += [Heading(scene), Charts(scene, drawings=[partial(plot_history, history, scene, metric) for metric in metrics])]
     return Document(f"Results over {len(history.names)} runs", parts)
 
 

@@ -1,55 +1,57 @@
-"""The matrix of a run: a row for each scene, a cell for each engine with its status and the leading error."""
+"""The matrix of a run, a row for each scene and a column for each engine: the scenes, the errors, the marks, and the time of the steps."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
+import numpy as np
+
+from dropspin.comparisons.judging.verdicts import VERDICTS
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.results.results import UNDECIDED, Results, Status
-from dropspin.reports.stories.leading_errors import leading_errors
-from dropspin.reports.stories.numbers import formatted, in_ms, quantity, unit
 
 MOST_SCENES = 24
-"""Largest number of rows. Of more scenes, those in which no engine has a finding are left out first, then those with the least severe
-findings.
+"""Largest number of rows on a terminal. Of more scenes, those in which no engine has a finding are left out first, then those with the
+least severe findings.
 """
 WITHOUT_FINDING = frozenset({"passed", "measured", "declined", "no_truth"})
 
 
 @dataclass(frozen=True)
-class MatrixRow:
-    """A scene: the quantity whose errors are shown, and for each engine, in order, the mark of its status and the size of its error."""
+class Leading:
+    """The errors of a scene in one metric at its finest time step.
 
-    scene: str
-    quantity: str
-    cells: list[tuple[str, str]]
-    fails: bool
+    Attributes:
+        metric: The metric, as chosen by `Results.leading_errors`.
+        unit: Unit of the errors.
+        dt: Time step [s].
+        scale: The scale of the errors, in their unit.
+        sizes: The size of the error, by engine; NaN where it is undefined.
+        levels: The decade of the error relative to its scale, by engine, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1); None if
+            undefined.
+    """
+
+    metric: str
+    unit: str
+    dt: float
+    scale: float
+    sizes: dict[str, float]
+    levels: dict[str, int | None]
 
 
-@dataclass(frozen=True)
-class Matrix:
-    """The rows of a matrix, a heading for the errors, the meaning of the marks, and a sentence on the scenes left out."""
-
-    rows: list[MatrixRow]
-    title: str
-    legend: str
-    left_out: str
-
-
-def matrix(results: Results, statuses: Mapping[str, Mapping[str, Status]]) -> Matrix:
-    """The matrix of a run, of at most `MOST_SCENES` scenes."""
-    scenes, left_out = _shown(statuses)
-    leading = leading_errors(results)
-    rows = []
-    for scene in scenes:
-        errors, by_engine = leading.get(scene), statuses[scene]
-        of = quantity(errors.metric) + unit(errors.unit) if errors else ""
-        sizes = {engine: formatted(size) for engine, size in errors.sizes.items() if not math.isnan(size)} if errors else {}
-        cells = [(status.mark, sizes.get(engine, "")) for engine, status in by_engine.items()]
-        rows.append(MatrixRow(scene, of, cells, any(status.verdict in FAILURES | BREAKDOWNS for status in by_engine.values())))
-    steps = sorted({in_ms(errors.dt) for errors in leading.values()})
-    legend = legend_of_marks({scene: statuses[scene] for scene in scenes})
-    return Matrix(rows, f"error at dt = {' or '.join(steps)}" if steps else "", legend, left_out)
+def leading_errors(results: Results) -> dict[str, Leading]:
+    """The leading error of each scene with an exact solution, by scene."""
+    found = {}
+    for name, of_scene in results.by_scene.items():
+        finest = of_scene.leading_errors(name)
+        if not finest.empty:
+            metric, dt, values = str(finest["metric"].iloc[0]), float(finest["dt"].iloc[0]), finest["value"].abs()
+            unit = METRICS[metric].unit
+            of = scale(results.scenes[name], unit)
+            sizes = {engine: float(values.get(engine, math.nan)) for engine in results.engines}
+            found[name] = Leading(metric, unit, dt, of, sizes, {engine: level(size / of) for engine, size in sizes.items()})
+    return found
 
 
 def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
@@ -63,16 +65,37 @@ def legend_of_marks(statuses: Mapping[str, Mapping[str, Status]]) -> str:
     return ", ".join(f"{mark} {' or '.join(meanings)}" for mark, meanings in words.items())
 
 
-def _shown(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:
-    """The scenes that have a row, and a sentence on the others."""
+def shown_scenes(statuses: Mapping[str, Mapping[str, Status]]) -> tuple[list[str], str]:
+    """The scenes that have a row on a terminal, and a sentence on the others."""
     if len(statuses) <= MOST_SCENES:
         return list(statuses), ""
-    found = [scene for scene, by_engine in statuses.items() if any(map(_is_finding, by_engine.values()))]
+    found = [
+        scene
+        for scene, by_engine in statuses.items()
+        if any(status.verdict not in WITHOUT_FINDING or status.words == UNDECIDED for status in by_engine.values())
+    ]
     worst = sorted(found, key=lambda scene: min(VERDICTS.index(status.verdict) for status in statuses[scene].values()))[:MOST_SCENES]
     fine, more = len(statuses) - len(found), len(found) - len(worst)
     left_out = [f"{fine} in which no engine has a finding"] * bool(fine) + [f"{more} with less severe findings"] * bool(more)
     return [scene for scene in statuses if scene in worst], f"Scenes not shown: {', '.join(left_out)}."
 
 
-def _is_finding(status: Status) -> bool:
-    return status.verdict not in WITHOUT_FINDING or status.words == UNDECIDED
+def step_times(results: Results) -> dict[str, float]:
+    """The time per step [s], by engine: the geometric mean over the scenes and time steps in which all engines were timed.
+
+    Ratios of these times are therefore the geometric means of the ratios. NaN for an engine that was not timed, and for all if there are no
+    scenes and time steps in which all engines were timed.
+    """
+    timed = results.table[results.table["time_per_step"] > 0.0].drop_duplicates(["scene", "engine", "dt"])
+    times = timed.pivot(index=["scene", "dt"], columns="engine", values="time_per_step")
+    means = np.exp(np.log(times.dropna()).mean())
+    return {engine: float(means.get(engine, math.nan)) for engine in results.engines}
+
+
+def level(error: float) -> int | None:
+    """The decade of a relative error, from 0 (up to 1e-8) over 1 (up to 1e-7) to 8 (above 0.1)."""
+    if math.isnan(error):
+        return None
+    if error > 0.1:  # it may be infinite
+        return 8
+    return 0 if error <= 1e-8 else min(8, 8 + math.ceil(math.log10(error) - 1e-9))

@@ -11,7 +11,7 @@ from dropspin.comparisons.judging.verdicts import MARKS
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
-from dropspin.reports.stories.leading_errors import level
+from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import duration, formatted, in_ms, word
 
 GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}

@@ -12,7 +12,6 @@ from dropspin.reports.stories.failures import Failure, failures, reproduce_drawn
 from dropspin.reports.stories.findings import (
     Counts,
     ProfileComparison,
-    asymptotic_errors,
     counts,
     finding_sentences,
     profile_comparisons,
@@ -48,8 +47,7 @@ class Overview:
 def overview(results: Results) -> Overview:
     """The overview of a run."""
     tally, profiles = counts(results), profile_comparisons(results)
-    findings = finding_sentences(results, {cause: asymptotic_errors(results, cause) for cause in ("model", "setting")}, profiles)
-    findings = [*_quick(results), *findings, *reproduce_drawn(results)]
+    findings = [*_quick(results), *finding_sentences(results, profiles), *reproduce_drawn(results)]
     return Overview(verdict_sentence(results, tally), findings, tally, results.statuses(), profiles, failures(results), law_rows(results))
 
 

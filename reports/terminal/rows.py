@@ -33,11 +33,11 @@ def print_json_or(json_output: bool, data: object, document: Document, written: 
 
 def print_document(document: Document, console: Console | None = None) -> None:
     """Print a document without its title and its charts, the summary last."""
-    console, is_first = console or Console(), True
-    for part in (*document.parts, *document.summary):
+    console = console or Console()
+    for number, part in enumerate(part for part in (*document.parts, *document.summary) if part.on_terminal):
         match part:
-            case Heading(text, on_terminal=True):
-                print_sentence(text if is_first else f"\n{text}", console)
+            case Heading(text):
+                print_sentence(f"\n{text}" if number else text, console)
             case Paragraph(text, command, style):
                 console.print(styled(f"{text} {command}".strip(), style), soft_wrap=bool(command) or not console.is_terminal)
             case Sentences(items, style=style):
@@ -48,7 +48,6 @@ def print_document(document: Document, console: Console | None = None) -> None:
                     print_sentence(line, console)
             case Table(rows, left_out_first) if rows:
                 print_rows(rows, left_out_first, console)
-        is_first = False
 
 
 def print_rows(rows: Sequence[Mapping[str, str]], left_out_first: Sequence[str] = (), console: Console | None = None) -> None:

@@ -8,7 +8,7 @@ import pytest
 from support.cli import TERMINAL, dropspin
 
 import dropspin as ds
-from dropspin.reports.stories.matrix import MOST_SCENES, matrix
+from dropspin.reports.stories.matrix import MOST_SCENES, shown_scenes
 from dropspin.reports.stories.run import overview
 from dropspin.reports.terminal.rows import print_rows
 from dropspin.reports.terminal.summary import print_summary
@@ -55,8 +55,7 @@ def test_summary_of_many_scenes_shows_those_with_findings_and_counts_the_others(
     assert len(lines) <= 45
     shown = [line.split()[0] for line in lines if line.split()[0] in many.scenes]
     assert len(shown) == MOST_SCENES
-    found = matrix(many, many.statuses())
-    fine, more = map(int, re.findall(r"\d+", found.left_out))
+    fine, more = map(int, re.findall(r"\d+", shown_scenes(many.statuses())[1]))
     assert fine + more + MOST_SCENES == len(many.scenes)
     by_scene = core.statuses()
     without = [scene for scene, found in by_scene.items() if all(one.words in ("converges", "declined") for one in found.values())]

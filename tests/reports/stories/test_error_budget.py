@@ -80,16 +80,17 @@ def budget(results):
 )
 def test_budget_in_a_sentence(results, sentence):
     """An error is discretisation error, or partly or wholly model or setting error, or undecided with the reason."""
-    assert budget(results).sentence == sentence
+    assert budget(results)["sentence"] == sentence
 
 
 def test_interval_is_stated():
     """The asymptotic error comes with both ends of its interval; without extrapolation all three are NaN."""
+    interval = ("value_of_limit", "lower_of_limit", "upper_of_limit")
     found = budget(made(4e-2, asymptotic=(3e-2, 2.9e-2, 3.2e-2, "model")))
-    assert (found.value, found.asymptotic, found.lower, found.upper, found.cause) == (4e-2, 3e-2, 2.9e-2, 3.2e-2, "model")
+    assert [found[name] for name in ("value", *interval, "cause")] == [4e-2, 3e-2, 2.9e-2, 3.2e-2, "model"]
     found = budget(made(4e-2))
-    assert all(map(math.isnan, [found.asymptotic, found.lower, found.upper]))
-    assert found.cause == "unresolved"
+    assert all(math.isnan(found[name]) for name in interval)
+    assert found["cause"] == "unresolved"
 
 
 def test_negligible_errors_are_left_out():

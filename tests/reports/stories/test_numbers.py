@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dropspin.reports.stories.leading_errors import level
+from dropspin.reports.stories.matrix import level
 from dropspin.reports.stories.numbers import duration, failing, formatted, left_out
 
 

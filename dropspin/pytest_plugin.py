@@ -177,7 +177,7 @@ class Runs:
         """
         __tracebackhide__ = True
         fails = FAILING | {"missing"} if self.named else FAILING
-        judged = [row | {"fails": row["verdict"] in fails, "message": _message(row), "share": _share(row)} for row in rows]
+        judged = [_described(row) | {"fails": row["verdict"] in fails} for row in rows]
         node.stash.setdefault(JUDGED, []).extend(row for row in judged if row["fails"] or row["verdict"] in STOPPED | {"passed", "known"})
         failing = [row for row in judged if row["fails"]]
         if failing:
@@ -213,7 +213,7 @@ class Runs:
         dts = sorted({row["dt"] for row in failing}, reverse=True) if all(row["dt"] is not None for row in failing) else result.dts
         paths = os.pathsep.join(os.path.relpath(path, self.root) for path in self.config.getini("pythonpath"))
         command = [NAME, "run", result.given, *_options(engines, dts, self.baseline), *REPRODUCE_OUTPUT]
-        return shlex.join([*([f"PYTHONPATH={paths}"] if paths else []), *command])
+        return shlex.join([f"PYTHONPATH={paths}"] * bool(paths) + command)
 
 
 def _options(engines: Iterable[str], dts: Iterable[float], baseline: str | None) -> list[str]:
@@ -244,40 +244,32 @@ def _written(folder: Path, scene: Mapping[str, Any]) -> Path:
     return path
 
 
-def _bound(row: Row) -> float | None:
-    """The bound that a value exceeds, or to which it is nearest."""
+def _described(row: Row) -> Row:
+    """A row with its `message`, one line, and its `share`: the value relative to its bound, above 1 if it fails, 0 without a bound."""
     value, lower, upper = row["value"], row["lower"], row["upper"]
-    if value is None or lower is None or upper is None:
-        return upper if lower is None else lower
-    return upper if value >= 0.5 * (lower + upper) else lower
+    # The bound that the value exceeds, or to which it is nearest.
+    bound = upper if lower is None else lower if upper is None or value is None or value < 0.5 * (lower + upper) else upper
+    share = math.inf if value is None else 0.0
+    if bound and value is not None:
+        at_least = (bound == lower) == (bound > 0.0)  # or, for a negative bound, at most: values nearer to 0 are not allowed
+        share = bound / value if at_least and value else value / bound
+    return row | {"message": _message(row, bound), "share": share}
 
 
-def _share(row: Row) -> float:
-    """The value relative to its bound, above 1 if it fails; 0 without a bound."""
-    value, bound = row["value"], _bound(row)
-    if value is None:
-        return math.inf
-    if not bound:
-        return 0.0
-    at_least = (bound == row["lower"]) == (bound > 0.0)  # or, for a negative bound, at most: values nearer to 0 are not allowed
-    return bound / value if at_least and value else value / bound
-
-
-def _message(row: Row) -> str:
+def _message(row: Row, bound: float | None) -> str:
     """A row in one line: its subject, its value, its bound, and the ratio of the two."""
     if not row["metric"]:
         return f"{row['verdict']}: {row['reason']}"
     prefix = row["truth"] if row["kind"] == "baseline" else row["kind"] if row["kind"] in SUBJECTS else ""
     at = "" if row["dt"] is None else f" at {row['dt']:g} s"
     subject = f"{SUBJECTS.get(prefix, prefix)} {row['metric']}{at}".strip()
-    value, lower, upper, bound = row["value"], row["lower"], row["upper"], _bound(row)
+    value, lower, upper = row["value"], row["lower"], row["upper"]
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
     if value is None or bound is None:
         return f"{subject} is " + ("undefined" if value is None else f"{value:.3g}{unit}")
+    expected = f"≤ {upper:.3g}" if lower is None else f"≥ {lower:.3g}" if upper is None else f"{lower:.3g} … {upper:.3g}"
     if lower is not None and upper == -lower:
         expected = f"± {upper:.3g}"
-    else:
-        expected = f"≤ {upper:.3g}" if lower is None else f"≥ {lower:.3g}" if upper is None else f"{lower:.3g} … {upper:.3g}"
     return f"{subject} is {value:.3g}{unit}, expected {expected}" + (f": {value / bound:.3g} times its bound" if bound else "")
 
 
@@ -395,11 +387,13 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         worst = max(rows, key=lambda row: (row["fails"], row["share"]))
         tally = (sum(row[key] == value for row in rows) for key, value in (("verdict", "passed"), ("fails", True), ("verdict", "known")))
         lines.append((engine, scene, *map(str, tally), worst["message"]))
-    widths = [max(len(line[column]) for line in lines) for column in range(5)]
+    widths = [max(map(len, column)) for column in list(zip(*lines, strict=True))[:-1]]
     terminalreporter.section(NAME)
-    for engine, scene, passed, failed, known, message in lines:
-        ends = f"{passed:>{widths[2]}}  {failed:>{widths[3]}}  {known:>{widths[4]}}  {message}"
-        terminalreporter.write_line(f"{engine:<{widths[0]}}  {scene:<{widths[1]}}  {ends}")
+    for *cells, message in lines:
+        padded = [
+            cell.rjust(width) if column > 1 else cell.ljust(width) for column, (cell, width) in enumerate(zip(cells, widths, strict=True))
+        ]
+        terminalreporter.write_line("  ".join([*padded, message]))
     runs = config.stash[RUNS]
     if runs.baseline and not any(row["kind"] == "baseline" for found in judged.values() for row in found.values()):
         terminalreporter.write_line(f"{runs.baseline} has no accepted results of these runs; no results were compared with it.")

@@ -5,7 +5,7 @@ A page begins with the summary; a terminal, on which the last lines are read fir
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dropspin.reports.plots.chart import Chart, Drawing
@@ -23,12 +23,16 @@ class Part:
     on_page: bool = True
     on_terminal: bool = True
 
+    @property
+    def kind(self) -> str:
+        """The name of its class in lower case."""
+        return type(self).__name__.lower()
+
 
 @dataclass(frozen=True)
 class Heading(Part):
     """A heading within a page; a terminal shows it as a sentence, or not at all."""
 
-    kind: ClassVar = "heading"
     text: str
     on_terminal: bool = field(default=False, kw_only=True)
 
@@ -37,7 +41,6 @@ class Heading(Part):
 class Paragraph(Part):
     """A text, followed by a command as code if there is one; `style` is that of a terminal, and bold is bold on a page too."""
 
-    kind: ClassVar = "paragraph"
     text: str
     command: str = ""
     style: str = ""
@@ -47,7 +50,6 @@ class Paragraph(Part):
 class Sentences(Part):
     """A list of sentences, on a page each with a command below it if there are any; `style` is that of a terminal."""
 
-    kind: ClassVar = "sentences"
     items: Sequence[str]
     numbered: bool = False
     style: str = ""
@@ -61,7 +63,6 @@ class Table(Part):
     A narrow terminal leaves out the columns in `left_out_first`, in this order.
     """
 
-    kind: ClassVar = "table"
     rows: Sequence[Mapping[str, str]]
     left_out_first: Sequence[str] = ()
     lines: Sequence[str] = ()
@@ -71,7 +72,6 @@ class Table(Part):
 class Charts(Part):
     """A picture of charts, or of what functions draw into axes, which a page in HTML does not show; a terminal shows neither."""
 
-    kind: ClassVar = "charts"
     name: str
     charts: "Sequence[Chart]" = ()
     drawings: "Sequence[Drawing]" = ()

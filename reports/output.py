@@ -1,6 +1,5 @@
 """Tables of studies as CSV and JSON, and data as JSON."""
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,10 +10,9 @@ from pydantic_core import to_jsonable_python
 
 def write_table(folder: Path, stem: str, rows: Sequence[Mapping[Any, Any]]) -> None:
     """Write rows as CSV, and as JSON, in which numbers stay numbers."""
-    with (folder / f"{stem}.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, dict.fromkeys(column for row in rows for column in row))
-        writer.writeheader()
-        writer.writerows(_plain(rows))
+    import pandas as pd
+
+    pd.DataFrame(_plain(rows), dtype=object).to_csv(folder / f"{stem}.csv", index=False, lineterminator="\r\n")
     (folder / f"{stem}.json").write_text(json_text(rows), encoding="utf-8")
 
 

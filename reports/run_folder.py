@@ -46,23 +46,18 @@ def write_report(results: Results, folder: str | Path, sections: Sequence[Docume
 
 def fill(results: Results, folder: Path, sections: Sequence[Document] = (), plots: Collection[str] = ()) -> None:
     """Write the data and the reports of a run into an empty folder, and its plots as files of these kinds, `svg` or `png`."""
-    summary = overview(results)
+    summary, charts_of = overview(results), report_charts(results)
     save(results, folder)
     results.table.to_csv(folder / "results.csv", index=False)
-    (folder / "report.html").write_text(html_report(results, summary, sections), encoding="utf-8")
+    (folder / "report.html").write_text(html_report(results, summary, charts_of, sections), encoding="utf-8")
     (folder / "report.md").write_text(markdown(document(results, summary), level=2), encoding="utf-8")
     (folder / "junit.xml").write_bytes(junit_xml(results))
     if plots:
-        _write_plots(results, folder / "plots", plots)
-
-
-def _write_plots(results: Results, folder: Path, kinds: Collection[str]) -> None:
-    folder.mkdir()
-    charts_of = report_charts(results)
-    for number, scene in enumerate(results.scenes):
-        for name, charts in charts_of.get(scene, {}).items():
-            for kind in kinds:
-                {"svg": save_svg, "png": save_png}[kind](figure_of(charts), folder / f"{number:02d}-{name}.{kind}")
+        (folder / "plots").mkdir()
+    for kind in plots:
+        for number, scene in enumerate(results.scenes):
+            for name, charts in charts_of.get(scene, {}).items():
+                {"svg": save_svg, "png": save_png}[kind](figure_of(charts), folder / "plots" / f"{number:02d}-{name}.{kind}")
 
 
 def run_folder(folder: str | Path) -> AbstractContextManager[Path]:

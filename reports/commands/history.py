@@ -3,11 +3,14 @@
 import os
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from dropspin.reports.commands.options import as_json, output_option
+
+if TYPE_CHECKING:
+    from dropspin.comparisons.results.results import Results
 
 
 @click.command("history")
@@ -28,21 +31,23 @@ def history_command(runs: tuple[str, ...], output: str, json_output: bool) -> No
 
     with study_folder(output) as folder:
         with status("reading the runs"):
-            found = history(_load_runs(_find_runs(runs)))
+            found = history(_load_runs(runs))
         with status("drawing"):
             document = write_history(found, folder)
     print_json_or(json_output, rows(found), document, os.path.join(output, "history.md"))
 
 
-def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
-    """The folders of all runs in the given folders, each of which is a run or a folder of runs.
+def _load_runs(places: tuple[str, ...]) -> "dict[str, Results]":
+    """The results of all runs in the given folders, by the name of the run's folder if it is unique, else by its path.
 
     Raises:
         DropspinError: A given folder is neither a run nor a folder of runs.
     """
+    from dropspin.comparisons.results.store import load_results
     from dropspin.scenarios import DropspinError
+    from dropspin.scenarios.text import printable
 
-    found: dict[str, Path] = {}
+    short: dict[Path, str] = {}
     for place in places:
         path = Path(place)
         here = [path] if (path / "run.json").is_file() else sorted(file.parent for file in path.glob("*/run.json"))
@@ -50,17 +55,7 @@ def _find_runs(places: tuple[str, ...]) -> dict[str, Path]:
             raise DropspinError(
                 f"{place}: neither a run nor a folder of runs; give folders that dropspin run -o wrote, or a folder of them."
             )
-        found |= {str(folder): folder for folder in here}
-    return found
-
-
-def _load_runs(found: dict[str, Path]) -> dict[str, Any]:
-    """The results of runs, by the name of the folder if it is unique, else by its path."""
-    from dropspin.comparisons.results.store import load_results
-    from dropspin.scenarios.text import printable
-
-    short = {place: printable(path.resolve().name) for place, path in found.items()}
+        short |= {folder: printable(folder.resolve().name) for folder in here}
     alike = Counter(short.values())
-    return {
-        short[place] if alike[short[place]] == 1 else printable(place): load_results(path, arrays=False) for place, path in found.items()
-    }
+    names = {path: name if alike[name] == 1 else printable(str(path)) for path, name in short.items()}
+    return {name: load_results(path, arrays=False) for path, name in names.items()}

@@ -63,7 +63,7 @@ class Site:
             about = {"changed": view.change_sentences(self.changes[engine]), "differing": findings.successive(self.measured[engine])}
             self._write(folder / f"engine-{engine}.html", "record_engine.html", engine=engine, newest=newest, **about)
             for release in self.measured[engine]:
-                self._write(folder / self.page_of(engine, release), "record_release.html", engine=engine, release=release, **about)
+                self._write(folder / self.page_of(engine, release.name), "record_release.html", engine=engine, release=release, **about)
             badge = view.badge(engine, newest, self.labels[engine][0], self.dts[-1])
             (folder / "badges" / f"{engine}.json").write_text(json.dumps(badge) + "\n", encoding="utf-8")
         for name, scene in self.scenes.items():
@@ -73,13 +73,9 @@ class Site:
     def _write(self, file: Path, template: str, **content: Any) -> None:
         file.write_text(page(template, site=self, step=numbers.in_ms(self.dts[-1]), **content), encoding="utf-8")
 
-    def page_of(self, engine: str, release: Release) -> str:
-        """The address of the page of a release."""
-        return f"release-{engine}-{release.name}.html"
-
-    def release(self, engine: str, name: str) -> Release:
-        """A release of an engine, by its name."""
-        return next(one for one in self.measured[engine] if one.name == name)
+    def page_of(self, engine: str, release: str) -> str:
+        """The address of the page of a release, by its name."""
+        return f"release-{engine}-{release}.html"
 
     def labels_of(self, release: Release) -> list[str]:
         """The engine with each set of options that a release was measured with."""
@@ -92,10 +88,6 @@ class Site:
     def remarks(self, scene: str) -> list[str]:
         """The known limitations in a scene, and why engines have no result, at the finest time step."""
         return view.remarks({label: self.case(label, scene, self.dts[-1]) for label in self.engines})
-
-    def position(self, release: Release, label: str) -> int:
-        """The number of the section of a label on the page of a release, from 1."""
-        return self.labels_of(release).index(label) + 1
 
     def link(self, label: str) -> str:
         """The address of the table of a label."""

@@ -20,7 +20,7 @@ from dropspin.reports.plots.chart import Chart
 from dropspin.reports.plots.chart_data import chart_data
 from dropspin.reports.plots.colours import engine_colours
 from dropspin.reports.plots.convergence import INTERVAL_WIDTH, PREDICTED
-from dropspin.reports.plots.figures import CHARTS, report_charts
+from dropspin.reports.plots.figures import CHARTS
 from dropspin.reports.plots.spins import wobbles_freely
 from dropspin.reports.replay import as_data, replay_of
 from dropspin.reports.stories import numbers
@@ -34,42 +34,42 @@ from dropspin.scenarios import truth_for
 from dropspin.scenarios.problems import identifier
 
 
-def html_report(results: Results, summary: Overview, sections: Sequence[Document] = ()) -> str:
+def html_report(
+    results: Results, summary: Overview, charts: Mapping[str, Mapping[str, Sequence[Chart]]], sections: Sequence[Document] = ()
+) -> str:
     """The page.
 
     Args:
         results: The run.
         summary: Its overview.
+        charts: Its charts, from `report_charts`.
         sections: Studies to include.
     """
-    words = sorted({status.words for by_engine in summary.statuses.values() for status in by_engine.values()})
-    return page("report.html", **vars(summary), **_details(results, summary), words=words, sections=sections)
-
-
-def _details(results: Results, summary: Overview) -> dict[str, Any]:
-    tally, charts = summary.counts, report_charts(results)
     finest = results.table.groupby("scene")["dt"].min().dropna().unique()
-    failing = {one.scene for one in summary.failures}
-    return {
-        "engines": results.engines,
-        "provenance": results.provenance,
-        "passed": tally.failed == 0 and tally.broken == 0,
-        "colours": engine_colours(results.engines),
-        "negligible": SMALLEST_STATED,
-        "leading": leading_errors(results),
-        "steps": numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
-        "times": step_times(results),
-        "legend": legend_of_marks(summary.statuses),
-        "plotted": len(charts),
-        "scenes": [
-            _scene(one, number, charts.get(name, {}), name in failing) for number, (name, one) in enumerate(results.by_scene.items())
-        ],
-        "metrics": METRICS,
-        "ensemble_metrics": ENSEMBLE_METRICS,
-        "start_phases": QUICK_START_PHASES if results.is_quick else START_PHASES,
-        "settings": first_settings(results.provenance),
-        "note_on_laws": NOTE,
-    }
+    failing = {failure.scene for failure in summary.failures}
+    by_scene = enumerate(results.by_scene.items())
+    return page(
+        "report.html",
+        **vars(summary),
+        engines=results.engines,
+        provenance=results.provenance,
+        passed=summary.counts.failed == 0 and summary.counts.broken == 0,
+        colours=engine_colours(results.engines),
+        negligible=SMALLEST_STATED,
+        leading=leading_errors(results),
+        steps=numbers.in_ms(float(finest[0])) if len(finest) == 1 else "",
+        times=step_times(results),
+        legend=legend_of_marks(summary.statuses),
+        words=sorted({status.words for by_engine in summary.statuses.values() for status in by_engine.values()}),
+        plotted=len(charts),
+        scenes=[_scene(of_scene, number, charts.get(name, {}), name in failing) for number, (name, of_scene) in by_scene],
+        sections=sections,
+        metrics=METRICS,
+        ensemble_metrics=ENSEMBLE_METRICS,
+        start_phases=QUICK_START_PHASES if results.is_quick else START_PHASES,
+        settings=first_settings(results.provenance),
+        note_on_laws=NOTE,
+    )
 
 
 def _scene(results: Results, number: int, charts: Mapping[str, Sequence[Chart]], has_failed: bool) -> dict[str, Any]:

@@ -41,14 +41,11 @@ def write_clip(replay: Replay, file: str | Path, speed: float, on_progress: Call
         on_progress: Called after each frame with the fraction of frames drawn.
 
     Raises:
-        DropspinError: The file name has another ending, the GIF would have too many frames, or the file cannot be written. An earlier
-            file of this name stays unchanged.
+        DropspinError: The GIF would have too many frames, or the file cannot be written. An earlier file of this name stays unchanged.
     """
     from matplotlib.animation import PillowWriter
     from matplotlib.figure import Figure
 
-    if Path(file).suffix.lower() != ".gif":
-        raise DropspinError(f"{file}: an animation is written as GIF; the file name must end in .gif.")
     times = _frame_times(replay, speed)
     figure = Figure(figsize=(6.4, 4.8), dpi=100)
     axes = _add_axes(figure, replay)

@@ -9,7 +9,7 @@ from dropspin.comparisons.regressions.comparing import Changes
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.document import Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.stories.failures import reproduce_scenes
-from dropspin.reports.stories.numbers import capitalized, formatted, subject
+from dropspin.reports.stories.numbers import capitalized, formatted, in_ms, subject
 from dropspin.scenarios.text import counted
 
 TITLES = {"worse": "Worse", "gone": "Gone", "moved": "Moved", "better": "Better", "new": "New"}
@@ -49,6 +49,16 @@ def _tables(changes: Changes) -> list[Part]:
     return parts
 
 
+def change_cells(row: Mapping[Hashable, Any]) -> dict[str, str]:
+    """The result that changed, its time step, and its values."""
+    return {
+        "result": subject(row["metric"], row["kind"]),
+        "step": "→ 0" if "," in row["steps"] else in_ms(float(row["steps"])),
+        "before": formatted(row["before"]),
+        "now": formatted(row["value"]),
+    }
+
+
 def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
     """The largest change of an engine in a scene, and the number of others."""
     before, after = row["before"], row["value"]
@@ -56,10 +66,7 @@ def _row(row: Mapping[Hashable, Any], count: int) -> dict[str, str]:
     return {
         "scene": row["scene"],
         "engine": row["engine"],
-        "result": subject(row["metric"], row["kind"]),
-        "step": "→ 0" if "," in row["steps"] else f"{1e3 * float(row['steps']):g} ms",
-        "before": formatted(before),
-        "now": formatted(after),
+        **change_cells(row),
         "ratio": f"{ratio:.3g}" if math.isfinite(ratio) else "–",
         "tolerances": "–" if math.isnan(row["in_tolerances"]) else f"{row['in_tolerances']:.3g}",
         "others": counted(count - 1, "other result") if count > 1 else "–",
@@ -102,7 +109,7 @@ def _speed(change: SpeedChange) -> str:
 
 
 def _motions(motions: EqualMotions) -> str:
-    first = f", the first difference in {motions.scene} at {1e3 * motions.dt:g} ms in step {motions.step:,}"
+    first = f", the first difference in {motions.scene} at {in_ms(motions.dt)} in step {motions.step:,}"
     return f"{motions.engine} {motions.equal:,} of {motions.compared:,}{first if motions.equal < motions.compared else ''}"
 
 

@@ -4,6 +4,7 @@ import math
 import shlex
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter, itemgetter
 from typing import Any
 
 from dropspin.comparisons.judging.convergence import STUDIES
@@ -13,7 +14,7 @@ from dropspin.comparisons.regressions.causes import WrongParameter, causes
 from dropspin.comparisons.results.results import Results
 from dropspin.comparisons.running.processes import ResourceLimits
 from dropspin.reports.document import Paragraph, Part, Sentences
-from dropspin.reports.stories.numbers import bound, formatted, step, subject, word
+from dropspin.reports.stories.numbers import bound, formatted, grouped, step, subject, word
 from dropspin.scenarios.text import counted, rounded
 
 Row = Mapping[Hashable, Any]
@@ -71,14 +72,13 @@ def failures(results: Results, baseline: str | None = None) -> list[Failure]:
     of_kind = rows["kind"].map({"baseline": 0.0, "asymptotic_error": 1.0}).astype(float).fillna(2.0)
     gone = (rows["value"].isna() & rows["metric"].ne("")).astype(float)
     urgency = (of_kind + 0.5 * gone).where(rows["verdict"].isin(FAILURES), -1.0)
-    grouped: dict[tuple[str, ...], list[Row]] = {}
-    for row in rows.assign(urgency=urgency).sort_values("urgency", kind="stable").to_dict("records"):
-        accepted = row["truth"] if row["kind"] == "baseline" else ""
-        grouped.setdefault((row["scene"], row["engine"], row["metric"], row["verdict"], row["kind"], accepted), []).append(row)
-    return [_failure(results, group, baseline) for group in grouped.values()]
+    accepted = rows["truth"].where(rows["kind"] == "baseline", "")
+    ordered = rows.assign(urgency=urgency, accepted=accepted).sort_values("urgency", kind="stable").to_dict("records")
+    alike = grouped(ordered, itemgetter("scene", "engine", "metric", "verdict", "kind", "accepted"))
+    return [_failure(results, group, baseline) for group in alike.values()]
 
 
-def _failure(results: Results, group: list[Row], baseline: str | None) -> Failure:
+def _failure(results: Results, group: Sequence[Row], baseline: str | None) -> Failure:
     row = group[0]
     where = "" if math.isnan(row["dt"]) and not row["metric"] else f" · {step(row['dt'])}{'' if math.isnan(row['dt']) else ' s'}"
     return Failure(
@@ -100,24 +100,20 @@ def failure_parts(results: Results, failures: Sequence[Failure], baseline: str |
 
     The failures of a scene probably have one cause; equal breakdowns of an engine in several scenes are one failure.
     """
-    by_engine: dict[str, dict[tuple[bool, str], list[Failure]]] = {}
     broken = {(failure.scene, failure.engine) for failure in failures if failure.broke_down}
-    for failure in failures:
-        if failure.accepted and not failure.result and (failure.scene, failure.engine) in broken:
-            continue  # its accepted results are gone because it broke down
-        cause = failure.what if failure.broke_down else failure.scene
-        by_engine.setdefault(failure.engine, {}).setdefault((failure.broke_down, cause), []).append(failure)
+    # Accepted results of an engine that broke down are gone because it broke down.
+    own = [one for one in failures if one.result or not one.accepted or (one.scene, one.engine) not in broken]
     parts: list[Part] = []
-    for engine, by_cause in by_engine.items():
+    for engine, of_engine in grouped(own, attrgetter("engine")).items():
+        by_cause = grouped(of_engine, lambda failure: (failure.broke_down, failure.what if failure.broke_down else failure.scene))
         explained, sentences = _consistent_with(results, engine), [f"✗ {_of_one_cause(alike)}" for alike in by_cause.values()]
         for most, on_page in ((MOST_ON_PAGE, True), (MOST_ON_TERMINAL, False)):
             more = len(sentences) - most
             others = [f"✗ {engine} has {counted(more, 'more failure')}."] if more > 0 else []
             parts.append(Sentences([*explained, *sentences[:most], *others], style="red", on_page=on_page, on_terminal=not on_page))
-        all_failures = [failure for alike in by_cause.values() for failure in alike]
-        scenes = list(dict.fromkeys(failure.scene for failure in all_failures))
-        of_baseline = baseline if any(failure.accepted for failure in all_failures) else None
-        symmetries = any(failure.of_symmetry for failure in all_failures)
+        scenes = list(dict.fromkeys(failure.scene for alike in by_cause.values() for failure in alike))
+        of_baseline = baseline if any(failure.accepted for failure in of_engine) else None
+        symmetries = any(failure.of_symmetry for failure in of_engine)
         command = reproduce_scenes(results, scenes, engine, baseline=of_baseline, symmetries=symmetries)
         parts.append(Paragraph("Reproduce:", command))
     return parts

@@ -5,7 +5,8 @@ from functools import partial
 from dropspin.comparisons.regressions.comparing import History
 from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
 from dropspin.reports.plots.history import plot_history
-from dropspin.reports.stories.numbers import capitalized, formatted, subject
+from dropspin.reports.stories.compare import change_cells
+from dropspin.reports.stories.numbers import capitalized
 from dropspin.scenarios.text import counted
 
 MOST_RESULTS = 6
@@ -42,10 +43,7 @@ def rows(history: History) -> list[dict[str, str]]:
             "run": history.names[move.run],
             "engine": move.engine,
             "scene": row["scene"],
-            "result": subject(row["metric"], row["kind"]),
-            "step": "→ 0" if "," in row["steps"] else f"{1e3 * float(row['steps']):g} ms",
-            "before": formatted(row["before"]),
-            "now": formatted(row["value"]),
+            **change_cells(row),
             "change": row["change"],
         }
         for move in history.moves

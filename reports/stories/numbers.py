@@ -1,13 +1,17 @@
 """The format of numbers, bounds and verdicts in all output."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from typing import TypeVar
 
 from dropspin.comparisons.judging.error_budget import is_determined
 from dropspin.comparisons.judging.verdicts import WORDS
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.scenarios.text import counted, rounded
+
+Item = TypeVar("Item")
+Key = TypeVar("Key")
 
 
 def formatted(value: float) -> str:
@@ -57,6 +61,14 @@ def failing(count: int, total: int, what: str) -> str:
 def capitalized(sentence: str) -> str:
     """A sentence with a capital first letter."""
     return sentence[:1].upper() + sentence[1:]
+
+
+def grouped(items: Iterable[Item], key: Callable[[Item], Key]) -> dict[Key, list[Item]]:
+    """Items by a key, in the order in which they occur."""
+    groups: dict[Key, list[Item]] = {}
+    for item in items:
+        groups.setdefault(key(item), []).append(item)
+    return groups
 
 
 def left_out(reasons: Mapping[str, str]) -> list[str]:

@@ -12,7 +12,7 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
 from dropspin.reports.stories.matrix import level
-from dropspin.reports.stories.numbers import duration, formatted, in_ms, word
+from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, word
 
 GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}
 """What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""
@@ -74,12 +74,9 @@ def mean_cost(release: Release, label: str, dt: float, *, with_floor: bool) -> s
 
 def remarks(cases: Mapping[str, Case]) -> list[str]:
     """Why there is no result, or which limitation is known: a sentence for all names, of scenes or labels, that have the same."""
-    found: dict[str, list[str]] = {}
-    for name, case in cases.items():
-        if case.reason:
-            words = "known limitation" if case.verdict == "measured" else word(case.verdict)
-            found.setdefault(f"{words}: {case.reason}", []).append(name)
-    return [f"{', '.join(names)}: {words}" for words, names in found.items()]
+    found = grouped([name for name, case in cases.items() if case.reason], lambda name: (cases[name].verdict, cases[name].reason))
+    words = {verdict: "known limitation" if verdict == "measured" else word(verdict) for verdict, _ in found}
+    return [f"{', '.join(names)}: {words[verdict]}: {reason}" for (verdict, reason), names in found.items()]
 
 
 def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
@@ -87,19 +84,14 @@ def change_sentences(changed: Sequence[Change]) -> dict[str, list[str]]:
 
     Labels and scenes that changed alike have one sentence; scenes with values in one of the releases only come last.
     """
-    groups: dict[tuple[str, str, str], list[Change]] = {}
-    for change in changed:
-        groups.setdefault((change.release, change.label, change.scene), []).append(change)
-    scenes: dict[tuple[str, str, str], list[str]] = {}
-    shown = {key: _shown(found) for key, found in groups.items()}
-    for (release, label, scene), change in sorted(shown.items(), key=lambda item: -_gained(item[1])):
-        scenes.setdefault((release, label, _words(change)), []).append(scene)
-    labels: dict[str, dict[tuple[str, str], list[str]]] = {change.release: {} for change in reversed(changed)}
-    for (release, label, words), names in scenes.items():
-        labels[release].setdefault((", ".join(names), words), []).append(label)
-    return {
-        release: [f"{names} with {', '.join(own)}: {words}" for (names, words), own in found.items()] for release, found in labels.items()
-    }
+    shown = [_shown(found) for found in grouped(changed, lambda change: (change.release, change.label, change.scene)).values()]
+    ordered = sorted(shown, key=lambda change: -_gained(change))
+    sentences: dict[str, list[str]] = {change.release: [] for change in reversed(changed)}
+    by_label = grouped(ordered, lambda change: (change.release, change.label, _words(change)))
+    scenes = {key: ", ".join(change.scene for change in alike) for key, alike in by_label.items()}
+    for (release, names, words), keys in grouped(scenes, lambda key: (key[0], scenes[key], key[2])).items():
+        sentences[release].append(f"{names} with {', '.join(label for _, label, _ in keys)}: {words}")
+    return sentences
 
 
 def _shown(found: Sequence[Change]) -> Change:
@@ -133,12 +125,15 @@ def _unit(metric: str) -> str:
 
 def summary(release: Release, label: str, dt: float) -> list[str]:
     """What an engine gets right and wrong in a release: sentences."""
-    groups: dict[str, list[str]] = {words: [] for words in GROUPS}
-    for scene, case in release.at(label, dt).items():
-        found = digits(relative_error(case, scene))
-        without = "too coarse" if case.verdict == "measured" else word(case.verdict)  # as in `cell`
-        groups.setdefault(next((words for words, least in GROUPS.items() if found >= least), without), []).append(scene)
-    return [f"{words}: {', '.join(scenes)}" for words, scenes in groups.items() if scenes]
+    cases = release.at(label, dt)
+
+    def group(scene: str) -> str:
+        found, verdict = digits(relative_error(cases[scene], scene)), cases[scene].verdict
+        without = "too coarse" if verdict == "measured" else word(verdict)  # as in `cell`
+        return next((words for words, least in GROUPS.items() if found >= least), without)
+
+    groups = grouped(cases, group)
+    return [f"{words}: {', '.join(groups[words])}" for words in dict.fromkeys([*GROUPS, *groups]) if words in groups]
 
 
 def since(label: str, scene: str, releases: Sequence[Release], changed: Iterable[Change]) -> str:

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from operator import attrgetter, itemgetter
 from typing import Any, Literal
 
 from dropspin.comparisons.measuring.symmetries import NAMES
 from dropspin.comparisons.symmetries.findings import STATUSES, Finding, Status
 from dropspin.reports.document import Document, Paragraph, Sentences, Table
+from dropspin.reports.stories.numbers import grouped
 from dropspin.reports.stories.study import Study
 
 COLUMNS = ("scene", "engine", "symmetry", "status", "difference", "step", "time", "reason")
@@ -58,11 +60,8 @@ def _cell(findings: Sequence[Finding]) -> str:
 
 def worst_lost(findings: Sequence[Finding]) -> list[Finding]:
     """For each engine that loses a symmetry, the finding with the largest difference."""
-    lost = [finding for finding in findings if finding.motions is not None]
-    worst: dict[str, Finding] = {}
-    for finding in sorted(lost, key=lambda finding: -finding.difference):
-        worst.setdefault(finding.engine, finding)
-    return list(worst.values())
+    lost = sorted((finding for finding in findings if finding.motions is not None), key=lambda finding: -finding.difference)
+    return [worst for worst, *_ in grouped(lost, attrgetter("engine")).values()]
 
 
 def legend(findings: Sequence[Finding]) -> str:
@@ -90,12 +89,9 @@ def _broken(findings: Sequence[Finding]) -> str:
 
 def _not_run(findings: Sequence[Finding]) -> list[str]:
     """The engines, symmetries and scenes that were not run, by reason."""
-    groups: dict[tuple[str, str], list[Finding]] = {}
-    for finding in sorted(findings, key=lambda finding: (finding.engine, finding.reason)):
-        if finding.status == "not run":
-            groups.setdefault((finding.engine, finding.reason), []).append(finding)
+    groups = grouped((finding for finding in findings if finding.status == "not run"), attrgetter("engine", "reason"))
     sentences = []
-    for (engine, reason), group in groups.items():
+    for (engine, reason), group in sorted(groups.items(), key=itemgetter(0)):
         scenes, names = (dict.fromkeys(getattr(finding, name) for finding in group) for name in ("scene", "symmetry"))
         ways = f" ({', '.join(names)})" if len(names) < len(NAMES) // 2 else ""
         options = " (options --time-limit and --dt)" if group[0].verdict == "timed_out" else ""

@@ -11,7 +11,7 @@ from dropspin.comparisons.tradeoff.errors import Ladder
 from dropspin.comparisons.tradeoff.points import LEVEL, CostPoint, TradeOff, spread
 from dropspin.reports.document import Charts, Document, Heading, Part, Sentences, Table
 from dropspin.reports.plots.figures import tradeoff_charts
-from dropspin.reports.stories.numbers import duration, formatted, left_out
+from dropspin.reports.stories.numbers import duration, formatted, grouped, left_out
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted, rounded
 
@@ -107,16 +107,14 @@ def pareto_front_rows(found: TradeOff) -> list[dict[str, str]]:
 
 def sentences(found: TradeOff, within: Sequence[float]) -> list[str]:
     """Sentences: the cheapest configuration within each tolerance, memory, the end of each ladder, and engines left out."""
-    ended: dict[str, list[str]] = {}
-    for ladder in found.ladders:
-        if ladder.steps:
-            ended.setdefault(_reason(ladder), []).append(f"{ladder.engine} at {_step(ladder.steps[-1][0])}")
+    ended = grouped([ladder for ladder in found.ladders if ladder.steps], _reason)
+    ends = {reason: ", ".join(f"{ladder.engine} at {_step(ladder.steps[-1][0])}" for ladder in alike) for reason, alike in ended.items()}
     memory = ", ".join(f"{label} {rounded(value / 1e3, 2)} kB" for label, value in found.memory_per_world.items())
     return [
         *(_recommendation(found, tolerance) for tolerance in within),
         *_timings(found),
         *([f"Memory per world in a batch of {found.worlds[-1]}: {memory}."] if memory else []),
-        *(f"No smaller time step was tried because {reason}: {', '.join(labels)}." for reason, labels in ended.items()),
+        *(f"No smaller time step was tried because {reason}: {engines}." for reason, engines in ends.items()),
         *left_out(found.left_out),
     ]
 

@@ -233,11 +233,6 @@ def assert_refused(done, message):
     assert "Traceback" not in done.stderr
 
 
-def test_gif_file_name_must_end_in_gif(results, tmp_path):
-    with pytest.raises(DropspinError, match=r"clip\.mp4: an animation is written as GIF; the file name must end in \.gif\."):
-        write_clip(replay_of(results, "drop-ball"), tmp_path / "clip.mp4", 1.0)
-
-
 def test_interrupted_gif_leaves_the_old_one(results, tmp_path):
     file = tmp_path / "clip.gif"
     file.write_bytes(b"old")

@@ -153,7 +153,7 @@ def test_failures_come_before_the_comparison():
         "expect": [{"metric": "bounce_height_error", "below": 1e-9, "reason": "too much to ask"}]
     }
     found = run(load(harsh), "mujoco", 1e-2)
-    text = html_report(found, overview(found))
+    text = html_report(found, overview(found), report_charts(found))
     assert "1 of 1 check fails." in text
     assert text.index("Failures") < text.index("<h3>Errors</h3>")
     assert "too much to ask" in text
@@ -338,7 +338,7 @@ def test_markdown_cells_hold_anything():
 def studied():
     """A run at three time steps, with an engine that has a model error, and its page."""
     found = run("spin-asymmetric", ["wang", "mujoco"], [8e-3, 4e-3, 2e-3])
-    return found, html_report(found, overview(found))
+    return found, html_report(found, overview(found), report_charts(found))
 
 
 def test_the_page_shows_orders_and_asymptotic_errors(studied):
@@ -433,7 +433,7 @@ def test_setting_errors_are_compared_with_the_calibrated_profile():
         assert row["part"] == max(0.0, 1 - abs(calibrated) / abs(default))
     height = next(row for row in comparison.rows if row["metric"] == "bounce_height_error")
     assert height["part"] > 0.95  # measured .965; the rest is discretisation error
-    page = html_report(found, overview(found))
+    page = html_report(found, overview(found), report_charts(found))
     assert "Setting errors of" in page
     [sentence] = [one for one in overview(found).findings if one.startswith("pybullet[profile=default]: ")]
     assert comparison.clause in sentence
@@ -445,7 +445,7 @@ def test_a_run_of_many_scenes_has_plots_of_those_that_fail(results, monkeypatch)
     last = list(results.scenes)[-1]
     failing = replace(results, table=results.table.assign(verdict=np.where(results.table["scene"] == last, "failed", "passed")))
     assert list(report_charts(failing)) == list(results.scenes)
-    assert "scenes have plots" not in html_report(failing, overview(failing))
+    assert "scenes have plots" not in html_report(failing, overview(failing), report_charts(failing))
     monkeypatch.setattr(figures, "MOST_SCENES", 1)
     assert list(report_charts(failing)) == [last]
-    assert "1 of 3 scenes have plots" in html_report(failing, overview(failing))
+    assert "1 of 3 scenes have plots" in html_report(failing, overview(failing), report_charts(failing))

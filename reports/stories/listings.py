@@ -50,11 +50,6 @@ def metric_rows() -> Rows:
     from dropspin.comparisons.measuring.metrics import METRICS
     from dropspin.comparisons.results.ensembles import ENSEMBLE_METRICS
 
-    of_one = [
-        {"metric": metric.name, "unit": metric.unit, "needs": metric.needs, "definition": metric.definition} for metric in METRICS.values()
-    ]
-    of_many = [
-        {"metric": name, "unit": metric.unit, "needs": "an ensemble", "definition": f"Mean. {metric.definition}"}
-        for name, metric in ENSEMBLE_METRICS.items()
-    ]
-    return of_one + of_many
+    rows = [(name, metric.unit, metric.needs, metric.definition) for name, metric in METRICS.items()]
+    rows += [(name, metric.unit, "an ensemble", f"Mean. {metric.definition}") for name, metric in ENSEMBLE_METRICS.items()]
+    return [dict(zip(("metric", "unit", "needs", "definition"), row, strict=True)) for row in rows]

@@ -58,24 +58,25 @@ def print_rows(rows: Sequence[Mapping[str, str]], left_out_first: Sequence[str] 
         left_out_first: The columns to leave out, in this order, if the table is wider than the terminal.
         console: Rich's console to print to; None means standard output.
     """
-    console, head = console or Console(), list(rows[0])
-    has_head = head not in (["what", "is"], ["what", "found"])
+    console, columns = console or Console(), {key: [key, *(row[key] for row in rows)] for key in rows[0]}
+    has_head = list(columns) not in (["what", "is"], ["what", "found"])
     if not console.is_terminal:
-        for line in aligned([head] * has_head + [list(row.values()) for row in rows]):
+        for line in aligned(list(zip(*columns.values(), strict=True))[not has_head :]):
             print_sentence(line, console)
         return
+    # The smallest width at which a column is readable: that of its cells, or `NARROWEST` for text.
+    least = {key: max(min(max(map(cell_len, cells)), NARROWEST), _longest_piece([key, *cells])) for key, (_, *cells) in columns.items()}
     left_out: list[str] = []
-    left_out_first = [key for key in left_out_first if key in head]
-    while _narrowest(rows, head) > console.width and len(left_out) < len(left_out_first):
-        left_out.append(left_out_first[len(left_out)])
-        head.remove(left_out[-1])
-    cells = [head, *([row[key] for key in head] for row in rows)]
-    widths = _widths(cells, console.width)
+    for key in left_out_first:
+        if key in columns and sum(least[name] + GAP for name in columns) - 1 > console.width:
+            left_out.append(key)
+            del columns[key]
+    widths = _widths(list(columns.values()), console.width)
     shown = table.Table(box=box.SIMPLE_HEAD, pad_edge=False, show_header=has_head)
-    for column, width in zip(head, widths, strict=True):
-        shown.add_column(styled(_wrapped(column, width)), overflow="fold")
-    for row in cells[1:]:
-        shown.add_row(*(styled(_wrapped(value, width)) for value, width in zip(row, widths, strict=True)))
+    for key, width in zip(columns, widths, strict=True):
+        shown.add_column(styled(_wrapped(key, width)), overflow="fold")
+    for cells in list(zip(*columns.values(), strict=True))[1:]:
+        shown.add_row(*(styled(_wrapped(cell, width)) for cell, width in zip(cells, widths, strict=True)))
     console.print(shown)
     if left_out:
         print_sentence(f"Columns not shown at this width: {', '.join(left_out)}; use a wider terminal or --json.", console)
@@ -102,28 +103,18 @@ def print_sentence(sentence: str, console: Console, style: str = "") -> None:
     console.print(styled(sentence, style=style), soft_wrap=not console.is_terminal)
 
 
-def _narrowest(rows: Sequence[Mapping[str, str]], head: Sequence[str]) -> int:
-    """The smallest width at which a table is readable: each column is as wide as its cells, or `NARROWEST` for text."""
-    widths = []
-    for key in head:
-        longest = max(cell_len(row[key]) for row in rows)
-        widths.append(max(min(longest, NARROWEST), _longest_piece([key, *(row[key] for row in rows)])))
-    return sum(widths) + GAP * len(widths) - 1
-
-
 def _longest_piece(cells: Iterable[str]) -> int:
     """The length of the longest part of some cells that cannot be broken."""
     return max(cell_len(piece.rstrip()) for cell in cells for piece in PIECES.split(cell))
 
 
-def _widths(cells: Sequence[Sequence[str]], available: int) -> list[int]:
+def _widths(columns: Sequence[Sequence[str]], available: int) -> list[int]:
     """The width of each column: that of its cells if the table fits, otherwise the widest columns are narrowed.
 
     Words are kept whole if possible. The first column, which has the names, is narrowed last.
     """
-    columns = list(zip(*cells, strict=True))
     widths = [max(cell_len(line) for cell in column for line in cell.splitlines() or [""]) for column in columns]
-    longest = [_longest_piece(column) for column in columns]
+    longest = list(map(_longest_piece, columns))
     while sum(widths) + GAP * len(widths) - 1 > available and max(widths) > 1:
         widest = max(
             range(len(widths)), key=lambda number: (widths[number] > longest[number], number > 0 or len(widths) == 2, widths[number])

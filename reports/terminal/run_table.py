@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from dropspin.comparisons.judging.verdicts import MARKS
 from dropspin.comparisons.measuring.metrics import METRICS
@@ -14,7 +13,7 @@ from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.stories.findings import orders
 from dropspin.reports.stories.impact_laws import law_rows
-from dropspin.reports.stories.numbers import formatted, trend, word
+from dropspin.reports.stories.numbers import formatted, trend, unit, word
 from dropspin.reports.terminal.safe import styled
 from dropspin.reports.terminal.summary import print_summary
 
@@ -58,21 +57,18 @@ def _scene_table(results: Results, name: str, engines: Sequence[str]) -> Table:
         table.add_column(styled(engine), overflow="fold", justify="right", width=NUMBER_WIDTH + 2)
     if not pairs.empty:
         table.add_column("spread", justify="right", width=NUMBER_WIDTH)
+    found = {
+        (row["metric"], row["engine"]): styled(f"{formatted(row['value'])} {MARKS[row['verdict']]}", STYLES.get(row["verdict"], ""))
+        for row in own.to_dict("records")
+    }
     for metric in own["metric"].unique():
-        unit = METRICS[metric].unit
-        cells: list[Text] = [styled(metric.replace("_", " ") + ("" if unit == "1" else f" [{unit}]"))]
-        for engine in engines:
-            row = own[(own["metric"] == metric) & (own["engine"] == engine)]
-            cells.append(_cell(float(row["value"].iloc[0]), str(row["verdict"].iloc[0])) if len(row) else styled("–"))
+        cells = [styled(metric.replace("_", " ") + unit(METRICS[metric].unit))]
+        cells += [found.get((metric, engine), styled("–")) for engine in engines]
         if not pairs.empty:
             spread = float(pairs.loc[pairs["metric"] == metric, "value"].abs().max())
             cells.append(styled("" if math.isnan(spread) else formatted(spread)))
         table.add_row(*cells)
     return table
-
-
-def _cell(value: float, verdict: str) -> Text:
-    return styled(f"{formatted(value)} {MARKS[verdict]}", style=STYLES.get(verdict, ""))
 
 
 def _trends(results: Results, name: str) -> Iterator[str]:
@@ -96,8 +92,8 @@ def _ensemble(results: Results, name: str) -> Iterator[str]:
     frame = results.table[(results.table["scene"] == name) & (results.table["kind"] == "ensemble")]
     finest = frame[frame["dt"] == frame["dt"].min()]
     for metric, rows in finest.groupby("metric", sort=False):
-        unit = "" if rows["unit"].iloc[0] == "1" else f" {rows['unit'].iloc[0]}"
-        means = [f"{row.engine} {row.value:.3g} ± {row.upper - row.value:.1g}{unit}" for row in rows.itertuples()]
+        of = "" if rows["unit"].iloc[0] == "1" else f" {rows['unit'].iloc[0]}"
+        means = [f"{row.engine} {row.value:.3g} ± {row.upper - row.value:.1g}{of}" for row in rows.itertuples()]
         spread = results.scenes[name].ensemble
         assert spread is not None
         starts = min(spread.size, QUICK_MEMBERS) if results.is_quick else spread.size

@@ -48,18 +48,13 @@ def _case(results: Results, row: Mapping[Hashable, Any], baseline: str | None) -
     said = _printable(what_fails(row))
     details = _printable(f"{said}\nReproduce: {reproduce(results, row, baseline)}")
     verdict = row["verdict"]
-    if verdict in FAILURES:
-        case.result = [_with_text(Failure(said, verdict), details)]
-    elif row["broke_down"]:
-        case.result = [_with_text(Error(said, verdict), details)]
+    if verdict in FAILURES or row["broke_down"]:
+        result = (Failure if verdict in FAILURES else Error)(said, verdict)
+        result.text = details
+        case.result = [result]
     elif verdict != "passed":
         case.result = [Skipped(f"{word(verdict)}: {_printable(row['reason'])}")]
     return case
-
-
-def _with_text(result: Failure | Error, text: str) -> Failure | Error:
-    result.text = text
-    return result
 
 
 def _printable(text: str) -> str:

@@ -11,7 +11,6 @@ from dropspin.reports.commands.options import BASELINE, as_json
 @click.option(
     "--baseline",
     default=BASELINE,
-    show_default=True,
     metavar="FILE",
     help="The baseline; the file is created if it does not exist. dropspin check has the same default.",
 )

@@ -10,11 +10,11 @@ from dropspin.reports.terminal.safe import echo
 
 
 @click.command("calibrate")
-@click.option("-e", "--engine", "engine_name", default="mujoco", show_default=True, metavar="ENGINE", help="The engine, with options.")
+@click.option("-e", "--engine", "engine_name", default="mujoco", metavar="ENGINE", help="The engine, with options.")
 @click.option("--restitution", type=click.FloatRange(0.0, 1.0), required=True, metavar="E", help="Coefficient of restitution.")
 @click.option("--dt", type=float, required=True, metavar="SECONDS", help="The time step.")
-@click.option("--friction", default="none", show_default=True, metavar="F", help="none, infinite or a coefficient.")
-@click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", show_default=True, help="The shape that falls.")
+@click.option("--friction", default="none", metavar="F", help="none, infinite or a coefficient.")
+@click.option("--shape", type=click.Choice(["ball", "box"]), default="ball", help="The shape that falls.")
 @click.option("--as", "language", metavar="LANGUAGE", help="Print only the text to paste: python, mjcf or urdf.")
 @as_json
 def calibrate_command(

@@ -18,11 +18,10 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
     metavar="AXIS",
     help="The quantity to vary, such as spin; repeat for more. [default: every axis that the scene has]",
 )
-@click.option("--dt", default=5e-3, show_default=True, type=float, metavar="SECONDS", help="The time step, for every axis except step.")
+@click.option("--dt", default=5e-3, type=float, metavar="SECONDS", help="The time step, for every axis except step.")
 @click.option(
     "--within",
     default=0.1,
-    show_default=True,
     type=POSITIVE,
     metavar="TOLERANCE",
     help="The largest error that counts as sound: a ratio, or an angle in radians.",

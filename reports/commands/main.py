@@ -174,7 +174,7 @@ class _LazyGroup(click.Group):
                 formatter.write_dl(list(commands.items()))
 
 
-@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100, "show_default": True})
 @click.version_option(package_name="dropspin", message=VERSION, help="Show the version and what to cite, and exit.")
 def dropspin() -> None:
     """Run drop and spin scenes with rigid-body engines and compare them with exact solutions."""

@@ -16,7 +16,7 @@ NAME = r"[A-Za-z][A-Za-z0-9_]{0,59}"
 
 @click.command("new-adapter")
 @click.argument("name")
-@click.option("-o", "--output", default=".", show_default=True, metavar="FOLDER", help="Folder for the two files.")
+@click.option("-o", "--output", default=".", metavar="FOLDER", help="Folder for the two files.")
 def new_adapter_command(name: str, output: str) -> None:
     """Write a working adapter, NAME.py, and tests of it, test_NAME.py, to change into the adapter of your engine.
 

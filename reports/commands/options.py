@@ -82,7 +82,7 @@ class WholeNumbers(click.ParamType):  # type: ignore[type-arg]  # not generic at
 def seconds_option(*names: str, default: float, of: str, least: float = 0.0, callback: Any = None) -> Callable[[Command], Command]:
     """An option whose value is a processor time."""
     kind, text = _Positive(least, most=1e7), f"Processor time {of}"
-    return click.option(*names, type=kind, default=default, show_default=True, metavar="SECONDS", help=text, callback=callback)
+    return click.option(*names, type=kind, default=default, metavar="SECONDS", help=text, callback=callback)
 
 
 def time_limit_option(default: float, of: str) -> Callable[[Command], Command]:
@@ -98,12 +98,12 @@ def _resources(context: click.Context, parameter: click.Parameter, seconds: floa
 
 def output_option(default: str, of: str) -> Callable[[Command], Command]:
     """The option `-o`: a folder."""
-    return click.option("-o", "--output", default=default, show_default=True, metavar="DIR", help=f"Folder {of}.")
+    return click.option("-o", "--output", default=default, metavar="DIR", help=f"Folder {of}.")
 
 
 def step_option(of: str) -> Callable[[Command], Command]:
     """The option `--dt` of a command with one time step."""
-    return click.option("--dt", default=1e-3, show_default=True, type=float, metavar="SECONDS", help=f"The time step{of}.")
+    return click.option("--dt", default=1e-3, type=float, metavar="SECONDS", help=f"The time step{of}.")
 
 
 def jobs_option(pieces: str) -> Callable[[Command], Command]:

@@ -16,8 +16,8 @@ from dropspin.reports.terminal.safe import echo
 @click.option("--dt", type=POSITIVE, metavar="SECONDS", help="One of the run's time steps. [default: the coarsest]")
 @click.option("-o", "--output", metavar="FILE", help="The page to write. [default: replay.html in the run's folder]")
 @click.option("--gif", metavar="FILE", help="Write an animated GIF of one scene instead.")
-@click.option("--speed", default=0.25, show_default=True, type=POSITIVE, help="Speed of the GIF: 1 is real time.")
-@click.option("--open/--no-open", "opens", default=True, help="Show the page in a browser. [default: --open]")
+@click.option("--speed", default=0.25, type=POSITIVE, help="Speed of the GIF: 1 is real time.")
+@click.option("--open/--no-open", "opens", default=True, show_default=False, help="Show the page in a browser. [default: --open]")
 def replay_command(
     run: str, scenes: tuple[str, ...], dt: float | None, output: str | None, gif: str | None, speed: float, opens: bool
 ) -> None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 @click.argument("engine")
 @click.argument("release")
 @click.argument("scene")
-@click.option("-r", "--record", "folder", default="record", show_default=True, metavar="DIR", help="Folder of the record.")
+@click.option("-r", "--record", "folder", default="record", metavar="DIR", help="Folder of the record.")
 @time_limit_option(60.0, "the engine may use for one simulation")
 @as_json
 def rerun_command(engine: str, release: str, scene: str, folder: str, resources: "ResourceLimits", json_output: bool) -> int:

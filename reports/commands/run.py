@@ -33,7 +33,6 @@ CORE_ENGINES = ("wang", "mujoco", "pybullet")
     "-o",
     "--output",
     default="out/run",
-    show_default=True,
     metavar="DIR",
     help="Folder for the report and the data; an earlier run there is replaced.",
 )
@@ -160,8 +159,8 @@ def _run(
                     if sentence := forecast_sentence(forecast):
                         shown.show_line(sentence)
 
-                callbacks: dict[str, Any] = {"on_progress": shown.on_progress, "keep": keep, "on_forecast": on_forecast}
-                results = run(scenes, chosen, steps, done=earlier, **callbacks, **options)
+                options |= {"on_progress": shown.on_progress, "keep": keep, "on_forecast": on_forecast}
+                results = run(scenes, chosen, steps, done=earlier, **options)
             stop_if_interrupted()
             if changes := {what_changed(part.provenance, results.provenance) for part in earlier} - {""}:
                 echo(f"measured again, not resumed: since the interrupted run, {'; '.join(sorted(changes))} changed", err=True)

@@ -13,9 +13,7 @@ if TYPE_CHECKING:
 
 @click.command("sweep")
 @click.argument("spec", metavar="SPEC.toml")
-@click.option(
-    "-o", "--output", default="out/sweep", show_default=True, metavar="DIR", help="Folder for the table, or a URL of an object store."
-)
+@click.option("-o", "--output", default="out/sweep", metavar="DIR", help="Folder for the table, or a URL of an object store.")
 @click.option("--resume", is_flag=True, help="Resume an interrupted sweep: jobs whose rows are already written are not run again.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://host:8786.")
 @time_limit_option(60.0, "an engine may use for one job")

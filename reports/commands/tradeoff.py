@@ -17,7 +17,6 @@ from dropspin.reports.commands.options import POSITIVE, WholeNumbers, as_json, e
     multiple=True,
     type=POSITIVE,
     default=(1e-3,),
-    show_default=True,
     metavar="TOLERANCE",
     help="The largest error allowed; repeat for more.",
 )
@@ -30,7 +29,6 @@ from dropspin.reports.commands.options import POSITIVE, WholeNumbers, as_json, e
     "--worlds",
     type=WholeNumbers(),
     default="256",
-    show_default=True,
     metavar="N[,N]...",
     help="Numbers of worlds in the batches to time, for engines that step many worlds together, such as 1,256,4096.",
 )

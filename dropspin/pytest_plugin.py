@@ -130,32 +130,29 @@ class Runs:
         from filelock import FileLock
 
         engines, dts = self.engines if engines is None else engines, self.dts if dts is None else dts
-        asked = [scene if isinstance(scene, Mapping) else os.fspath(scene), _options(engines, dts, self.baseline)]
+        options = _options(engines, dts, self.baseline)
+        asked = [scene if isinstance(scene, Mapping) else os.fspath(scene), options]
         name = f"{_title(scene)}-{hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]}"
-        if name not in self._results:
-            # The operating system releases this lock when a worker dies; a lock made of a folder would stay and block the other workers.
-            with FileLock(self.folder / f"{name}.lock"):
-                self._results[name] = self._kept_or_new(name, scene, engines, dts)
-        return self._results[name]
-
-    def _kept_or_new(self, name: str, scene: Scene, engines: Sequence[str], dts: Sequence[float]) -> Result:
-        __tracebackhide__ = True
+        if name in self._results:
+            return self._results[name]
         folder, kept = self.folder / name, self.folder / f"{name}.json"
-        if isinstance(scene, Mapping):
-            scene = _written(self.folder / f"{name}-scene", scene)
-        given = os.path.relpath(scene, self.root) if os.path.isabs(scene) else os.fspath(scene)
-        found = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
-        if found.get("session") != self.session:
-            options = _options(engines, dts, self.baseline)
-            done = self._dropspin("run", given, *options, "-o", os.path.relpath(folder, self.root), "--json")
-            found = {"session": self.session, "rows": json.loads(done.stdout or "[]"), "error": _error(done)}
-            unfinished = kept.with_suffix(".unfinished")
-            unfinished.write_text(json.dumps(found), encoding="utf-8")
-            unfinished.replace(kept)
+        # The operating system releases this lock when a worker dies; a lock made of a folder would stay and block the other workers.
+        with FileLock(self.folder / f"{name}.lock"):
+            if isinstance(scene, Mapping):
+                scene = _written(self.folder / f"{name}-scene", scene)
+            given = os.path.relpath(scene, self.root) if os.path.isabs(scene) else os.fspath(scene)
+            found = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+            if found.get("session") != self.session:
+                done = self._dropspin("run", given, *options, "-o", os.path.relpath(folder, self.root), "--json")
+                found = {"session": self.session, "rows": json.loads(done.stdout or "[]"), "error": _error(done)}
+                unfinished = kept.with_suffix(".unfinished")
+                unfinished.write_text(json.dumps(found), encoding="utf-8")
+                unfinished.replace(kept)
         if not found["rows"]:
             pytest.fail(found["error"], pytrace=False)
         names = json.loads((folder / "run.json").read_text(encoding="utf-8"))["provenance"]["names"]
-        return Result(found["rows"][0]["scene"], found["rows"], folder, given, names, tuple(dts))
+        self._results[name] = Result(found["rows"][0]["scene"], found["rows"], folder, given, names, tuple(dts))
+        return self._results[name]
 
     def _dropspin(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run the installed command in the root directory; engines are found in pytest's `pythonpath` too."""

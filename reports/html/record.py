@@ -49,9 +49,8 @@ class Site:
         self.labels = {engine: self.labels_of(one) for engine, one in self.newest.items()}
         self.engines = {label: engine for engine, labels in self.labels.items() for label in labels}
         self.styles = engine_styles(list(self.engines))
-        default = [label for label in self.engines if calibrated_label(label) is not None]
-        divisions = {"calibrated": [label for label in self.engines if label not in default], "default": default}
-        self.divisions = {name: labels for name, labels in divisions.items() if labels}
+        divisions = numbers.grouped(self.engines, lambda label: "calibrated" if calibrated_label(label) is None else "default")
+        self.divisions = dict(sorted(divisions.items()))
         self.identifier, self.view = identifier, view
 
     def write(self, folder: Path) -> None:

@@ -39,7 +39,9 @@ def error_budgets(results: Results, scene_name: str) -> list[dict[Hashable, Any]
 def _sentence(row: Mapping[Hashable, Any]) -> str:
     value, limit, cause = float(row["value"]), float(row["value_of_limit"]), row["cause"]
     if cause == "unresolved":
-        return _why_undecided(row)
+        if row["unit"] == "rad" and abs(value) > SATURATION:
+            return "Undecided: the angle is near π, where it saturates."
+        return "Undecided: too few usable time steps." if math.isnan(limit) else f"Undecided: {row['reason_of_limit']}."
     if cause == "rounding":
         return "Within rounding."
     if cause == "discretisation":
@@ -59,11 +61,3 @@ def _sentence(row: Mapping[Hashable, Any]) -> str:
     if abs(rest) <= 0.5 * (float(row["upper_of_limit"]) - float(row["lower_of_limit"])):
         return f"A {kind}.{because}"
     return f"{formatted(limit)} is a {kind}; the remaining {formatted(rest)} is discretisation error.{because}"
-
-
-def _why_undecided(row: Mapping[Hashable, Any]) -> str:
-    if row["unit"] == "rad" and abs(row["value"]) > SATURATION:
-        return "Undecided: the angle is near π, where it saturates."
-    if math.isnan(row["value_of_limit"]):
-        return "Undecided: too few usable time steps."
-    return f"Undecided: {row['reason_of_limit']}."

@@ -201,9 +201,8 @@ def reproduce_scenes(
         named_scenes = named[0] if len(named) == 1 else f"[{', '.join(named)}]"
         named_engine = f"<engine {label!r}>" if engine is None else repr(engine)
         return f"dropspin.run({named_scenes}, {named_engine}, dt={[float(dt) for dt in steps]}{', quick=True' * asked.get('quick', False)})"
-    options = [*_options(steps, asked), *["--symmetries"] * symmetries]
-    options += [] if baseline is None else ["--baseline", baseline]
-    return shlex.join(["dropspin", "run", *(scene.origin for scene in scenes), "-e", engine, *options, "-o", "out/again"])
+    more = ["--symmetries"] * symmetries + ([] if baseline is None else ["--baseline", baseline])
+    return _command([scene.origin for scene in scenes], [engine], steps, asked, more)
 
 
 def reproduce_drawn(results: Results) -> list[str]:
@@ -212,15 +211,18 @@ def reproduce_drawn(results: Results) -> list[str]:
     if "draw" not in asked:
         return []
     named = [results.scenes[name].origin for name in asked["scenes"][: -asked["draw"]]]
-    drawn = ["--draw", str(asked["draw"]), "--seed", str(asked["seed"])]
-    engines = [word for label in results.engines for word in ("-e", results.provenance["names"][label])]
-    command = ["dropspin", "run", *named, *drawn, *engines, *_options(sorted(asked["dts"], reverse=True), asked), "-o", "out/again"]
-    return [f"Scenes drawn with seed {asked['seed']}: {asked['draw']}. Reproduce: {shlex.join(command)}"]
+    scenes = [*named, "--draw", str(asked["draw"]), "--seed", str(asked["seed"])]
+    engines = [results.provenance["names"][label] for label in results.engines]
+    command = _command(scenes, engines, sorted(asked["dts"], reverse=True), asked)
+    return [f"Scenes drawn with seed {asked['seed']}: {asked['draw']}. Reproduce: {command}"]
 
 
-def _options(dts: Sequence[float], asked: Mapping[str, Any]) -> list[str]:
-    """The options of `dropspin run` for time steps [s], a quick run, and a time limit [s] that is not the default one."""
-    options = [word for dt in dts for word in ("--dt", repr(float(dt)))]
-    options += ["--quick"] * asked.get("quick", False)
+def _command(
+    scenes: Sequence[str], engines: Sequence[str], dts: Sequence[float], asked: Mapping[str, Any], more: Sequence[str] = ()
+) -> str:
+    """The command that runs scenes again at time steps [s]; as asked, it is quick, or has a time limit that is not the default one."""
+    words = [word for engine in engines for word in ("-e", engine)] + [word for dt in dts for word in ("--dt", repr(float(dt)))]
+    words += ["--quick"] * asked.get("quick", False)
     limit = asked["time_limit"]
-    return options if limit == ResourceLimits().processor_time else [*options, "--time-limit", f"{limit:g}"]
+    words += [] if limit == ResourceLimits().processor_time else ["--time-limit", f"{limit:g}"]
+    return shlex.join(["dropspin", "run", *scenes, *words, *more, "-o", "out/again"])

@@ -91,11 +91,6 @@ class Comparison:
             raise BeyondHorizon(f"the exact solution is known for {len(self.reference) - 1} steps of {self.dt:g} s only")
         return self.reference
 
-    @property
-    def ends_at_an_impact(self) -> bool:
-        """Whether the reference ends before the motion, at an impact whose outcome is not known."""
-        return self.reference is not None and len(self.motion) - len(self.reference) > 1
-
     @cached_property
     def compared(self) -> Trajectory:
         """The motion at the reference's times."""
@@ -143,11 +138,6 @@ class Comparison:
         """The violations of the laws of contact at each step in which the floor acts."""
         return contact_residuals(self.scene, self.motion.states, self.motions)
 
-    @property
-    def has_impact_to_come(self) -> bool:
-        """Whether the first impact occurs after the first step, so that errors depend on its time within a step."""
-        return bool(self.impacts) and self.impacts[0] > self.dt
-
     @cached_property
     def flights(self) -> list[Rows]:
         """Rows in the middle half of each flight; the first flight begins at the start, and the last one ends at the end of the motion.
@@ -164,10 +154,11 @@ class Comparison:
         lengths = np.diff(edges)
         shortest = max(SHORTEST_FLIGHT * self.dt, SHORT * float(np.max(lengths[:-1], initial=0.0)))
         inner = []
+        ends_at_an_impact = self.reference is not None and len(self.motion) - len(self.reference) > 1  # whose outcome is not known
         for number, (start, end) in enumerate(pairwise(edges)):
             # The scene's end may cut the last flight short; the uncertainty of its impact scales with the flight before.
             before = 0.0 if number == 0 else 0.25 * max(end - start, start - edges[number - 1])
-            after = 0.0 if number == len(self.impacts) and not self.ends_at_an_impact else 0.25 * (end - start)
+            after = 0.0 if number == len(self.impacts) and not ends_at_an_impact else 0.25 * (end - start)
             held = rows[(times >= start + before) & (times <= end - after)]
             if number > 0 and (end - start < shortest or not len(held)):
                 break

@@ -1,7 +1,6 @@
 """Errors at each time of a motion; a metric is usually the largest of these errors."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,19 +58,7 @@ def orientation_difference(case: Comparison, rows: Rows = ALL) -> Array:
     return rotation_vector(case.exact.orientation[rows], case.compared.orientation[rows])
 
 
-@dataclass(frozen=True)
-class ErrorOverTime:
-    """An error at each time: the function from a comparison to its values, and whether it is defined in flight only."""
-
-    at_each_row: Callable[[Comparison], Array]
-    in_flight: bool
-
-
-ERRORS = {
-    "energy_error": ErrorOverTime(energy_error, in_flight=True),
-    "angular_momentum_error": ErrorOverTime(angular_momentum_error, in_flight=True),
-    "angular_momentum_direction_error": ErrorOverTime(angular_momentum_direction_error, in_flight=True),
-    "position_error": ErrorOverTime(position_error, in_flight=False),
-    "orientation_error": ErrorOverTime(orientation_error, in_flight=False),
-}
+IN_FLIGHT = energy_error, angular_momentum_error, angular_momentum_direction_error
+"""Errors that are defined in flight only."""
+ERRORS: dict[str, Callable[[Comparison], Array]] = {error.__name__: error for error in (*IN_FLIGHT, position_error, orientation_error)}
 """Errors by the name of the metric that is their largest value."""

@@ -27,12 +27,12 @@ class Metric:
         name: The name in the results.
         unit: SI unit; '1' for a ratio.
         kind: The reference of the metric: an exact solution (`truth`) or a conservation law (`invariant`).
-        signed: Whether the sign of the value has a meaning.
         definition: The definition in a sentence.
         needs: The properties that a scene must have, in words.
         applies: Whether a scene, with its exact solution, has these properties.
         measure: The function from a comparison to the value, or to the values of each flight; it raises `Unresolved` if the time step is
             too coarse.
+        signed: Whether the sign of the value has a meaning.
         components: If the value is the length of a vector, the function from a comparison to this vector at the end of the middle half of
             each flight, shape (flights, 3); otherwise None.
         agreement: Whether the metric is also used to compare two engines with each other.
@@ -42,11 +42,11 @@ class Metric:
     name: str
     unit: str
     kind: Literal["truth", "invariant"]
-    signed: bool
     definition: str
     needs: str
-    applies: Callable[[Scenario, Truth | None], bool]
+    applies: Applies
     measure: Measure
+    signed: bool = False
     components: Components | None = None
     agreement: bool = False
     first_flight: bool = False
@@ -78,8 +78,8 @@ class Metric:
         # The phases are even at the first impact only; at later ones they are correlated, hardly better than one draw.
         later = 2 if flights > 1 or self.first_flight or len(cases[0].impacts) < 2 else 0
         resolutions[later:] = phases[:, later:].std(axis=0)
-        if len(cases) == 1 and cases[0].has_impact_to_come:
-            resolutions = np.abs(phases[0])  # the whole value of a single start may be sampling noise
+        if len(cases) == 1 and any(impact > cases[0].dt for impact in cases[0].impacts[:1]):
+            resolutions = np.abs(phases[0])  # of a single start, the whole value may depend on where in a step its first impact falls
         return Average(phases.mean(axis=0), resolutions, np.ptp(phases, axis=0) / len(phases))
 
     def value_or_nan(self, cases: Sequence[Comparison]) -> float:

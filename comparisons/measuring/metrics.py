@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -28,22 +28,13 @@ def metrics_for(scene: Scenario, truth: Truth | None) -> tuple[Metric, ...]:
     return tuple(metric for metric in METRICS.values() if metric.applies(scene, truth))
 
 
-def _metric(
-    unit: str,
-    kind: Literal["truth", "invariant"],
-    needs: str,
-    applies: Applies,
-    *,
-    signed: bool = False,
-    components: Components | None = None,
-    agreement: bool = False,
-    first_flight: bool = False,
-) -> Callable[[AnyMeasure], AnyMeasure]:
-    """Register a function as a metric, with the name of the function as name and its docstring as definition."""
+def _metric(unit: str, kind: Literal["truth", "invariant"], applies: Applies, **others: Any) -> Callable[[AnyMeasure], AnyMeasure]:
+    """Register a function as a metric: its name, its docstring as the definition, and what a scene needs by that of `applies`."""
 
     def register(measure: AnyMeasure) -> AnyMeasure:
         name, definition = measure.__name__, " ".join((measure.__doc__ or "").split())
-        METRICS[name] = Metric(name, unit, kind, signed, definition, needs, applies, measure, components, agreement, first_flight)
+        needed = (applies.__doc__ or "").partition(".")[0]
+        METRICS[name] = Metric(name, unit, kind, definition, needed[:1].lower() + needed[1:], applies, measure, **others)
         return measure
 
     return register
@@ -58,25 +49,25 @@ def _at_end_of_each_flight(components: Callable[[Comparison, list[int]], Array])
     return lambda case: components(case, [int(rows[-1]) for rows in case.flights])
 
 
-@_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True, agreement=True)
+@_metric("1", "truth", requirements.has_truth, signed=True, agreement=True)
 def energy_error(case: Comparison) -> Array:
     """Largest difference of energy from the exact solution in flight, over the scene's energy, with velocity synchronised with position."""
     return _extremes_of_each_flight(errors.energy_error(case), case)
 
 
-@_metric("1", "truth", "an exact solution", requirements.has_truth, signed=True)
+@_metric("1", "truth", requirements.has_truth, signed=True)
 def energy_error_raw(case: Comparison) -> Array:
     """Like energy_error, but with velocities as stored, which in some engines lag positions by half a step."""
     return _extremes_of_each_flight(errors.energy_error(case, synchronised=False), case)
 
 
-@_metric("1", "invariant", "no damping, a start in flight", requirements.keeps_energy_in_flight, signed=True, first_flight=True)
+@_metric("1", "invariant", requirements.keeps_energy_in_flight, signed=True, first_flight=True)
 def energy_drift(case: Comparison | Motions) -> Array:
     """Change of energy from the start to the end of the first flight, over the scene's energy."""
     return (at_rows(case.energy, case.first_flight_end) - case.energy[..., 0]) / case.energy_scale
 
 
-@_metric("1", "invariant", "no damping, and no impact that gains energy in the exact solution", requirements.gains_no_energy)
+@_metric("1", "invariant", requirements.gains_no_energy)
 def energy_gain(case: Comparison | Motions) -> Array:
     """Largest increase of energy above any earlier value, over the scene's energy.
 
@@ -86,15 +77,7 @@ def energy_gain(case: Comparison | Motions) -> Array:
     return motions.energy_gained / case.energy_scale
 
 
-@_metric(
-    "1",
-    "truth",
-    "an exact solution with an impact, gravity downwards",
-    requirements.has_apex,
-    signed=True,
-    agreement=True,
-    first_flight=True,
-)
+@_metric("1", "truth", requirements.has_apex, signed=True, agreement=True, first_flight=True)
 def bounce_height_error(case: Comparison) -> float:
     """Apex height of the centre of mass after the first impact minus the exact apex height, over the height of the drop.
 
@@ -110,7 +93,7 @@ def bounce_height_error(case: Comparison) -> float:
     return float(np.mean(found - exact)) / case.scene.clearance
 
 
-@_metric("1", "truth", "an exact impact with Newton's restitution", requirements.has_newton_restitution, signed=True, first_flight=True)
+@_metric("1", "truth", requirements.has_newton_restitution, signed=True, first_flight=True)
 def restitution_error(case: Comparison) -> float:
     """Separation speed over approach speed of the contact point in the first impact, minus the coefficient of restitution."""
     assert case.scene.floor is not None
@@ -142,9 +125,7 @@ def _moment_in_first_impact(case: Comparison) -> Array:
     return np.array([turned - cross(r, mass * pushed)]) / scale
 
 
-@_metric(
-    "1", "invariant", "an exact solution with an impact", requirements.has_impact, components=_moment_in_first_impact, first_flight=True
-)
+@_metric("1", "invariant", requirements.has_impact, components=_moment_in_first_impact, first_flight=True)
 def contact_momentum_error(case: Comparison) -> float:
     """Change of angular momentum about the contact point in the first impact, over M r v.
 
@@ -154,7 +135,7 @@ def contact_momentum_error(case: Comparison) -> float:
     return float(np.linalg.norm(_moment_in_first_impact(case)))
 
 
-@_metric("1", "truth", "an exact solution that comes to rest", requirements.comes_to_rest, signed=True)
+@_metric("1", "truth", requirements.comes_to_rest, signed=True)
 def rest_time_error(case: Comparison) -> float:
     """Time at which the body comes to rest minus the exact time, over the exact time.
 
@@ -166,16 +147,14 @@ def rest_time_error(case: Comparison) -> float:
     return (found - exact) / exact
 
 
-@_metric("m/s", "truth", "an exact solution that comes to rest", requirements.comes_to_rest)
+@_metric("m/s", "truth", requirements.comes_to_rest)
 def rest_jitter(case: Comparison) -> float:
     """Root mean square of the vertical velocity in the last tenth of the scene, in which the body rests in the exact solution."""
     rows = case.motion.t >= 0.9 * case.motion.t[-1]
     return float(np.sqrt(np.mean(case.motion.velocity[rows, 1] ** 2)))
 
 
-@_metric(
-    "1", "truth", "an exact solution that turns on the floor before its first impact", requirements.lands, signed=True, first_flight=True
-)
+@_metric("1", "truth", requirements.lands, signed=True, first_flight=True)
 def landing_error(case: Comparison) -> float:
     """Ratio of the angular speed three steps after the first landing to that three steps before it, minus the exact ratio."""
     edges = [0.0, *case.impacts[:2], case.exact.t[-1]]
@@ -187,32 +166,25 @@ def landing_error(case: Comparison) -> float:
     return float(found[1] / found[0] - exact[1] / exact[0])
 
 
-@_metric("1/s", "truth", "an exact solution that bounces or rocks more than once", requirements.repeats_impacts)
+@_metric("1/s", "truth", requirements.repeats_impacts)
 def desync_rate(case: Comparison) -> float:
     """Reciprocal of the first time at which the height error reaches half the height of a flight (desynchronised); 0 if there is none."""
     return 1.0 / case.desynchronised_from
 
 
-@_metric(
-    "1",
-    "truth",
-    "an exact solution with spin",
-    requirements.spins,
-    components=_at_end_of_each_flight(errors.angular_momentum_difference),
-    agreement=True,
-)
+@_metric("1", "truth", requirements.spins, components=_at_end_of_each_flight(errors.angular_momentum_difference), agreement=True)
 def angular_momentum_error(case: Comparison) -> Array:
     """Largest difference of angular momentum from the exact solution in flight, over the largest exact value."""
     return _largest_of_each_flight(errors.angular_momentum_error(case), case)
 
 
-@_metric("rad", "truth", "an exact solution with spin, a start in flight", requirements.spins_in_flight)
+@_metric("rad", "truth", requirements.spins_in_flight)
 def angular_momentum_direction_error(case: Comparison) -> Array:
     """Largest angle in flight between the angular momentum and the exact angular momentum."""
     return _largest_of_each_flight(errors.angular_momentum_direction_error(case), case)
 
 
-@_metric("1", "invariant", "a frictionless floor, gravity straight down, no damping", requirements.keeps_horizontal_momentum)
+@_metric("1", "invariant", requirements.keeps_horizontal_momentum)
 def horizontal_momentum_error(case: Comparison) -> float:
     """Largest change of the horizontal velocity, over the speed at which the kinetic energy equals the scene's energy."""
     sideways = (case.motion.velocity - np.array(case.scene.start.velocity))[:, [0, 2]]
@@ -220,25 +192,25 @@ def horizontal_momentum_error(case: Comparison) -> float:
     return float(np.max(length(sideways)) / speed)
 
 
-@_metric("m", "truth", "an exact solution", requirements.has_truth, components=_at_end_of_each_flight(errors.position_difference))
+@_metric("m", "truth", requirements.has_truth, components=_at_end_of_each_flight(errors.position_difference))
 def position_error(case: Comparison) -> float:
     """Largest distance of the centre of mass from its exact position."""
     return float(np.max(errors.position_error(case)))
 
 
-@_metric("rad", "truth", "an exact solution", requirements.has_truth, components=_at_end_of_each_flight(errors.orientation_difference))
+@_metric("rad", "truth", requirements.has_truth, components=_at_end_of_each_flight(errors.orientation_difference))
 def orientation_error(case: Comparison) -> float:
     """Largest angle of the rotation from the exact orientation to that of the engine."""
     return float(np.max(errors.orientation_error(case)))
 
 
-@_metric("m", "invariant", "a floor", requirements.has_floor)
+@_metric("m", "invariant", requirements.has_floor)
 def penetration(case: Comparison | Motions) -> Array:
     """Largest depth of the body's lowest point below the floor."""
     return np.maximum(-case.lowest_height, 0.0).max(axis=-1)
 
 
-@_metric("1", "invariant", "a floor, no damping", requirements.obeys_contact_laws)
+@_metric("1", "invariant", requirements.obeys_contact_laws)
 def contact_pull(case: Comparison) -> float:
     """Largest impulse in a time step with which the floor pulls the body, over M v.
 
@@ -247,19 +219,19 @@ def contact_pull(case: Comparison) -> float:
     return _largest(case.contacts.pull)
 
 
-@_metric("1", "invariant", "a floor whose friction is not infinite, no damping", requirements.limits_friction)
+@_metric("1", "invariant", requirements.limits_friction)
 def friction_cone_excess(case: Comparison) -> float:
     """Largest impulse along the floor in a time step beyond friction coefficient times normal impulse, over M v as in contact_pull."""
     return _largest(case.contacts.cone_excess)
 
 
-@_metric("1", "invariant", "a floor whose friction opposes the slip that is left, no damping", requirements.opposes_slip_left)
+@_metric("1", "invariant", requirements.opposes_slip_left)
 def friction_push(case: Comparison) -> float:
     """Largest impulse of friction in a time step times the slip that is left in its direction, over the scene's energy."""
     return _largest(case.contacts.push)
 
 
-@_metric("m", "invariant", "a floor, no damping", requirements.obeys_contact_laws)
+@_metric("m", "invariant", requirements.obeys_contact_laws)
 def contact_gap(case: Comparison) -> float:
     """Largest height of the body's lowest point, at both ends of a time step in a contact.
 
@@ -267,6 +239,12 @@ def contact_gap(case: Comparison) -> float:
     on the floor or the fall gains no speed. A sequence above the floor is a contact if it takes a quarter of the speed of the fall.
     """
     return _largest(case.contacts.gap)
+
+
+def values_of(scene: Scenario, truth: Truth | None, motion: Trajectory, exact: Trajectory | None = None) -> dict[str, float]:
+    """Every metric that a scene has, of one motion, by name; NaN where the time step is too coarse."""
+    case = Comparison.with_truth(scene, motion, truth, exact)
+    return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}
 
 
 def leading_metric(scene: Scenario) -> str:

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
+from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.scenarios import Scenario, Trajectory, Truth, discrete_flight
 from dropspin.scenarios.mechanics import angular_momentum
@@ -25,7 +25,8 @@ def flight_error(scene: Scenario, truth: Truth | None, metric: str, dt: float, *
     """The error of semi-implicit Euler in free flight; None for other scenes and for rotations without a simple discrete solution."""
     if truth is None or scene.floor is not None or scene.damping is not None or (exact_rotation and not spins_steadily(scene)):
         return None
-    return _measured(metric, _flight(scene, truth, dt, exact_rotation))
+    value = METRICS[metric].value_or_nan([_flight(scene, truth, dt, exact_rotation)])
+    return None if math.isnan(value) else value
 
 
 @lru_cache(maxsize=4)  # every metric of a scene needs it
@@ -65,11 +66,3 @@ def spins_steadily(scene: Scenario) -> bool:
     w = np.array(scene.start.angular_velocity)
     L = angular_momentum(scene, Trajectory.from_states(np.zeros(1), scene.initial_state[None]))[0]
     return float(np.linalg.norm(np.cross(w, L))) <= 1e-12 * float(np.linalg.norm(w) * np.linalg.norm(L))
-
-
-def _measured(metric: str, case: Comparison) -> float | None:
-    try:
-        value = METRICS[metric].average([case]).value
-    except Unresolved:
-        return None
-    return None if math.isnan(value) else value

@@ -1,4 +1,4 @@
-"""Requirements of metrics: the properties that a scene must have for a metric to apply."""
+"""Requirements of metrics: whether a scene has what a metric needs. The first line of a docstring says what is needed."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,12 @@ Array = NDArray[np.float64]
 
 
 def has_truth(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the exact solution is known."""
+    """An exact solution."""
     return truth is not None
 
 
 def spins(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body rotates at some time in the exact solution."""
+    """An exact solution with spin."""
     if truth is None:
         return False
     sampled = truth(np.linspace(0.0, min(scene.duration, truth.horizon), 9))
@@ -24,17 +24,20 @@ def spins(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def has_impact(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body starts above the floor and strikes the floor."""
+    """An exact solution with an impact.
+
+    The body starts above the floor.
+    """
     return truth is not None and len(truth.events) > 0 and scene.starts_above_floor
 
 
 def has_newton_restitution(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether, in addition, the speeds of the contact point before and after an impact have the ratio of the coefficient of restitution."""
+    """An exact impact with Newton's restitution."""
     return has_impact(scene, truth) and scene.floor is not None and scene.floor.impact_law in ("cone", "integrated-newton")
 
 
 def lands(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body turns on the floor before its first impact."""
+    """An exact solution that turns on the floor before its first impact."""
     return (
         truth is not None
         and not starts_in_flight(scene)
@@ -44,44 +47,59 @@ def lands(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def comes_to_rest(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body comes to rest after an impact, within the first nine tenths of the scene's duration."""
+    """An exact solution that comes to rest.
+
+    It does so after an impact, within the first nine tenths of the scene's duration.
+    """
     if truth is None or truth.horizon < scene.duration or not truth.events or truth.events[0].time == 0.0:
         return False
     return not truth([0.9 * scene.duration]).states[0, RATES].any()
 
 
 def repeats_impacts(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether there are several impacts that do not amplify errors as those of a tumbling body do."""
+    """An exact solution that bounces or rocks more than once.
+
+    These impacts do not amplify errors as those of a tumbling body do.
+    """
     return truth is not None and truth.name in ("bounce-ladder", "rocking") and len(truth.events) > 1
 
 
 def has_apex(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body rises to an apex after an impact."""
+    """An exact solution with an impact, gravity downwards."""
     return has_impact(scene, truth) and bool(scene.acceleration[1] < 0.0)
 
 
 def has_floor(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether there is a floor."""
+    """A floor."""
     return scene.floor is not None
 
 
 def obeys_contact_laws(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the forces of the floor can be computed from the motion: there is a floor, and no damping."""
+    """A floor, no damping.
+
+    The forces of the floor can then be computed from the motion.
+    """
     return scene.floor is not None and scene.damping is None
 
 
 def limits_friction(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether, in addition, friction is limited by a coefficient, which is 0 without friction."""
+    """A floor whose friction is not infinite, no damping."""
     return obeys_contact_laws(scene, truth) and scene.floor is not None and scene.floor.friction != "infinite"
 
 
 def opposes_slip_left(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether, in addition, friction opposes the slip that an impact leaves, instead of that at each instant of the impact."""
+    """A floor whose friction opposes the slip that is left, no damping.
+
+    In other laws friction opposes the slip at each instant of the impact.
+    """
     return obeys_contact_laws(scene, truth) and scene.floor is not None and scene.floor.impact_law == "cone"
 
 
 def gains_no_energy(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether there is no damping, and no impact of the exact solution gains energy, as some do whose restitution is large and Newton's."""
+    """No damping, and no impact that gains energy in the exact solution.
+
+    Some gain energy whose restitution is large and Newton's.
+    """
     if scene.damping is not None:
         return False
     return truth is None or all(_kinetic(scene, one.after) <= (1.0 + 1e-9) * _kinetic(scene, one.before) for one in truth.events)
@@ -93,12 +111,12 @@ def _kinetic(scene: Scenario, state: Array) -> float:
 
 
 def keeps_energy_in_flight(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether energy is conserved in the first flight."""
+    """No damping, a start in flight."""
     return scene.damping is None and starts_in_flight(scene)
 
 
 def spins_in_flight(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether the body starts in flight and has spin."""
+    """An exact solution with spin, a start in flight."""
     return starts_in_flight(scene) and spins(scene, truth)
 
 
@@ -108,6 +126,6 @@ def starts_in_flight(scene: Scenario) -> bool:
 
 
 def keeps_horizontal_momentum(scene: Scenario, truth: Truth | None) -> bool:
-    """Whether no force acts along the floor."""
+    """A frictionless floor, gravity straight down, no damping."""
     upright = scene.acceleration[0] == 0.0 and scene.acceleration[2] == 0.0
     return upright and scene.damping is None and scene.floor is not None and scene.floor.friction == "none"

@@ -5,25 +5,23 @@ of the scenes in which asymptotic errors fail, and none in the scenes in which t
 known to the end, or leaves a metric undefined, neither holds.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from dropspin.comparisons.faults.fault_model import FaultModel
 from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.judging.convergence import JUMPING
-from dropspin.comparisons.measuring.comparison import Comparison, exactly
-from dropspin.comparisons.measuring.metrics import METRICS, metrics_for
+from dropspin.comparisons.measuring.comparison import exactly
+from dropspin.comparisons.measuring.metrics import METRICS, values_of
 from dropspin.comparisons.measuring.tolerances import negligible
 from dropspin.comparisons.regressions.parameters import PARAMETERS, Parameter
 from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 
-Array = NDArray[np.float64]
 FIRST_SIZE = 1e-3
 LARGEST_SIZE = 0.3
 MOST_STEPS = 20_000
@@ -146,47 +144,32 @@ def _exact(scene: Scenario, step: float, count: int) -> Trajectory | None:
 class _Caused(NamedTuple):
     """The errors that a cause has, by metric, those of sampling the exact solution, and whether the exact solution with it is as long."""
 
-    errors: dict[str, float]
-    sampled: dict[str, float]
-    is_whole: bool
+    errors: Mapping[str, float] = {}
+    sampled: Mapping[str, float] = {}
+    is_whole: bool = False
 
 
 def _caused(scene: Scenario, fault: FaultModel, dt: float) -> _Caused:
     """The errors that a cause has; none without an exact solution."""
-    reference = _sampled(scene, dt)
-    if reference is None:
-        return _Caused({}, {}, is_whole=False)
+    step = max(dt, scene.duration / MOST_STEPS)
+    count = 1 + scene.steps(step)
     try:
-        motion = _exact(fault.simulated(scene), float(reference.times[1]), len(reference.times))
+        reference, motion = _sampled(scene, step, count), _exact(fault.simulated(scene), step, count)
     except (DropspinError, ValueError):  # the body is impossible
-        motion = None
-    if motion is None:
-        return _Caused({}, {}, is_whole=False)
-    motion = Trajectory.from_states(motion.t, fault.reported(motion.states))
-    common = min(len(motion), len(reference.motion))
-    is_whole, exact = common == len(reference.motion), reference.motion[:common]
-    sampled = reference.errors if is_whole else _measured(scene, exact, exact)
-    errors = {name: value - sampled[name] for name, value in _measured(scene, motion[:common], exact).items()}
-    return _Caused(errors, sampled, is_whole)
-
-
-class _Sampled(NamedTuple):
-    """The exact solution of a scene at each time step, and the errors that its sampling has."""
-
-    times: Array
-    motion: Trajectory
-    errors: dict[str, float]
+        return _Caused()
+    if reference is None or motion is None:
+        return _Caused()
+    exact, sampled = reference
+    truth, common = truth_for(scene), min(len(motion), len(exact))
+    if common < len(exact):
+        sampled = values_of(scene, truth, exact[:common], exact[:common])
+    reported = Trajectory.from_states(motion.t, fault.reported(motion.states))[:common]
+    errors = {name: value - sampled[name] for name, value in values_of(scene, truth, reported, exact[:common]).items()}
+    return _Caused(errors, sampled, common == len(exact))
 
 
 @lru_cache(maxsize=256)  # of each scene it is needed for every cause
-def _sampled(scene: Scenario, dt: float) -> _Sampled | None:
-    step = max(dt, scene.duration / MOST_STEPS)
-    times = step * np.arange(1 + scene.steps(step), dtype=float)
-    motion = _exact(scene, float(times[1]), len(times))
-    return None if motion is None else _Sampled(times, motion, _measured(scene, motion, motion))
-
-
-def _measured(scene: Scenario, motion: Trajectory, exact: Trajectory) -> dict[str, float]:
-    truth = truth_for(scene)
-    case = Comparison.with_truth(scene, motion, truth, exact)
-    return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}
+def _sampled(scene: Scenario, step: float, count: int) -> tuple[Trajectory, Mapping[str, float]] | None:
+    """The exact solution of a scene at each time step, and the errors that its sampling has."""
+    exact = _exact(scene, step, count)
+    return None if exact is None else (exact, values_of(scene, truth_for(scene), exact, exact))

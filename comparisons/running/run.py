@@ -10,8 +10,7 @@ from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.stand_in import code_of
 from dropspin.comparisons.judging.judge import verify_expectations
 from dropspin.comparisons.measuring.batch import compile_states
-from dropspin.comparisons.measuring.comparison import Comparison
-from dropspin.comparisons.measuring.metrics import metrics_for
+from dropspin.comparisons.measuring.metrics import values_of
 from dropspin.comparisons.results.provenance import provenance
 from dropspin.comparisons.results.results import Results, joined
 from dropspin.comparisons.running.belonging import verify_motion
@@ -185,5 +184,4 @@ def measure(scene: SceneLike, motion: Trajectory) -> dict[str, float]:
         raise DropspinError(f"motion: got a {type(motion).__name__}; give a Trajectory, such as simulate() returns.")
     truth = truth_for(scene)
     verify_motion(scene, truth, motion)
-    case = Comparison.with_truth(scene, motion, truth)
-    return {metric.name: metric.value_or_nan([case]) for metric in metrics_for(scene, truth)}
+    return values_of(scene, truth, motion)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved, exactly
-from dropspin.comparisons.measuring.errors_over_time import ERRORS
+from dropspin.comparisons.measuring.errors_over_time import ERRORS, IN_FLIGHT
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import TRUTH_ACCURACY, scale
 from dropspin.comparisons.results.results import Results
@@ -57,10 +57,10 @@ def _sizes(scene: Scenario, motion: Trajectory, truth: Truth, metric: str) -> tu
     """Times [s] and absolute errors after the start, NaN where the error is undefined; empty if the time step is too coarse."""
     case = Comparison.with_truth(scene, motion, truth, _exact(truth, motion.t.tobytes()))
     try:
-        sizes = np.maximum(np.abs(ERRORS[metric].at_each_row(case)), ROUNDING)
+        sizes = np.maximum(np.abs(ERRORS[metric](case)), ROUNDING)
     except Unresolved:
         return np.empty(0), np.empty(0)
-    usable = np.concatenate(case.flights) if ERRORS[metric].in_flight else np.arange(len(sizes))
+    usable = np.concatenate(case.flights) if ERRORS[metric] in IN_FLIGHT else np.arange(len(sizes))
     is_usable = np.isin(np.arange(len(sizes)), usable) & np.isfinite(sizes)
     ranked, every = np.where(is_usable, sizes, -1.0), stride(len(sizes))
     # The largest of each stride, so that no peak is lost.

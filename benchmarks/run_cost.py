@@ -19,7 +19,6 @@ from dropspin import reference_impl
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo, MuJoCoBatch, MuJoCoSimulation
 from dropspin.comparisons.engines.pybullet_engine import PyBullet, PyBulletSimulation
 from dropspin.comparisons.engines.wang import Wang, WangBatch, WangSimulation, reference_body, reference_world
-from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.inputs import EngineEntry
 
 DT = 4e-3
@@ -104,15 +103,9 @@ class ProcessesHere:
     def abandon(self) -> None:
         """There is no process to end."""
 
-    def call(self, entry: EngineEntry, work: Callable[..., Any], *given: Any) -> Any:
+    def call(self, entry: EngineEntry, work: Callable[..., Any], *given: Any, **_: object) -> Any:
         """Call a function with an engine."""
         return work(entry, *given)
-
-    def run_engine(
-        self, entry: EngineEntry, scene: ds.Scenario, dt: float, starts: Sequence[ds.Scenario], _: object, *, quick: bool
-    ) -> EngineRun:
-        """Run a scene with an engine."""
-        return run_engine(entry, scene, dt, starts, quick=quick)
 
 
 def run_cost(scenes: Sequence[ds.Scenario]) -> None:

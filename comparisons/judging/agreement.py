@@ -9,34 +9,28 @@ from dropspin.comparisons.judging.verdicts import Basis, Judgement, Verdict
 from dropspin.comparisons.measuring.comparison import BeyondHorizon, Comparison, Unresolved
 from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.scenarios import Scenario, Trajectory, Truth
+from dropspin.scenarios import Scenario, Truth
 
 
 def judge_agreement(
-    scene: Scenario,
-    truth: Truth | None,
-    truths: Sequence[Truth | None],
-    first: Sequence[Comparison],
-    second: Sequence[Comparison],
-    discretisations: tuple[str | None, str | None],
+    scene: Scenario, truth: Truth | None, first: Sequence[Comparison], second: Sequence[Comparison], shared: str | None
 ) -> Iterator[tuple[Metric, Judgement]]:
     """The differences between two engines, for each metric that is defined between engines.
 
     Args:
         scene: The scene.
         truth: The exact solution of the scene, if it is known.
-        truths: The exact solution from each start phase.
         first: The motion of one engine from each start phase, compared with the exact solution.
         second: The same of the other engine.
-        discretisations: The discretisation that each engine declares.
+        shared: The discretisation that both engines declare; None if they do not.
     """
-    pairs = [_paired(truth, one, other) for truth, one, other in zip(truths, first, second, strict=True)]
-    shared, other = discretisations
-    same = shared is not None and shared == other
-    basis: Basis = "same_method" if same else ""
-    reason = f"no evidence: both are {shared}" if same else ""
+    pairs = list(map(_paired, first, second))
+    basis: Basis = "same_method" if shared else ""
+    reason = f"no evidence: both are {shared}" if shared else ""
+    # Without an exact solution, the motion of an engine takes its place, to determine which metrics apply.
+    known = truth or Truth("engine", "", lambda t: second[0].motion.states[: len(t)])
     for metric in METRICS.values():
-        if not (metric.agreement and metric.applies(scene, truth or _as_truth(second[0].motion))):
+        if not (metric.agreement and metric.applies(scene, known)):
             continue
         try:
             value, remark = metric.average(pairs).value, remark_on_horizon(scene, truth, metric)
@@ -47,15 +41,10 @@ def judge_agreement(
         yield metric, judgement
 
 
-def _paired(truth: Truth | None, one: Comparison, other: Comparison) -> Comparison:
+def _paired(one: Comparison, other: Comparison) -> Comparison:
     """The motions of two engines up to the horizon of the exact solution, or, without one, up to the first contact of either engine."""
-    if truth is not None:
-        return Comparison.between(one, other, int(np.sum(truth.covers(one.motion.t))))
+    if one.reference is not None:
+        return Comparison.between(one, other, len(one.reference))
     contacts = [case.first_contact for case in (one, other)]
     until = max(2, min([len(one.motion), *(contact[0] + 1 for contact in contacts if contact is not None)]))
     return Comparison(one.scene, one.motion[:until], other.motion[:until])
-
-
-def _as_truth(motion: Trajectory) -> Truth:
-    """The motion of an engine in place of an exact solution, to determine which metrics apply."""
-    return Truth("engine", "", lambda t: motion.states[: len(t)])

@@ -17,13 +17,11 @@ from dropspin.comparisons.engines.adapter_code import adapter_code
 from dropspin.comparisons.engines.base import EngineBroken
 from dropspin.comparisons.engines.registry import constructed
 from dropspin.comparisons.engines.stand_in import StandIn
-from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.recording import classify
-from dropspin.scenarios import Scenario
 
 PROCESSES = Path("/proc")
-
+PR_SET_PDEATHSIG = 1
 
 _shared: list["ctypes.Array[ctypes.c_long]"] = []
 """Numbers that the parent reads: the id of this process, the leader of its group, since it works; simulations done and to do."""
@@ -31,13 +29,10 @@ _entry: list[EngineEntry] = []
 """The engine of this process; empty in the parent."""
 
 
-def run_and_count(entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool) -> EngineRun:
-    """Run a scene with an engine in this process, and share the numbers of simulations with the parent."""
-
-    def on_simulations(done: int, total: int) -> None:
-        _shared[0][1:] = [done, total]
-
-    return run_engine(entry, scene, dt, starts, on_simulations, quick=quick)
+def share_progress(done: int, total: int) -> None:
+    """Share the numbers of simulations done and to do with the parent, if this is the process of an engine."""
+    for numbers in _shared:
+        numbers[1:] = [done, total]
 
 
 def start_process(entry: EngineEntry, memory: int, shared: "ctypes.Array[ctypes.c_long]") -> None:
@@ -56,7 +51,8 @@ def start_process(entry: EngineEntry, memory: int, shared: "ctypes.Array[ctypes.
     if sys.platform == "linux":
         import resource
 
-        _end_with_parent()
+        # The system ends this process when its parent is killed: the processes of several engines would wait for each other.
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         # Not the address space, of which libraries for GPUs and WebAssembly reserve far more than they use.
         resource.setrlimit(resource.RLIMIT_DATA, (memory_for_data(os.getpid()) + memory, resource.RLIM_INFINITY))
 
@@ -68,14 +64,6 @@ def memory_for_data(process: int) -> int:
         OSError: There is no such process, or the system is not Linux.
     """
     return int((PROCESSES / str(process) / "statm").read_text().split()[5]) * os.sysconf("SC_PAGE_SIZE")
-
-
-PR_SET_PDEATHSIG = 1
-
-
-def _end_with_parent() -> None:
-    """Have the system end this process when its parent is killed: the processes of several engines would wait for each other."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def call(work: Callable[..., Any], given: Sequence[Any], processor_time: float) -> Any:

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from dropspin.comparisons.engines.base import Engine, KnownLimitation
+from dropspin.comparisons.engines.base import KnownLimitation
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.comparisons.measuring.tolerances import perturbed
 from dropspin.comparisons.results.ensembles import QUICK_MEMBERS, EnsembleOutcome
+from dropspin.comparisons.running.engine_process import share_progress
 from dropspin.comparisons.running.ensembles import run_ensemble
-from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.recording import Breakdown, classify, record, record_batch, verify_accepted
 from dropspin.comparisons.running.verification import verified_claims, verified_predictions
@@ -53,13 +54,7 @@ class EngineRun:
 
 
 def run_engine(
-    entry: EngineEntry,
-    scene: Scenario,
-    dt: float,
-    starts: Sequence[Scenario],
-    on_simulations: OnSimulations = ignore,
-    *,
-    quick: bool = False,
+    entry: EngineEntry, scene: Scenario, dt: float, starts: Sequence[Scenario], quick: bool, on_simulations: OnSimulations = share_progress
 ) -> EngineRun:
     """Run a scene from its own start, then from each of its start phases if there are several; failures are part of the result.
 
@@ -68,8 +63,8 @@ def run_engine(
         scene: The scene.
         dt: Time step [s].
         starts: The scene from each of its start phases.
-        on_simulations: Called after each simulation.
         quick: Whether perturbed starts are run only where verdicts need them, in single precision, and few members of an ensemble.
+        on_simulations: Called after each simulation.
     """
     engine, found = entry.adapter, EngineRun(entry.label)
     try:
@@ -87,15 +82,10 @@ def run_engine(
         found.perturbed = [[next(motions) for _ in moved] for moved in sets]
         found.outcome = None if scene.ensemble is None else run_ensemble(engine, scene, dt, QUICK_MEMBERS if quick else None)
         # The predicted error of a bounce is a mean over start phases.
-        found.predicted = _predicted_errors(engine, scene, dt) if scene.floor is None or len(starts) > 1 else {}
+        if scene.floor is None or len(starts) > 1:
+            truth = truth_for(scene)
+            predicted = {metric.name: engine.predicted_error(scene, truth, metric.name, dt) for metric in metrics_for(scene, truth)}
+            found.predicted = verified_predictions(predicted)
     except Exception as error:  # whatever an engine raises costs its own row only
         found.breakdown = classify(error)
     return found
-
-
-def _predicted_errors(engine: Engine, scene: Scenario, dt: float) -> dict[str, float]:
-    """The errors that the engine's scheme must have, by metric."""
-    truth = truth_for(scene)
-    return verified_predictions(
-        {metric.name: engine.predicted_error(scene, truth, metric.name, dt) for metric in metrics_for(scene, truth)}
-    )

@@ -15,16 +15,15 @@ from dropspin.comparisons.judging.judge import judge, judge_asymptotic_error, ju
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metric import Metric
 from dropspin.comparisons.measuring.metrics import METRICS
-from dropspin.comparisons.measuring.states import States
 from dropspin.comparisons.results.provenance import motion_digest
 from dropspin.comparisons.results.table import Case, Measurement
-from dropspin.comparisons.running.engine_run import EngineRun
+from dropspin.comparisons.running.engine_run import EngineRun, run_engine
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.measured import breakdown_of, compare, measure, phases_at
 from dropspin.comparisons.running.processes import EngineProcesses
-from dropspin.comparisons.running.progress import OnProgress, Progress, reporter
-from dropspin.comparisons.running.start_phases import StartPhase
+from dropspin.comparisons.running.progress import OnProgress, Progress
+from dropspin.comparisons.running.recording import Breakdown, divergence
+from dropspin.comparisons.running.start_phases import StartPhase, compare, measure, phases_at
 from dropspin.comparisons.running.timing import Timing
 
 FEWEST_STEPS = 8
@@ -73,33 +72,39 @@ class EngineStudy:
     causes: dict[str, Convergence] = field(default_factory=dict)
     added: dict[tuple[str, float], Mapping[str, SeriesPoint]] = field(default_factory=dict)
 
-    def run_at(self, dt: float, phases: Sequence[StartPhase], exact: Sequence[States | None], timing: Timing) -> list[Comparison]:
+    def run_at(self, dt: float, phases: Sequence[StartPhase], timing: Timing) -> list[Comparison]:
         """Run the engine at a requested time step; its motions from all start phases, compared with the exact ones, if it has any."""
         progress = Progress(self.own.scene.name, self.entry.label, dt)
         self.on_progress(progress)
-        outcome, cases = self._measured(self.entry, phases, exact, progress, timing)
+        outcome, cases = self._measured(self.entry, phases, progress, timing)
         self.outcomes.append(outcome)
         self.on_progress(progress._replace(finished=True))
         return cases
 
     def _measured(
-        self, entry: EngineEntry, phases: Sequence[StartPhase], exact: Sequence[States | None], progress: Progress, timing: Timing
+        self, entry: EngineEntry, phases: Sequence[StartPhase], progress: Progress, timing: Timing
     ) -> tuple[Outcome, list[Comparison]]:
         """Simulate the scene from all start phases, and measure every metric."""
         scene, dt, run = self.own.scene, progress.dt, EngineRun(entry.label)
         if not timing.ended:
             starts = [phase.scene for phase in phases]
-            run = self.processes.run_engine(entry, scene, dt, starts, reporter(progress, self.on_progress), quick=self.own.quick)
-        run.breakdown = run.breakdown or timing.breakdown or breakdown_of(run)
-        cases = [] if run.breakdown else compare(run.phases, phases, exact)
-        points = measure(self.own, dt, run, phases, exact, cases) if cases else {}
-        digest = "" if run.motion is None else motion_digest([run.motion, *run.phases])
+
+            def on_simulations(done: int, total: int) -> None:
+                self.on_progress(progress._replace(done=done, total=total))
+
+            answer = self.processes.call(entry, run_engine, scene, dt, starts, self.own.quick, on_simulations=on_simulations)
+            run = EngineRun(entry.label, answer) if isinstance(answer, Breakdown) else answer
+        motions = [] if run.motion is None else [run.motion, *run.phases]
+        run.breakdown = run.breakdown or timing.breakdown or next(filter(None, map(divergence, motions)), None)
+        cases = [] if run.breakdown else compare(run.phases, phases)
+        points = measure(self.own, dt, run, phases, cases) if cases else {}
+        digest = motion_digest(motions) if motions else ""
         case = Case(scene.name, entry.label, dt, scene.steps(dt))
         return Outcome(case, timing.per_step, replace(run, phases=[], perturbed=[]), points, digest), cases
 
     def rows(self, *, is_extrapolated: bool) -> Iterator[Measurement]:
         """All rows of the engine: at each time step, and its orders and asymptotic errors if there are enough time steps."""
-        scene, truth, _, _ = self.own
+        scene, truth, *_ = self.own
         causes = {name: self.cause(name) for name in self.series} if is_extrapolated else {}
         truths = {"truth": "" if truth is None else truth.name, "invariant": ""}
         for case, per_step, run, points, _ in self.outcomes:
@@ -206,7 +211,7 @@ class EngineStudy:
         for dt, entry in wanted:
             if self.own.scene.steps(dt) >= FEWEST_STEPS and (entry.label, dt) not in self.added:
                 progress = Progress(self.own.scene.name, entry.label, dt, added=True)
-                outcome, _ = self._measured(entry, *phases_at(self.own, dt), progress, Timing())
+                outcome, _ = self._measured(entry, phases_at(self.own, dt), progress, Timing())
                 self.added[entry.label, dt] = outcome.points
             points.append(self.added.get((entry.label, dt), {}).get(metric.name))
         return [point for point in points if point is not None]

@@ -73,7 +73,5 @@ def _describe(entry: EngineEntry, name: str) -> Traits | DropspinError:
     before = frozenset(sys.modules)
     try:
         return traits(parsed(name)[0], engine_named(name), frozenset(sys.modules) - before)
-    except (EngineMissing, EngineBroken) as error:
-        return type(error)(str(error))
     except DropspinError as error:  # of a type that may need more than a text
-        return DropspinError(str(error))
+        return (type(error) if isinstance(error, EngineMissing | EngineBroken) else DropspinError)(str(error))

@@ -23,12 +23,11 @@ from pebble import ProcessExpired, ProcessPool
 from dropspin.comparisons.engines.exceptions import described
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.results.interrupts import finished, interrupts_deferred
-from dropspin.comparisons.running.engine_process import PROCESSES, call, memory_for_data, run_and_count, start_process
-from dropspin.comparisons.running.engine_run import EngineRun
+from dropspin.comparisons.running.engine_process import PROCESSES, call, memory_for_data, start_process
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.progress import OnSimulations
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios import DropspinError
 
 Given = TypeVarTuple("Given")
 Result = TypeVar("Result")
@@ -85,35 +84,11 @@ class EngineProcesses:
         self._shared: dict[str, ctypes.Array[ctypes.c_long]] = {}
         self._closed = False
 
-    def run_engine(
-        self,
-        entry: EngineEntry,
-        scene: Scenario,
-        dt: float,
-        starts: Sequence[Scenario],
-        on_simulations: OnSimulations = ignore,
-        *,
-        quick: bool = False,
-    ) -> EngineRun:
-        """Run a scene with an engine in its process; failures are part of the result.
-
-        Args:
-            entry: The engine.
-            scene: The scene.
-            dt: Time step [s].
-            starts: The scene from each of its start phases.
-            on_simulations: Called while the engine works, twice a second.
-            quick: As for `run_engine`.
-        """
-        found = self.call(entry, run_and_count, scene, dt, starts, quick, on_simulations=on_simulations)
-        return EngineRun(entry.label, found) if isinstance(found, Breakdown) else found
-
     def start(self, entries: Sequence[EngineEntry]) -> None:
         """Start the processes of engines: a process that is forked while another thread compiles or imports may wait for it forever."""
         for entry in entries:
             with _system_errors_named(entry), interrupts_deferred():
-                self._pools[entry.label] = self._pool(entry)
-                started = self._pools[entry.label].schedule(int)
+                started = self._ready(entry).schedule(int)
             while not finished([started], POLL):
                 pass
 
@@ -177,8 +152,12 @@ class EngineProcesses:
         if entry.label in self._pools and not self._pools[entry.label].active:
             self.renew(entry)
         if entry.label not in self._pools:
+            context = get_context(self._start_method)
             with _system_errors_named(entry):
-                self._pools[entry.label] = self._pool(entry)
+                # Without a lock: the parent would wait forever for a process that is killed while it holds one.
+                self._shared[entry.label] = context.RawArray("l", 3)
+                given = [entry, self._resources.memory, self._shared[entry.label]]
+                self._pools[entry.label] = ProcessPool(max_workers=1, initializer=start_process, initargs=given, context=context)
         self._shared[entry.label][:] = [0, 0, 0]
         return self._pools[entry.label]
 
@@ -211,13 +190,6 @@ class EngineProcesses:
         pool.stop()  # type: ignore[no-untyped-call]  # pebble's has no types
         pool.join()
         self._end_group(entry.label)
-
-    def _pool(self, entry: EngineEntry) -> ProcessPool:
-        context = get_context(self._start_method)
-        # Without a lock: the parent would wait forever for a process that is killed while it holds one.
-        self._shared[entry.label] = shared = context.RawArray("l", 3)
-        given = [entry, self._resources.memory, shared]
-        return ProcessPool(max_workers=1, initializer=start_process, initargs=given, context=context)
 
     def __enter__(self) -> Self:
         return self

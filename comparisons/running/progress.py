@@ -31,8 +31,3 @@ class Progress(NamedTuple):
 OnProgress = Callable[[Progress], None]
 OnSimulations = Callable[[int, int], None]
 """Called with the numbers of simulations done and to do."""
-
-
-def reporter(progress: Progress, on_progress: OnProgress) -> OnSimulations:
-    """A function that reports the simulations done of some progress."""
-    return lambda done, total: on_progress(progress._replace(done=done, total=total))

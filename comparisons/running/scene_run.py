@@ -18,16 +18,17 @@ from dropspin.comparisons.results.table import Measurement, as_table
 from dropspin.comparisons.running.engine_study import EngineStudy, Outcome
 from dropspin.comparisons.running.ensembles import judge_differences, judge_means
 from dropspin.comparisons.running.inputs import EngineEntry
-from dropspin.comparisons.running.measured import compare, exactly_at, phases_at
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.progress import OnProgress
-from dropspin.comparisons.running.start_phases import StartPhase
+from dropspin.comparisons.running.start_phases import StartPhase, compare, phases_at, with_exact_motions
 from dropspin.comparisons.running.timing import Timing
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.truths import other_laws
 
 Timings = Mapping[tuple[str, str, float], Timing]
 """By scene, engine and time step."""
+Compared = tuple[Outcome, Sequence[Comparison]]
+"""What an engine gave at a time step, and its motions from all start phases compared with the exact ones."""
 
 
 def run_scene(
@@ -54,11 +55,11 @@ def run_scene(
     distances: list[Measurement] = []
     studies = [EngineStudy(own, entry, processes, on_progress) for entry in entries]
     for dt in dts:
-        phases, exact = phases_at(own, dt)
-        cases = [study.run_at(dt, phases, exact, timings[own.scene.name, study.entry.label, dt]) for study in studies]
+        phases = phases_at(own, dt)
+        cases = [study.run_at(dt, phases, timings[own.scene.name, study.entry.label, dt]) for study in studies]
         compared = [(study.outcomes[-1], of_study) for study, of_study in zip(studies, cases, strict=True) if of_study]
         for first, second in combinations(compared, 2):
-            agreements += _agreement(own, phases, first, second)
+            agreements += _agreement(own, first, second)
         if dt == min(dts):
             distances += _distances_to_other_laws(own.scene, dt, phases, compared)
     for study in studies:
@@ -67,16 +68,11 @@ def run_scene(
     return _results(own, studies, [*judged, *distances], agreements, stamp)
 
 
-def _agreement(
-    own: StartPhase,
-    phases: Sequence[StartPhase],
-    first: tuple[Outcome, Sequence[Comparison]],
-    second: tuple[Outcome, Sequence[Comparison]],
-) -> Iterator[Measurement]:
+def _agreement(own: StartPhase, first: Compared, second: Compared) -> Iterator[Measurement]:
     """The differences between two engines."""
     ((case, _, one, _, _), cases), ((_, _, other, _, _), other_cases) = first, second
-    truths = [phase.truth for phase in phases]
-    for metric, judgement in judge_agreement(own.scene, own.truth, truths, cases, other_cases, (one.discretisation, other.discretisation)):
+    shared = one.discretisation if one.discretisation == other.discretisation else None
+    for metric, judgement in judge_agreement(own.scene, own.truth, cases, other_cases, shared):
         yield case.measurement("agreement", metric.name, metric.unit, judgement, other.label)
     if one.outcome is not None and other.outcome is not None:
         for name, judgement in judge_differences(one.outcome, other.outcome):
@@ -84,19 +80,19 @@ def _agreement(
 
 
 def _distances_to_other_laws(
-    scene: Scenario, dt: float, phases: Sequence[StartPhase], compared: Sequence[tuple[Outcome, Sequence[Comparison]]]
+    scene: Scenario, dt: float, phases: Sequence[StartPhase], compared: Sequence[Compared]
 ) -> Iterator[Measurement]:
     """How far engines are from the exact solutions under the impact laws that the scene does not name, in its leading metric; no errors."""
-    laws = []
-    for law, truth in other_laws(scene).items():
-        of_law = [phase._replace(truth=truth.after(phase.delay)) for phase in phases]
-        laws.append((law, of_law, exactly_at(scene, dt, truth, of_law)))
+    laws = {
+        law: with_exact_motions(truth, [phase._replace(truth=truth.after(phase.delay)) for phase in phases], dt)
+        for law, truth in other_laws(scene).items()
+    }
     if not laws:  # also without an exact solution, where no metric leads
         return
     metric = METRICS[leading_metric(scene)]
     for outcome, cases in compared:
-        for law, of_law, exact in laws:
-            value = metric.value_or_nan(compare([case.motion for case in cases], of_law, exact))
+        for law, of_law in laws.items():
+            value = metric.value_or_nan(compare([case.motion for case in cases], of_law))
             yield outcome.case.measurement("other_law", metric.name, metric.unit, Judgement(value, "measured"), law)
 
 

@@ -11,12 +11,12 @@ from threading import RLock
 from unittest import mock
 
 from dropspin.comparisons.engines.stand_in import StandIn
-from dropspin.comparisons.running.engine_run import EngineRun, run_engine
+from dropspin.comparisons.running.engine_run import run_engine
 from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.processes import Closed, EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, classify
 
-REAL = {name: getattr(EngineProcesses, name) for name in ("start", "run_engine", "call", "renew")}
+REAL = {name: getattr(EngineProcesses, name) for name in ("start", "call", "renew")}
 _one_at_a_time = RLock()
 
 
@@ -36,14 +36,7 @@ def renew(self, entry):
     REAL["start"](self, [entry])
 
 
-def run(self, entry, scene, dt, starts, on_simulations=ignore, *, quick=False):
-    if needs_process(self, entry):
-        return REAL["run_engine"](self, entry, scene, dt, starts, on_simulations, quick=quick)
-    found = call(self, entry, run_engine, scene, dt, starts, on_simulations, quick=quick)
-    return EngineRun(entry.label, found) if isinstance(found, Breakdown) else found
-
-
-def call(self, entry, work, *given, on_simulations=ignore, **options):
+def call(self, entry, work, *given, on_simulations=ignore):
     """As `EngineProcesses.call`; one piece of work at a time, for not all that engines do is safe in threads."""
     if needs_process(self, entry):
         return REAL["call"](self, entry, work, *given, on_simulations=on_simulations)
@@ -54,7 +47,7 @@ def call(self, entry, work, *given, on_simulations=ignore, **options):
     on_simulations(0, 0)
     with _one_at_a_time, mock.patch.object(tempfile, "tempdir", tempfile.tempdir):
         try:
-            return work(entry, *given, **options)
+            return work(entry, *given, *([on_simulations] if work is run_engine else []))
         except Exception as error:
             return classify(error)
 
@@ -62,7 +55,7 @@ def call(self, entry, work, *given, on_simulations=ignore, **options):
 @contextmanager
 def engines_in_process() -> Iterator[None]:
     """Let engines work in this process, one at a time."""
-    with mock.patch.multiple(EngineProcesses, start=start, run_engine=run, call=call, renew=renew):
+    with mock.patch.multiple(EngineProcesses, start=start, call=call, renew=renew):
         yield
 
 

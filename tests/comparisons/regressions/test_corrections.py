@@ -12,7 +12,7 @@ from dropspin.comparisons.regressions.baseline import Baseline, load_baseline, w
 from dropspin.comparisons.regressions.changes import digests_of
 from dropspin.comparisons.regressions.checking import accept, check
 from dropspin.comparisons.regressions.comparing import compare
-from dropspin.comparisons.running import measured
+from dropspin.comparisons.running import start_phases
 from dropspin.comparisons.running.run import run
 from dropspin.reports.stories.check import BaselineFile, sentences
 
@@ -25,7 +25,7 @@ def corrected(monkeypatch):
     metric = METRICS["bounce_height_error"]
     changed = replace(metric, measure=lambda case: metric.measure(case) + 0.01)
     monkeypatch.setitem(METRICS, "bounce_height_error", changed)
-    monkeypatch.setattr(measured, "metrics_for", metrics_for.__wrapped__)  # which remembers the metrics of a scene
+    monkeypatch.setattr(start_phases, "metrics_for", metrics_for.__wrapped__)  # which remembers the metrics of a scene
 
 
 def stamped(results, **changes):

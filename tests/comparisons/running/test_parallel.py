@@ -11,6 +11,7 @@ from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.running import processes
+from dropspin.comparisons.running.engine_run import run_engine
 from dropspin.comparisons.running.parallel import results_in_parallel
 
 SCENES = ["drop-ball", "spin-asymmetric", "fall-tilted"]
@@ -63,11 +64,13 @@ class Killed(made.Exact):
 
 @pytest.mark.usefixtures("engine_processes")
 def test_engine_that_ends_its_process_costs_its_own_rows_and_is_tried_once(monkeypatch):
-    called = []
-    run_engine = processes.EngineProcesses.run_engine
-    monkeypatch.setattr(
-        processes.EngineProcesses, "run_engine", lambda *given, **named: called.append(given[1].label) or run_engine(*given, **named)
-    )
+    called, call = [], processes.EngineProcesses.call
+
+    def noted(self, entry, work, *given, **named):
+        called.extend([entry.label] if work is run_engine else [])
+        return call(self, entry, work, *given, **named)
+
+    monkeypatch.setattr(processes.EngineProcesses, "call", noted)
     table = ds.run(["fall-spin", "spin-principal"], [Killed(), "wang"], 0.01, jobs=2).table
     broken = table[table["verdict"] == "crashed"]
     assert list(zip(broken["scene"], broken["engine"], strict=True)) == [("fall-spin", "killed")]

@@ -21,7 +21,7 @@ def test_every_simulation_is_reported():
     total = 1 + 32
     for engine, done in ((made.Exact(), range(1, 34)), ("wang", (1, 33))):
         reported = []
-        run_engine(engine_entry(engine), BALL, DT, STARTS, lambda *counts, reported=reported: reported.append(counts))
+        run_engine(engine_entry(engine), BALL, DT, STARTS, False, lambda *counts, reported=reported: reported.append(counts))
         assert reported == [(number, total) for number in done]
 
 

@@ -6,7 +6,7 @@ import pytest
 import dropspin as ds
 from dropspin.comparisons.measuring.batch import AT_ONCE, compute_states
 from dropspin.comparisons.measuring.states import States
-from dropspin.comparisons.running.start_phases import exact_motions, start_phases
+from dropspin.comparisons.running.start_phases import StartPhase, phases_at
 
 DT = 4e-3
 SCENES = ("drop-box-flat", "spin-asymmetric", "roll-prism", "slide-box")
@@ -15,8 +15,8 @@ SCENES = ("drop-box-flat", "spin-asymmetric", "roll-prism", "slide-box")
 def phases_of(name):
     scene, truth = ds.load(name), ds.truth_for(ds.load(name))
     times = DT * np.arange(1 + scene.steps(DT), dtype=float)
-    phases = start_phases(scene, truth, DT)
-    return phases, times, exact_motions(truth, phases, times)
+    phases = phases_at(StartPhase(scene, truth), DT)
+    return phases, times, [phase.exact.motion for phase in phases]
 
 
 def states_at_once(scenes, motions):

@@ -5,10 +5,11 @@ import hashlib
 import inspect
 import sys
 import sysconfig
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec, resolve_name
+from itertools import accumulate
 from pathlib import Path
 
 PACKAGE, COMMON = "dropspin.comparisons.engines", frozenset({"base", "options", "packages"})
@@ -36,7 +37,7 @@ def adapter_code(adapter: type, loaded: Iterable[str] = ()) -> str | None:
         return built_in_code(file)
     files = _with_imports({file: adapter.__module__}, _file)
     further = {other: name for name in loaded if (other := _file(name)) is not None and other not in files}
-    return _hashed({**files, **_with_imports(further, _file)})
+    return hash_of({**files, **_with_imports(further, _file)})
 
 
 def built_in_code(file: Path) -> str:
@@ -51,14 +52,12 @@ def built_in_code(file: Path) -> str:
         return there if module not in COMMON and there.is_file() else None
 
     files = _with_imports({file: f"{PACKAGE}.{file.stem}"}, beside)
-    return _hashed(same for one in files for same in file.parent.glob(f"{one.stem}.*"))
+    return hash_of(same for one in files for same in file.parent.glob(f"{one.stem}.*"))
 
 
-def _hashed(files: Iterable[Path]) -> str:
-    found = hashlib.sha256()
-    for one in sorted(files, key=lambda path: path.name):
-        found.update(one.read_bytes())
-    return found.hexdigest()[:12]
+def hash_of(files: Iterable[Path]) -> str:
+    """A short hash of the content of files, in the order of their names."""
+    return hashlib.sha256(b"".join(one.read_bytes() for one in sorted(files, key=lambda path: path.name))).hexdigest()[:12]
 
 
 def _with_imports(files: Mapping[Path, str], file_of: Callable[[str], Path | None]) -> dict[Path, str]:
@@ -86,32 +85,23 @@ def _imported_by(source: bytes, package: str) -> tuple[str, ...]:
 
     Each content is parsed once: every run needs the hashes of its adapters.
     """
-    return tuple(dict.fromkeys(_imports(ast.parse(source), package)))
-
-
-def _imports(tree: ast.Module, package: str) -> Iterator[str]:
-    for node in ast.walk(tree):
+    names: dict[str, None] = {}
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            for alias in node.names:  # `import a.b` loads a as well
+                names |= dict.fromkeys(accumulate(alias.name.split("."), "{}.{}".format))
         elif isinstance(node, ast.ImportFrom):
             with suppress(ImportError):  # beyond the top-level package: Python itself refuses it when it gets there
                 base = resolve_name("." * node.level + (node.module or ""), package)
-                yield from (base, *(f"{base}.{alias.name}" for alias in node.names))
-            continue
-        else:
-            continue
-        for name in names:  # `import a.b` loads a as well
-            parts = name.split(".")
-            yield from (".".join(parts[: count + 1]) for count in range(len(parts)))
+                names |= dict.fromkeys([base, *(f"{base}.{alias.name}" for alias in node.names)])
+    return tuple(names)
 
 
 def _file(name: str) -> Path | None:
     """The source file of a module; None if the module is installed, built into Python, a part of dropspin, or not found."""
     top = name.partition(".")[0]
-    if top == "dropspin":
+    if top == "dropspin" or (name != top and _file(top) is None):  # asking for a submodule imports its package
         return None
-    if name != top and _file(top) is None:
-        return None  # asking for a submodule imports its package
     module = sys.modules.get(name)
     try:
         spec = find_spec(name) if module is None else getattr(module, "__spec__", None)

@@ -162,20 +162,15 @@ class PyBullet(Engine):
         Maximal coordinates damp as v (1 - k)^t, so that k = 1 - exp(-rate) is the scene's decay. In the default profile a scene without
         damping keeps Bullet's default of 0.04.
         """
-        found: dict[str, float] = {}
-        if scene.floor is not None:
-            found |= {"restitution": scene.floor.restitution, "lateralFriction": friction_of(scene.floor, STRONGEST_FRICTION)}
-            found |= {} if self.is_default else {"contactProcessingThreshold": 0.0}
-        for motion in ("linear", "angular"):
-            if scene.damping is not None:
-                rate = getattr(scene.damping, motion)
-                found[f"{motion}Damping"] = rate if self.is_default else float(-np.expm1(-rate))
-            elif not self.is_default:
-                found[f"{motion}Damping"] = 0.0
-        if not self.is_default:
-            found["activationState"] = NEVER_SLEEPS
-            found |= {"maxJointVelocity": FASTEST} if self.is_multibody and self.option("velocity_clamp") == "lifted" else {}
-        return found
+        floor, damping = scene.floor, scene.damping
+        rates = {f"{motion}Damping": rate for motion, rate in damping.model_dump().items()} if damping else {}
+        found = {"restitution": floor.restitution, "lateralFriction": friction_of(floor, STRONGEST_FRICTION)} if floor else {}
+        if self.is_default:
+            return found | rates
+        found |= {"contactProcessingThreshold": 0.0} if floor else {}
+        found |= {name: float(-np.expm1(-rates.get(name, 0.0))) for name in ("linearDamping", "angularDamping")}
+        found["activationState"] = NEVER_SLEEPS
+        return found | ({"maxJointVelocity": FASTEST} if self.is_multibody and self.option("velocity_clamp") == "lifted" else {})
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python, and the body's part of them as URDF."""

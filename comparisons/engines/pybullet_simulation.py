@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from itertools import chain
 from struct import pack
@@ -49,19 +49,13 @@ class PyBulletSimulation(Simulation):
             parameters: Of the physics engine.
             dynamics: Properties of the body.
         """
-        self._bullet = _import_quietly()
-        self._dt, self._fall, self.velocity_lag = dt, dt * scene.acceleration, 0.5 * dt
-        self._grips = scene.floor is not None and scene.floor.friction == "infinite"
-        self._is_maximal, slips = form["coordinates"] == "maximal", scene.floor is not None and 0.0 < scene.floor.coefficient < np.inf
-        self._turning_slip_of = scene if slips and self._is_maximal else None
-        self._idle = _idle.setdefault(form["profile"], [])
-        self._client, self._uses = self._idle.pop() if self._idle else (int(self._bullet.connect(self._bullet.DIRECT)), 0)
-        if self._client < 0:
-            raise RuntimeError("PyBullet returned no connection")
+        self._scene, self._dt, self.velocity_lag = scene, dt, 0.5 * dt
+        self._is_maximal, self._idle = form["coordinates"] == "maximal", _idle.setdefault(form["profile"], [])
+        self._bullet, self._uses = self._idle.pop() if self._idle else (_Connection(), 0)
         self.settings = {"version": version("pybullet"), **form, **parameters, **dynamics}
         try:
-            self._bullet.setPhysicsEngineParameter(physicsClientId=self._client, **parameters)
-            self._bullet.setGravity(*map(float, scene.acceleration), physicsClientId=self._client)
+            self._bullet.setPhysicsEngineParameter(**parameters)
+            self._bullet.setGravity(*map(float, scene.acceleration))
             if scene.floor is not None:
                 self._add_floor(floor, dynamics)
             self._body, *_ = [self._add_body(one, form["body"], dynamics) for one in bodies_in(scene, form["beside"])]
@@ -71,51 +65,45 @@ class PyBulletSimulation(Simulation):
 
     def _add(self, mass: float, shape: int, position: Sequence[float], **given: Any) -> int:
         """Add a body, and return its number."""
-        maximal, client = self._is_maximal, self._client
-        added = self._bullet.createMultiBody(
-            mass, shape, basePosition=position, useMaximalCoordinates=maximal, physicsClientId=client, **given
-        )
-        return int(added)
-
-    def _shape(self, kind: int, **given: Any) -> int:
-        return int(self._bullet.createCollisionShape(kind, physicsClientId=self._client, **given))
+        given["useMaximalCoordinates"] = self._is_maximal
+        return int(self._bullet.createMultiBody(mass, shape, basePosition=position, **given))
 
     def _add_body(self, scene: Scenario, kind: str, dynamics: Mapping[str, float]) -> int:
-        body, start, client = scene.body, scene.start, self._client
+        body, start = scene.body, scene.start
         shape = -1 if scene.floor is None else self._shape_of(body, kind)
         added = self._add(body.mass, shape, start.position, baseOrientation=start.orientation)
         moments = np.diag(body.inertia_tensor).tolist()
-        self._bullet.changeDynamics(added, -1, mass=body.mass, localInertiaDiagonal=moments, physicsClientId=client, **dynamics)
-        self._bullet.resetBaseVelocity(added, start.velocity, start.angular_velocity, physicsClientId=client)
+        self._bullet.changeDynamics(added, -1, mass=body.mass, localInertiaDiagonal=moments, **dynamics)
+        self._bullet.resetBaseVelocity(added, start.velocity, start.angular_velocity)
         return added
 
-    def _shape_of(self, body: Body, kind: str) -> int:
+    def _shape_of(self, body: Body, kind: str) -> Any:
         bullet, corners = self._bullet, body.hull.tolist()
         if kind == "hull":
-            return self._shape(bullet.GEOM_MESH, vertices=corners)
+            return bullet.createCollisionShape(bullet.GEOM_MESH, vertices=corners)
         if isinstance(body, Sphere):
-            return self._shape(bullet.GEOM_SPHERE, radius=body.radius)
+            return bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=body.radius)
         if isinstance(body, Box):
-            return self._shape(bullet.GEOM_BOX, halfExtents=body.half_extents)
+            return bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=body.half_extents)
         # Bullet gives a convex hull one contact point per step: a prism that rolls leaves its course by 0.07 m in 1.7 m, at 1 ms.
         balls, radii = [bullet.GEOM_SPHERE] * len(corners), [BALL * body.size] * len(corners)
-        return int(bullet.createCollisionShapeArray(balls, radii=radii, collisionFramePositions=corners, physicsClientId=self._client))
+        return bullet.createCollisionShapeArray(balls, radii=radii, collisionFramePositions=corners)
 
     def _add_floor(self, kind: str, dynamics: Mapping[str, float]) -> None:
         bullet, top = self._bullet, 0.0
         if kind == "plane":
-            shape = self._shape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0])
+            shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0])
         elif kind == "mesh":
             flags, indices = bullet.GEOM_FORCE_CONCAVE_TRIMESH, list(chain(*TRIANGLES))
-            shape = self._shape(bullet.GEOM_MESH, flags=flags, vertices=SQUARE, indices=indices)
+            shape = bullet.createCollisionShape(bullet.GEOM_MESH, flags=flags, vertices=SQUARE, indices=indices)
         else:  # on a plane, Bullet gives a box one contact point per step
-            shape, top = self._shape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3), FLOOR_HALF_SIZE
+            shape, top = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3), FLOOR_HALF_SIZE
         # Bullet multiplies the coefficients of the two bodies; with 1 for the floor, the product is the scene's value.
         contact = {name: dynamics[name] for name in CONTACT if name in dynamics} | {"restitution": 1.0, "lateralFriction": 1.0}
-        bullet.changeDynamics(self._add(0.0, shape, [0, -top, 0]), -1, physicsClientId=self._client, **contact)
+        bullet.changeDynamics(self._add(0.0, shape, [0, -top, 0]), -1, **contact)
 
     def advance(self, steps: int) -> None:
-        step, client = self._bullet.stepSimulation, self._client
+        step, client = self._bullet.module.stepSimulation, self._bullet.client
         for _ in range(steps):
             step(client)
 
@@ -124,8 +112,8 @@ class PyBulletSimulation(Simulation):
 
     def _states_after_each(self, steps: int, count: int) -> Array:
         """The states after each of `count` times `steps` steps, shape (count, 13), without look-ups: reading costs as much as a step."""
-        step, pose, rates = self._bullet.stepSimulation, self._bullet.getBasePositionAndOrientation, self._bullet.getBaseVelocity
-        body, client, numbers = self._body, self._client, list[float]()
+        bullet, client, body, numbers = self._bullet.module, self._bullet.client, self._body, list[float]()
+        step, pose, rates = bullet.stepSimulation, bullet.getBasePositionAndOrientation, bullet.getBaseVelocity
         for _ in range(count):
             for _ in range(steps):
                 step(client)
@@ -142,14 +130,12 @@ class PyBulletSimulation(Simulation):
         rows[0] = self.state()
         for first in range(1, len(rows), CHUNK):
             rows[first : first + CHUNK] = self._states_after_each(every, min(CHUNK, len(rows) - first))
-        self.known_limitations = list(_limitations_met(rows, self._dt, self._fall if self._grips else None)) if every == 1 else []
-        if every == 1 and self._turning_slip_of is not None:
-            self.known_limitations += _turning_slip(self._turning_slip_of, rows, self._dt)
+        self.known_limitations = list(_limitations_met(self._scene, rows, self._dt, self._is_maximal)) if every == 1 else []
         return rows
 
     def as_built(self) -> AsBuilt:
-        dynamics = self._bullet.getDynamicsInfo(self._body, -1, physicsClientId=self._client)
-        world = self._bullet.getPhysicsEngineParameters(physicsClientId=self._client)
+        dynamics = self._bullet.getDynamicsInfo(self._body, -1)
+        world = self._bullet.getPhysicsEngineParameters()
         gravity = np.array([world[f"gravityAcceleration{axis}"] for axis in "XYZ"])
         return AsBuilt(dynamics[0], np.diag(dynamics[2]), gravity)
 
@@ -157,57 +143,69 @@ class PyBulletSimulation(Simulation):
         if self._uses == MOST_USES or not np.isfinite(self.state()).all():
             self._reset()
             return
-        for number in reversed(range(self._bullet.getNumBodies(physicsClientId=self._client))):
-            body = self._bullet.getBodyUniqueId(number, physicsClientId=self._client)
-            self._bullet.removeBody(body, physicsClientId=self._client)
-        self._idle.append((self._client, self._uses + 1))
+        for number in reversed(range(self._bullet.getNumBodies())):
+            self._bullet.removeBody(self._bullet.getBodyUniqueId(number))
+        self._idle.append((self._bullet, self._uses + 1))
 
     def _reset(self) -> None:
-        self._bullet.resetSimulation(physicsClientId=self._client)
-        self._idle.append((self._client, 0))
+        self._bullet.resetSimulation()
+        self._idle.append((self._bullet, 0))
 
 
-_idle: dict[str, list[tuple[int, int]]] = {}
+class _Connection:
+    """A connection to a physics server in this process: PyBullet's functions with its number."""
+
+    def __init__(self) -> None:
+        self.module = _import_quietly()
+        self.client = int(self.module.connect(self.module.DIRECT))
+        if self.client < 0:
+            raise RuntimeError("PyBullet returned no connection")
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self.module, name)
+        return partial(found, physicsClientId=self.client) if callable(found) else found
+
+
+_idle: dict[str, list[tuple[_Connection, int]]] = {}
 """Unused connections, by profile, and how often each was used since it was reset; they give the bits that new ones give."""
 
 
-def _limitations_met(rows: Array, dt: float, fall: Array | None) -> Iterator[KnownLimitation]:
-    """Bullet's known limitations that a motion met.
-
-    Args:
-        rows: States at every step, shape (n, 13).
-        dt: Time step [s].
-        fall: The velocity that gravity adds in a step [m/s], shape (3,), where the floor grips; else None.
-    """
+def _limitations_met(scene: Scenario, rows: Array, dt: float, is_maximal: bool) -> Iterator[KnownLimitation]:
+    """Bullet's known limitations that a motion met, with states at every step, shape (n, 13)."""
     turn = float(np.linalg.norm(rows[:, SPIN], axis=1).max()) * dt
     if turn > LARGEST_TURN:
         yield KnownLimitation(
             f"the body turns by up to {turn:.3g} rad a step; Bullet's rotations are too small beyond π/4", {"orientation_error": np.pi}
         )
-    if fall is None:
+    if scene.floor is None:
         return
+    fall, friction = dt * scene.acceleration, scene.floor.coefficient
     pushes = np.diff(rows[:, VELOCITY], axis=0) - fall
     along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
-    if bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
+    if np.isinf(friction) and bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
         yield KnownLimitation(
             f"a contact needs more than {STRONGEST_FRICTION:g} times its normal force to stick; Bullet clamps friction there, so it slips"
         )
+    if is_maximal and 0.0 < friction < np.inf:
+        struck = (up > NO_PUSH * np.abs(up).max()) & (along > (1.0 + NO_PUSH) * friction * up)
+        if struck.any():
+            ratio = float((along[struck] / up[struck]).max()) / friction
+            yield _turning_slip(scene, rows, dt, ratio, friction * float(up[struck].max()))
 
 
-def _turning_slip(scene: Scenario, rows: Array, dt: float) -> Iterator[KnownLimitation]:
-    """The limitation of friction in maximal coordinates, for a motion with states at every step, shape (n, 13).
+def _turning_slip(scene: Scenario, rows: Array, dt: float, ratio: float, wrong: float) -> KnownLimitation:
+    """The limitation of friction in maximal coordinates.
 
     Bullet limits friction along the first direction of the slip and across it, each by µ times the normal force. Where the slip turns in an
     impact with the normal impulse J, the impulse along the floor is wrong by up to µ J, and the velocity at the floor by a = µ J/M.
+
+    Args:
+        scene: The scene.
+        rows: States at every step, shape (n, 13).
+        dt: Time step [s].
+        ratio: The largest impulse along the floor, over µ times the normal one.
+        wrong: a, the error of the velocity at the floor [m/s].
     """
-    assert scene.floor is not None
-    pushes = np.diff(rows[:, VELOCITY], axis=0) - dt * scene.acceleration
-    along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
-    struck = (up > NO_PUSH * np.abs(up).max()) & (along > (1.0 + NO_PUSH) * scene.floor.coefficient * up)
-    if not struck.any():
-        return
-    ratio = float((along[struck] / up[struck]).max()) / scene.floor.coefficient
-    wrong = scene.floor.coefficient * float(up[struck].max())
     body, motion, left = scene.body, Trajectory.from_states(dt * np.arange(len(rows), dtype=float), rows), dt * len(rows)
     fastest = float(np.max(np.linalg.norm(motion.velocity, axis=1) + body.size * np.linalg.norm(motion.angular_velocity, axis=1)))
     height = scene.clearance if scene.starts_above_floor else body.size
@@ -226,7 +224,7 @@ def _turning_slip(scene: Scenario, rows: Array, dt: float) -> Iterator[KnownLimi
         sizes |= {"angular_momentum_error": turned, "angular_momentum_direction_error": min(np.pi, 0.5 * np.pi * turned)}
     if g > 0.0 and scene.starts_above_floor:
         sizes["bounce_height_error"] = wrong * (fastest + 0.5 * wrong) / (g * height)
-    yield KnownLimitation(
+    return KnownLimitation(
         "in maximal coordinates Bullet limits friction along the initial slip and across it separately: the slip turns, and the impulse "
         f"along the floor is up to {ratio:.3g} µ times the normal one; coordinates=multibody keeps the cone",
         sizes,

@@ -58,7 +58,7 @@ class StandIn(Engine):
         raise NotImplementedError(f"{self.label} is simulated in its own process only")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self.traits, dict(self.options))
+        return stand_in, (self.traits.model_copy(update={"options": dict(self.options)}),)
 
 
 def traits(source: str, engine: Engine, loaded: frozenset[str]) -> Traits:
@@ -103,7 +103,3 @@ def stand_in(known: Traits) -> StandIn:
     members = {"traits": known} | {name: getattr(known, name) for name in STATED}
     kind: type[StandIn] = type("StandIn", (StandIn,), members)
     return kind(known.options)
-
-
-def _restored(known: Traits, options: dict[str, str]) -> StandIn:
-    return stand_in(known.model_copy(update={"options": options}))

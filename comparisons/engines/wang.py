@@ -169,5 +169,5 @@ def _reference_worlds(scenes: Sequence[Scenario]) -> reference_impl.World:
     return reference_impl.World(
         gravity=None if gravity[0] is None else np.array(gravity),
         floor=None if floor[0] is None else reference_impl.Floor(*np.transpose(floor)),
-        damping=None if damping[0] is None else (np.transpose(damping)[0], np.transpose(damping)[1]),
+        damping=None if damping[0] is None else tuple(np.transpose(damping)),
     )

@@ -25,9 +25,9 @@ def turn_mujoco(simulation, added, axes):
 
 
 def turn_pybullet(simulation, added, axes):
-    state, body, client = simulation.state(), simulation._body, simulation._client
+    state, body = simulation.state(), simulation._body
     turned = state[SPIN] + added @ axes
-    simulation._bullet.resetBaseVelocity(body, state[VELOCITY].tolist(), turned.tolist(), physicsClientId=client)
+    simulation._bullet.resetBaseVelocity(body, state[VELOCITY].tolist(), turned.tolist())
 
 
 TURNS = {WangSimulation: turn_document, MuJoCoSimulation: turn_mujoco, PyBulletSimulation: turn_pybullet}

@@ -20,19 +20,9 @@ def rendered(template: str, scene: Scenario, **values: Any) -> str:
     assert scene.floor is not None
     body = scene.body
     extents = [body.radius] if isinstance(body, Sphere) else body.vertices.max(axis=0)[[2, 0, 1]].tolist()
-    return (
-        _templates()
-        .get_template(template)
-        .render(
-            shape="ball" if isinstance(body, Sphere) else "box",
-            extents=extents,
-            lowest=extents[-1],
-            mass=body.mass,
-            gravity=-scene.acceleration[1],
-            restitution=scene.floor.restitution,
-            **values,
-        )
-    )
+    values |= {"shape": "ball" if isinstance(body, Sphere) else "box", "extents": extents, "lowest": extents[-1]}
+    values |= {"mass": body.mass, "gravity": -scene.acceleration[1], "restitution": scene.floor.restitution}
+    return _templates().get_template(template).render(values)
 
 
 def can_be_pasted(scene: Scenario) -> bool:

@@ -185,16 +185,14 @@ def _forms(h: tuple[float, ...], claimed: float | None, one_start: bool) -> _For
     if claimed is not None:
         nearest = np.argmin(np.abs(ORDERS - claimed))
         weights = 0.5 * weights + 0.5 * (np.arange(len(ORDERS)) == nearest)
-    covariances, leading, orders, logs, ratios = [], [], [], [], []
+    forms = []
     for order, weight, ratio_of_weights in zip(ORDERS, weights, unclaimed / weights, strict=True):
         for terms, observed, chance in _series(steps, float(order), one_start):
             for discrepancy, share in DISCREPANCIES.items():
-                covariances.append(terms.T @ terms + discrepancy**2 * np.eye(len(steps)))
-                leading.append(steps**order)
-                orders.append(observed)
-                ratios.append(math.log(ratio_of_weights))
-                logs.append(math.log(weight * share * chance))
-    return _Forms(np.array(covariances), np.array(leading), np.array(orders), np.array(logs), np.array(ratios))
+                covariance = terms.T @ terms + discrepancy**2 * np.eye(len(steps))
+                logs = math.log(weight * share * chance), math.log(ratio_of_weights)
+                forms.append((covariance, steps**order, observed, *logs))
+    return _Forms(*map(np.array, zip(*forms, strict=True)))
 
 
 def _series(steps: Array, order: float, one_start: bool) -> Iterator[tuple[Array, float, float]]:

@@ -17,6 +17,7 @@ from pydantic import Field
 from tomlkit.items import Item
 
 from dropspin.comparisons.engines.options import engine_name
+from dropspin.comparisons.judging.convergence import STUDIES
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.symmetries import kind_of
 from dropspin.comparisons.regressions.changes import KEY, Digests, leaves
@@ -39,8 +40,12 @@ EXTRA_DIGITS = 3
 """Number of additional digits with which a value is written, so that its rounding error is at most 1/200 of the tolerance."""
 LARGEST_RATIO = 1e17
 """Largest ratio of a value to its tolerance that adds digits: a double has no more."""
-SUFFIXES = {"_order": "order", "_asymptotic_error": "asymptotic_error"}
-"""Suffixes of the names of results that are fitted to several time steps, and the kinds of such results."""
+NAMES = (
+    {name: (name, metric.kind) for name, metric in METRICS.items()}
+    | {name: (name, "ensemble") for name in ENSEMBLE_METRICS}
+    | {f"{name}_{kind}": (name, kind) for name in METRICS for kind in STUDIES}
+)
+"""The metric and the kind of a result by its name in the file; a symmetry has its own name."""
 KEY_LENGTH = 7
 """Number of digits of the hash that identifies an acceptance."""
 HEADER = (
@@ -158,25 +163,15 @@ def _row(where: str, keys: tuple[str, ...], content: Any, acceptances: Mapping[s
     scene, engine, steps, name = keys
     _verify_steps(f"{where}: results of {scene}, {engine}", steps)
     here = f"{where}: results of {scene}, {current_label(engine)}, {steps}: {name}"
-    metric, kind = _metric_and_kind(here, name)
+    if name not in NAMES and kind_of(name) is None:
+        raise DropspinError(f"{here}: no such result.{did_you_mean(name, NAMES)}")
+    metric, kind = NAMES.get(name, (name, kind_of(name)))
     line = validated(_Line, here, content)
     if line.by not in acceptances:
         raise DropspinError(f"{here}: by: got {line.by!r}; accepted are {', '.join(acceptances) or 'none'}.")
     unit = "1" if kind in ("order", *OF_SYMMETRIES) else (METRICS.get(metric) or ENSEMBLE_METRICS[metric]).unit
     identity = dict(zip(KEY, (scene, current_label(engine), steps, metric, kind), strict=True))
     return identity | line.model_dump() | {"unit": unit}
-
-
-def _metric_and_kind(where: str, name: str) -> tuple[str, str]:
-    """The metric and the kind of a result, from its name in the file."""
-    kinds = {name: metric.kind for name, metric in METRICS.items()} | dict.fromkeys(ENSEMBLE_METRICS, "ensemble")
-    kind = kinds.get(name) or kind_of(name)
-    if kind is not None:
-        return name, kind
-    for ending, kind in SUFFIXES.items():
-        if name.endswith(ending) and name.removesuffix(ending) in METRICS:
-            return name.removesuffix(ending), kind
-    raise DropspinError(f"{where}: no such result.{did_you_mean(name, kinds)}")
 
 
 def _verify_steps(where: str, steps: str) -> None:
@@ -225,11 +220,10 @@ def _text(baseline: Baseline) -> str:
     cases = {(row["by"], row["scene"], row["engine"], step) for row in held.to_dict("records") for step in row["steps"].split(", ")}
     measured = {(by, *case): digest for by, digests in baseline.motions.items() for case, digest in digests.items()}
     lines += [_assigned(["motions", *key], measured[key]) for key in sorted(cases & measured.keys())]
-    suffixes = {kind: ending for ending, kind in SUFFIXES.items()}
     for _, rows in held.groupby(["scene", "engine", "steps"], sort=False):
         lines.append("")
         for row in rows.to_dict("records"):
-            name = row["metric"] + suffixes.get(row["kind"], "")
+            name = f"{row['metric']}_{row['kind']}" if row["kind"] in STUDIES else row["metric"]
             lines.append(_assigned(["results", row["scene"], row["engine"], row["steps"], name], _line(row)))
     return "\n".join(lines) + "\n"
 

@@ -7,6 +7,7 @@ import datetime
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,8 @@ from dropspin.scenarios import DropspinError
 VERDICTS: dict[str, Verdict] = {"same": "passed", "better": "passed", "worse": "failed", "moved": "failed", "gone": "failed"}
 ACCEPTED = {"order": "accepted order", "asymptotic_error": "accepted asymptotic error", "ensemble": "accepted mean"}
 """The column `truth` of a row of kind `baseline`; `accepted` for all others."""
+
+STALE = "the scene has changed since its results were accepted; accept them again"
 
 
 class NothingAccepted(DropspinError):
@@ -147,17 +150,10 @@ def check(results: Results, baseline: Baseline | None = None) -> Checked:
     found = most_changed_first(found)
     causes = _causes(found, baseline, results)
     noted = found.assign(note=[f"; {CORRECTION}" if number in causes and causes[number].is_correction else "" for number in found.index])
+    stale = accepted.loc[of_other_scenes, ["scene", "engine"]].drop_duplicates().to_numpy()
     rows = [
-        Measurement(
-            scene=scene,
-            engine=engine,
-            kind="baseline",
-            truth="accepted",
-            verdict="failed",
-            reason="the scene has changed since its results were accepted; accept them again",
-            basis="scene_changed",
-        )
-        for scene, engine in accepted.loc[of_other_scenes, ["scene", "engine"]].drop_duplicates().to_numpy()
+        Measurement(scene=scene, engine=engine, kind="baseline", truth="accepted", verdict="failed", reason=STALE, basis="scene_changed")
+        for scene, engine in stale
     ]
     rows += _lost_rows(results, noted[noted["change"] == "gone"])
     for row in noted[~noted["change"].isin(["new", "gone"])].to_dict("records"):
@@ -185,16 +181,16 @@ def _causes(found: pd.DataFrame, baseline: Baseline, results: Results) -> dict[i
     """By the number of its row, the cause to which each failing accepted result is attributed."""
     stamp, digests = results.provenance, digests_of(results.provenance)
     unmoved = [str(engine) for engine, changes in found.groupby("engine")["change"] if set(changes) == {"same"}]
-    known: dict[tuple[str, str, Motion], Attribution] = {}
-    causes = {}
+
+    @cache
+    def attributed(engine: str, by: str, motions: Motion) -> Attribution:
+        return attribute(baseline.acceptances[by].stamp_of(engine), stamp, engine, unmoved, motions)
+
     failing = regressed(found)
-    for number, row in zip(failing.index, failing.to_dict("records"), strict=True):
-        engine, by = row["engine"], row["by"]
-        motions = compared_digests(row, baseline.motions.get(by, {}), digests)
-        if (engine, by, motions) not in known:
-            known[engine, by, motions] = attribute(baseline.acceptances[by].stamp_of(engine), stamp, engine, unmoved, motions)
-        causes[number] = known[engine, by, motions]
-    return causes
+    return {
+        number: attributed(row["engine"], row["by"], compared_digests(row, baseline.motions.get(row["by"], {}), digests))
+        for number, row in zip(failing.index, failing.to_dict("records"), strict=True)
+    }
 
 
 def _with_current_names(baseline: Baseline, results: Results) -> pd.DataFrame:

@@ -5,7 +5,7 @@ import json
 import os
 import platform
 import subprocess
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from email import message_from_string
 from importlib.metadata import PackageNotFoundError, distribution
@@ -35,7 +35,7 @@ def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:
         "asked": dict(asked),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": versions(),
-        "wheels": {package: tag for package in STAMPED if (tag := _wheel(package))},
+        "wheels": {package: tag for package in STAMPED if (tag := _of_package(_wheel, package))},
         "python": platform.python_version(),
         "platform": platform.platform(),
         "cpu": processor(),
@@ -47,7 +47,7 @@ def provenance(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 def versions() -> dict[str, str | None]:
     """Installed versions of the packages that results depend on; None where one is missing."""
-    return {package: _version(package) for package in STAMPED}
+    return {package: _of_package(version, package) for package in STAMPED}
 
 
 def versions_behind(stamp: Mapping[str, Any]) -> dict[str, str]:
@@ -73,29 +73,23 @@ def processor() -> str:
     return named[0] if named else platform.machine()
 
 
-def _version(package: str) -> str | None:
+def _of_package(read: Callable[[str], str], package: str) -> str | None:
+    """What is known of an installed package; None if it is missing."""
     try:
-        return version(package)
+        return read(package)
     except PackageNotFoundError:
         return None
 
 
-def _wheel(package: str) -> str | None:
-    """What a package was built for, such as cp311-cp311-manylinux_2_28_x86_64."""
-    try:
-        wheel = distribution(package).read_text("WHEEL") or ""
-    except PackageNotFoundError:
-        return None
-    return ", ".join(message_from_string(wheel).get_all("Tag", [])) or None
+def _wheel(package: str) -> str:
+    """What a package was built for, such as cp311-cp311-manylinux_2_28_x86_64; empty if that is not known."""
+    return ", ".join(message_from_string(distribution(package).read_text("WHEEL") or "").get_all("Tag", []))
 
 
 def code(*places: Path) -> str:
     """A short hash of the Python files at some places; it shows changes that no version number shows."""
     files = sorted(file for place in places for file in (place.rglob("*.py") if place.is_dir() else [place]))
-    found = hashlib.sha256()
-    for file in files:
-        found.update(file.read_bytes())
-    return found.hexdigest()[:12]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
 
 
 def motion_digest(motions: Iterable[Trajectory]) -> str:

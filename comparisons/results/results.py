@@ -1,6 +1,7 @@
 """A run: its table, its trajectories and its provenance."""
 
 import html
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,6 +20,8 @@ from dropspin.comparisons.results.table import empty_table
 from dropspin.scenarios import Scenario, Trajectory, UnknownName, truth_for
 
 TrajectoryKey = tuple[str, str, float]
+FRAMES = ("table", "predictions", "agreements")
+"""The tables of a run."""
 SMALLEST_STATED = 1e-4
 """Errors below this (relative to the scene's scale, in m or in rad) are not mentioned in summaries and reports."""
 
@@ -77,12 +80,11 @@ class Results:
 
         To select rows of one scene after the other from all rows takes most of the time of a report.
         """
-        names = ("table", "predictions", "agreements")
         texts: dict[str, Any] = dict.fromkeys(self.table.select_dtypes("str"), object)
-        frames = {name: getattr(self, name).astype(texts) for name in names}
+        frames = {name: getattr(self, name).astype(texts) for name in FRAMES}
         rows = {name: dict(iter(frame.groupby("scene"))) for name, frame in frames.items()}
         return {
-            scene: replace(self, scenes={scene: self.scenes[scene]}, **{name: rows[name].get(scene, frames[name][:0]) for name in names})
+            scene: replace(self, scenes={scene: self.scenes[scene]}, **{name: rows[name].get(scene, frames[name][:0]) for name in FRAMES})
             for scene in self.scenes
         }
 
@@ -171,16 +173,13 @@ class Results:
 
     def summary(self) -> str:
         """A line for each engine: how many checks passed and failed, how many runs broke down, and the scenes with model errors."""
-        return "\n".join(self._summary_of(engine) for engine in self.engines)
-
-    def _summary_of(self, engine: str) -> str:
-        verdicts = self.table.loc[self.table["engine"] == engine, "verdict"]
-        parts = [_counted(verdicts)]
-        errors = self.asymptotic_errors("model")
-        scenes = errors.loc[(errors["engine"] == engine) & (errors["value"].abs() > SMALLEST_STATED), "scene"].unique()
-        if len(scenes):
-            parts.append(f"model errors in {', '.join(scenes)}")
-        return f"{engine}: {'; '.join(parts)}."
+        errors, lines = self.asymptotic_errors("model"), []
+        for engine in self.engines:
+            counts = _counted(self.table.loc[self.table["engine"] == engine, "verdict"])
+            scenes = errors.loc[(errors["engine"] == engine) & (errors["value"].abs() > SMALLEST_STATED), "scene"].unique()
+            named = f"; model errors in {', '.join(scenes)}" if len(scenes) else ""
+            lines.append(f"{engine}: {counts}{named}.")
+        return "\n".join(lines)
 
     @property
     def measurements(self) -> pd.DataFrame:
@@ -257,16 +256,8 @@ def joined(parts: Sequence[Results], provenance: Mapping[str, Any]) -> Results:
         for engine, stamped in part.provenance["settings"].items():
             settings.setdefault(engine, {}).update(stamped)
     digests = {engine: digest(stamped) for engine, stamped in settings.items()}
-    table, predictions, agreements = (
-        pd.concat([getattr(part, name) for part in parts], ignore_index=True) for name in ("table", "predictions", "agreements")
-    )
-    return Results(
-        table,
-        dict(item for part in parts for item in part.scenes.items()),
-        parts[0].engines,
-        dict(item for part in parts for item in part.trajectories.items()),
-        dict(item for part in parts for item in part.ensembles.items()),
-        {**provenance, "settings": settings, "settings_digests": digests, "motions": motions},
-        predictions,
-        agreements,
-    )
+    stamp = {**provenance, "settings": settings, "settings_digests": digests, "motions": motions}
+    mappings = ("scenes", "trajectories", "ensembles")
+    united: dict[str, Any] = {name: dict(ChainMap(*(getattr(part, name) for part in reversed(parts)))) for name in mappings}
+    united |= {name: pd.concat([getattr(part, name) for part in parts], ignore_index=True) for name in FRAMES}
+    return Results(engines=parts[0].engines, provenance=stamp, **united)

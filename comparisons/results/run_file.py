@@ -22,6 +22,7 @@ ARRAY_FILE = re.compile(r"(trajectories|ensembles)/[A-Za-z0-9][A-Za-z0-9.=_-]*\.
 
 Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Texts = dict[Text, Text]
+ArrayPath = Annotated[str, Field(pattern=f"^{ARRAY_FILE.pattern}$")]
 
 
 def _time(text: str) -> str:
@@ -74,12 +75,6 @@ class _Provenance(_Table):
     named: list[Text] = []
     compilation: dict[Text, Seconds] = {}
 
-    @model_validator(mode="after")
-    def _versions(self) -> Self:
-        if lacking := set(MEASURING) - self.versions.keys():
-            raise ValueError(f"versions: lacks {', '.join(sorted(lacking))}")
-        return self
-
 
 class RunFile(_Table):
     """The content of `run.json`.
@@ -98,12 +93,12 @@ class RunFile(_Table):
 
     format: int
     provenance: _Provenance
-    engines: list[Text]
-    scenes: dict[Text, dict[str, Any]]
+    engines: Annotated[list[Text], Field(min_length=1)]
+    scenes: Annotated[dict[Text, dict[str, Any]], Field(min_length=1)]
     digests: Texts
     origins: Texts
-    trajectories: dict[str, Case]
-    ensembles: dict[str, Case]
+    trajectories: dict[ArrayPath, Case]
+    ensembles: dict[ArrayPath, Case]
     sha256: dict[str, str]
 
     @model_validator(mode="after")
@@ -111,25 +106,18 @@ class RunFile(_Table):
         asked, engines = self.provenance.asked, set(self.engines)
         paths = {*self.trajectories, *self.ensembles}
         cases = [*self.trajectories.values(), *self.ensembles.values()]
-        drawn = [asked.draw, asked.seed] != [None, None]
         problems = {
-            "engines: one is listed twice, or none": not engines or len(engines) < len(self.engines),
-            "scenes: there are none": not self.scenes,
+            "engines: one is listed twice": len(engines) < len(self.engines),
             "digests and origins must be those of the scenes": not self.digests.keys() == self.origins.keys() == self.scenes.keys(),
             "trajectories and ensembles must be of the run's scenes, engines and time steps": not all(
                 one.scene in self.scenes and one.engine in engines and one.dt in asked.dts for one in cases
             ),
-            "trajectories and ensembles: a path is none that dropspin writes": not all(map(ARRAY_FILE.fullmatch, paths)),
             "sha256 must have every file that is loaded": self.sha256.keys() != {FILE, TABLE, *paths},
+            f"provenance: versions must have {', '.join(MEASURING)}": not self.provenance.versions.keys() >= {*MEASURING},
             "provenance: has engines that the run does not have": not self.provenance.names.keys() <= engines,
-            "provenance: draw, seed and scenes do not agree": drawn
-            and not (
-                asked.draw is not None
-                and asked.seed is not None
-                and asked.draw <= len(asked.scenes)
-                and asked.scenes == list(self.scenes)
-                and self.provenance.names.keys() == engines
-            ),
+            "provenance: draw and seed belong together": (asked.draw is None) != (asked.seed is None),
+            "provenance: draw and scenes do not agree": asked.draw is not None
+            and (asked.draw > len(asked.scenes) or asked.scenes != list(self.scenes) or self.provenance.names.keys() != engines),
         }
         if found := [problem for problem, is_one in problems.items() if is_one]:
             raise ValueError(found[0])

@@ -202,7 +202,8 @@ def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Co
     if lacking := set(scenes) - set(rows.loc[rows["dt"].notna(), "scene"]):
         raise ValueError(f"has no rows of the scene {shown(min(lacking))}")
     for kind, metric, unit in rows[["kind", "metric", "unit"]].drop_duplicates().itertuples(index=False):
-        _verify_kind(kind, metric, unit)
+        if _units(metric).get(kind) != unit:
+            raise ValueError(f"has {metric or 'a remark'} of the kind {kind!r} in the unit {shown(unit)}")
     of_studies = rows["kind"].isin(["order", "asymptotic_error"])
     of_ensembles = rows["metric"].isin(list(ENSEMBLE_METRICS))
     with_ensembles = [name for name, scene in scenes.items() if scene.ensemble is not None]
@@ -218,15 +219,13 @@ def _verify_rows(rows: pd.DataFrame, scenes: Mapping[str, Scenario], engines: Co
         raise ValueError(f"has {found[0]}")
 
 
-def _verify_kind(kind: str, metric: str, unit: str) -> None:
-    """Raise `ValueError` if no row has this kind of this metric in this unit."""
+def _units(metric: str) -> Mapping[str, str]:
+    """The unit of a metric by the kinds of rows that have it."""
     if metric == "":
-        kinds, own = {""}, ""
-    elif (of_symmetry := kind_of(metric)) is not None:
-        kinds, own = {of_symmetry}, "1"
-    elif metric in ENSEMBLE_METRICS:
-        kinds, own = {"ensemble", "agreement"}, ENSEMBLE_METRICS[metric].unit
-    else:
-        kinds, own = {METRICS[metric].kind, "prediction", "other_law", "agreement", "order", "asymptotic_error"}, METRICS[metric].unit
-    if kind not in kinds or unit != ("1" if kind == "order" else own):
-        raise ValueError(f"has {metric or 'a remark'} of the kind {kind!r} in the unit {shown(unit)}")
+        return {"": ""}
+    if metric in ENSEMBLE_METRICS:
+        return dict.fromkeys(("ensemble", "agreement"), ENSEMBLE_METRICS[metric].unit)
+    if metric in METRICS:
+        kinds = METRICS[metric].kind, "prediction", "other_law", "agreement", "asymptotic_error"
+        return dict.fromkeys(kinds, METRICS[metric].unit) | {"order": "1"}
+    return {str(kind_of(metric)): "1"}

@@ -118,8 +118,7 @@ def schema_of(names: Iterable[str], numbers: Iterable[str] = ()) -> pa.Schema:
 
 def as_table(measurements: Sequence[Measurement]) -> pd.DataFrame:
     """Measurements as a table, one row each, with the columns and types of `COLUMNS`."""
-    columns = {name: [getattr(one, name) for one in measurements] for name in COLUMNS}
-    return pd.DataFrame({name: pd.Series(values, dtype=COLUMNS[name]) for name, values in columns.items()})
+    return pd.DataFrame(map(vars, measurements), columns=list(COLUMNS)).astype(COLUMNS)
 
 
 def empty_table() -> pd.DataFrame:

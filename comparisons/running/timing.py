@@ -7,12 +7,12 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.engines.base import BatchSimulation, Engine, Simulation, numpy_array
+from dropspin.comparisons.engines.base import Engine, numpy_array
 from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry
 from dropspin.comparisons.running.recording import Breakdown, classify, verify_accepted
 from dropspin.scenarios import Scenario
@@ -48,37 +48,24 @@ class TimedSteps(NamedTuple):
         return self.building + self.call + self.stepping
 
 
-def time_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> TimedSteps:
-    """Time native steps: one, and then others in one call. The call itself may cost a compiled engine as much as hundreds of steps.
+def time_steps(engine: Engine, given: Scenario | Sequence[Scenario], dt: float, steps: int) -> TimedSteps:
+    """Time native steps of a scene, or of a batch of scenes: one, and then others in one call.
 
-    Raises:
-        Diverged: The simulation broke down.
-    """
-    start = time.perf_counter()
-    simulation = engine.prepare(scene, dt)
-    return _timed(start, simulation, simulation.state, steps)
-
-
-def time_batch(engine: Engine, members: Sequence[Scenario], dt: float, steps: int) -> TimedSteps:
-    """As `time_steps`, of a batch.
+    The call itself may cost a compiled engine as much as hundreds of steps.
 
     Raises:
         Breakdown: The engine cannot simulate batches.
         Diverged: The simulation broke down.
     """
-    start = time.perf_counter()
-    batch = engine.prepare_batch(members, dt)
-    if batch is None:
+    times = [time.perf_counter()]
+    simulation: Any = engine.prepare(given, dt) if isinstance(given, Scenario) else engine.prepare_batch(given, dt)
+    times.append(time.perf_counter())
+    if simulation is None:
         raise Breakdown("declined", "the engine cannot simulate batches")
-    return _timed(start, batch, lambda: numpy_array(batch.states()), steps)
-
-
-def _timed(start: float, simulation: Simulation | BatchSimulation, state: Callable[[], NDArray[np.float64]], steps: int) -> TimedSteps:
-    times = [start, time.perf_counter()]
     with simulation:
         for number in (1, steps):
             simulation.advance(number)
-            last = state()
+            last = simulation.state() if isinstance(given, Scenario) else numpy_array(simulation.states())
             times.append(time.perf_counter())
     building, call, stepping = (later - earlier for earlier, later in pairwise(times))
     return TimedSteps(building, call, stepping, steps, last)

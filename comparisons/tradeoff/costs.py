@@ -20,7 +20,6 @@ from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.timing import (
     TIMING_REPEATS,
     TimedSteps,
-    time_batch,
     time_per_step,
     time_steps,
     timings,
@@ -77,7 +76,7 @@ def costs_per_world(entry: EngineEntry, scene: Scenario, dts: Sequence[float], w
     """
     found = []
     for dt in dts[-1:] if scene.floor is None else dts:
-        timed, steps = partial(_finite, time_batch, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
+        timed, steps = partial(_finite, time_steps, entry.adapter, [scene] * worlds, dt), scene.steps(dt)
         found.append(math.nan)
         with suppress(Diverged):
             timed(1)  # compiles
@@ -111,12 +110,12 @@ def memory_per_world(entry: EngineEntry, scene: Scenario, dt: float, worlds: int
     members = [scene] * worlds
     if not (PROCESS / "clear_refs").exists():
         return math.nan
-    time_batch(entry.adapter, members, dt, MEMORY_STEPS)
+    time_steps(entry.adapter, members, dt, MEMORY_STEPS)
     if hasattr(libc := ctypes.CDLL(None), "malloc_trim"):  # of glibc
         libc.malloc_trim(0)
     (PROCESS / "clear_refs").write_text("5")  # sets the peak to the present memory
     before = _process_memory("VmRSS")
-    time_batch(entry.adapter, members, dt, MEMORY_STEPS)
+    time_steps(entry.adapter, members, dt, MEMORY_STEPS)
     return (_process_memory("VmHWM") - before) / worlds
 
 

@@ -135,12 +135,8 @@ class EngineStudy:
     @cached_property
     def series(self) -> Mapping[str, list[SeriesPoint]]:
         """The errors at each time step, by metric."""
-        found: dict[str, list[SeriesPoint]] = {}
-        for outcome in self.outcomes:
-            for name, point in outcome.points.items():
-                if name not in ARTEFACTS:
-                    found.setdefault(name, []).append(point)
-        return found
+        names = dict.fromkeys(name for outcome in self.outcomes for name in outcome.points if name not in ARTEFACTS)
+        return {name: [outcome.points[name] for outcome in self.outcomes if name in outcome.points] for name in names}
 
     def cause(self, name: str) -> Convergence:
         """Decide the cause of the errors of a metric.
@@ -215,13 +211,6 @@ class EngineStudy:
                 self.added[entry.label, dt] = outcome.points
             points.append(self.added.get((entry.label, dt), {}).get(metric.name))
         return [point for point in points if point is not None]
-
-    def is_default_of(self, other: "EngineStudy") -> bool:
-        """Whether another engine is this one with calibrated instead of default settings."""
-        engine, calibrated = self.entry.engine, other.entry.engine
-        if engine is None or calibrated is None or engine.name != calibrated.name or "profile" in calibrated.options:
-            return False
-        return engine.options == {**calibrated.options, "profile": "default"}
 
 
 def _claim(runs: Sequence[EngineRun]) -> Claim:

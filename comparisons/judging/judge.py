@@ -21,6 +21,7 @@ from dropspin.comparisons.measuring.tolerances import negligible
 from dropspin.scenarios import DropspinError, Scenario, SceneError, Truth
 from dropspin.scenarios.errors import did_you_mean
 from dropspin.scenarios.model import Expectation
+from dropspin.scenarios.validation import key_of
 
 
 def judge(
@@ -211,11 +212,9 @@ def _bounds(expectation: Expectation, metric: Metric) -> tuple[float, float]:
 def verify_expectations(scene: Scenario, truth: Truth | None, engines: Iterable[str]) -> None:
     """Raise `SceneError` if an expectation has an unknown metric or engine, or a metric that does not apply to the scene."""
     known = {*BUILT_IN, *map(engine_name, engines)}
+    where, root = (f"{scene.origin}: ", "") if scene.origin else ("", "scene")
     for number, expectation in enumerate(scene.expect):
-        metric_key, engine_key = (
-            f"{scene.origin}: expect[{number}].{key}" if scene.origin else f"scene['expect'][{number}][{key!r}]"
-            for key in ("metric", "engine")
-        )
+        metric_key, engine_key = (where + key_of(["expect", number, key], root) for key in ("metric", "engine"))
         name = expectation.metric
         if name not in METRICS:
             raise SceneError(f"{metric_key}: got {name!r}; no such metric.{did_you_mean(name, METRICS)} Known: {', '.join(METRICS)}.")

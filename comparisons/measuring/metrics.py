@@ -141,7 +141,7 @@ def rest_time_error(case: Comparison) -> float:
 
     The body is in motion while its kinetic energy, including rotation, exceeds M (2 g dt)²/2 and 1e-6 M g times its size.
     """
-    found, exact = (last_time_in_motion(case.scene, motion) for motion in (case.compared, case.exact))
+    found, exact = (float(motion.t[Motions.of(case.scene, motion).last_row_in_motion]) for motion in (case.compared, case.exact))
     if exact == 0.0:
         raise Unresolved(f"the body is never faster than 2 g dt, with dt = {case.dt:g} s")
     return (found - exact) / exact
@@ -257,11 +257,6 @@ def leading_metric(scene: Scenario) -> str:
     motion = truth(np.linspace(0.0, min(scene.duration, truth.horizon), 9))
     turned = angle_between_orientations(motion.orientation[:1], motion.orientation)
     return "orientation_error" if turned.max() > TURNED else "position_error"
-
-
-def last_time_in_motion(scene: Scenario, motion: Trajectory) -> float:
-    """The time [s] of `Motions.last_row_in_motion`."""
-    return float(motion.t[Motions.of(scene, motion).last_row_in_motion])
 
 
 def _largest(values: Array) -> float:

@@ -184,11 +184,8 @@ def classify(error: BaseException) -> Breakdown:
     """The verdict for what an adapter raised: an engine is somebody else's code, so any exception costs its own row only."""
     if isinstance(error, Breakdown):
         return error.with_traceback(None)
-    if isinstance(error, Diverged):
-        return Breakdown("diverged", short(str(error)))
-    if isinstance(error, BuildMismatch):
-        return Breakdown("crashed", short(str(error)))
-    return Breakdown("crashed", described(error))
+    reason = short(str(error)) if isinstance(error, Diverged | BuildMismatch) else described(error)
+    return Breakdown("diverged" if isinstance(error, Diverged) else "crashed", reason)
 
 
 def finite(recording: Recording | Breakdown) -> Trajectory:

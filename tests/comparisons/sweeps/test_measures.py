@@ -13,8 +13,8 @@ import dropspin as ds
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.measuring.batch import motions_side_by_side
 from dropspin.comparisons.measuring.comparison import Comparison
-from dropspin.comparisons.measuring.metrics import METRICS, last_time_in_motion
-from dropspin.comparisons.measuring.motions import Setup
+from dropspin.comparisons.measuring.metrics import METRICS
+from dropspin.comparisons.measuring.motions import Motions, Setup
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, run_scenes, standard_metrics
 from dropspin.comparisons.sweeps.spec import load_sweep
@@ -32,7 +32,7 @@ def metrics_of_a_run(scene, motion):
     values = [metric.value_or_nan([case]) if metric.applies(scene, None) else np.nan for metric in by_name]
     contact = case.first_contact
     rebound = 0.0 if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1]
-    return [*values, rebound, last_time_in_motion(scene, motion)]
+    return [*values, rebound, float(motion.t[Motions.of(scene, motion).last_row_in_motion])]
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import cache, partial
 from importlib import import_module
 from itertools import chain
@@ -234,18 +233,12 @@ def _turning_slip(scene: Scenario, rows: Array, dt: float, ratio: float, wrong: 
 @cache
 def _import_quietly() -> Any:
     """Import pybullet without the build date that it writes to the standard error of every process."""
-    with _no_standard_error():
-        return import_module("pybullet")
-
-
-@contextmanager
-def _no_standard_error() -> Iterator[None]:
     sys.stderr.flush()
     kept = os.dup(2)
     with open(os.devnull, "wb") as nowhere:
         os.dup2(nowhere.fileno(), 2)
     try:
-        yield
+        return import_module("pybullet")
     finally:
         os.dup2(kept, 2)
         os.close(kept)

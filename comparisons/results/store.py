@@ -5,7 +5,7 @@ A folder may be damaged, or somebody else's: all of it is verified on loading, a
 
 import io
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -91,8 +91,8 @@ def _loaded(folder: Path, file: RunFile, provenance: Mapping[str, Any], arrays: 
     read_table = partial(results_table, scenes=scenes, engines=file.engines, dts=file.provenance.asked.dts, is_earlier=is_earlier)
     rows = _from_file(folder, TABLE, file, read_table)
     read_outcome = partial(_outcome, most=QUICK_MEMBERS if file.provenance.asked.quick else None)
-    trajectories = dict(_arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory))
-    ensembles = dict(_arrays(folder, file, file.ensembles if arrays else {}, scenes, read_outcome))
+    trajectories = _arrays(folder, file, file.trajectories if arrays else {}, scenes, _trajectory)
+    ensembles = _arrays(folder, file, file.ensembles if arrays else {}, scenes, read_outcome)
     is_prediction, is_agreement = (rows["kind"] == kind for kind in ("prediction", "agreement"))
     table, *others = (rows[kept].reset_index(drop=True) for kept in (~(is_prediction | is_agreement), is_prediction, is_agreement))
     return Results(table, scenes, tuple(file.engines), trajectories, ensembles, provenance, *others)
@@ -110,10 +110,11 @@ def _scene(file: RunFile, name: str) -> Scenario:
 
 def _arrays(
     folder: Path, file: RunFile, files: Mapping[str, Case], scenes: Mapping[str, Scenario], read: Callable[..., Kept]
-) -> Iterator[tuple[TrajectoryKey, Kept]]:
-    for path, case in files.items():
-        found = _from_file(folder, path, file, partial(read, scene=scenes[case.scene], dt=case.dt))
-        yield (case.scene, case.engine, case.dt), found
+) -> dict[TrajectoryKey, Kept]:
+    return {
+        (case.scene, case.engine, case.dt): _from_file(folder, path, file, partial(read, scene=scenes[case.scene], dt=case.dt))
+        for path, case in files.items()
+    }
 
 
 def _trajectory(content: bytes, scene: Scenario, dt: float) -> Trajectory:

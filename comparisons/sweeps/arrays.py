@@ -6,7 +6,7 @@ by itself.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from dropspin.comparisons.measuring.motions import Setup
 from dropspin.comparisons.running.inputs import FEWEST_STEPS, MOST_STEPS
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
 from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
-from dropspin.comparisons.sweeps.outcomes import Outcomes, requested_metrics
+from dropspin.comparisons.sweeps.outcomes import Outcomes, not_run, requested_metrics, standard_metrics
 from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.ensemble import clearances, spread_starts
@@ -30,24 +30,25 @@ from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP
 from dropspin.scenarios.variations import Path, path_of, set_field, with_fields
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 FRICTION = "floor.friction"
 ARRAY_FIELDS = {("floor", "restitution"), ("floor", "friction"), ("floor", "rest_speed"), ("damping", "linear"), ("damping", "angular")}
 
 
-def run_side_by_side(jobs: Jobs, outcomes: Outcomes, metrics: tuple[str, ...]) -> None:
-    """Run the jobs that can be run side by side; the verdicts of all others stay empty."""
+def run_side_by_side(jobs: Jobs, metrics: tuple[str, ...]) -> Outcomes:
+    """The outcomes of the jobs that can be run side by side; the verdicts of all others stay empty."""
+    outcomes = not_run(len(jobs), metrics)
     for indices in _groups(jobs):
         group = jobs[indices]
         engine, scene = group.engine_at(0), _representative_scene(group)
         # The steps that a sequential contact leaves unsolved are reported for each job, and are counted only for a job by itself.
         if isinstance(engine, Wang) and engine.option("contact") == "mean" and scene is not None and engine.declines(scene) is None:
             steps = _steps(group, scene)
-            order = np.argsort(steps, kind="stable")[np.count_nonzero(steps == 0) :]
-            for batch in _batches(steps[order]):
-                chosen = order[batch]
-                _run_batch(group[chosen], indices[chosen], steps[chosen], engine, scene, outcomes, metrics)
+            ordinary = np.argsort(steps, kind="stable")[np.count_nonzero(steps == 0) :]
+            batches = 1 + len(ordinary) * (1 + int(steps.max())) * 13 * 8 // BATCH_BYTES
+            for chosen in filter(len, np.array_split(ordinary, batches)):
+                outcomes[indices[chosen]] = _of_batch(group[chosen], steps[chosen], engine, scene, metrics)
+    return outcomes
 
 
 def _is_array_field(name: str, column: NDArray[Any]) -> bool:
@@ -57,17 +58,14 @@ def _is_array_field(name: str, column: NDArray[Any]) -> bool:
     return column.dtype == float and (in_vector or path in ARRAY_FIELDS or path[0] in ("duration", "body"))
 
 
-def _groups(jobs: Jobs) -> Iterator[Indices]:
+def _groups(jobs: Jobs) -> Iterable[NDArray[np.intp]]:
     """The indices of jobs that differ only in fields that the kernels take as arrays, and that all have friction or none, as laws need."""
     columns = [column for name, column in jobs.values.items() if name.startswith(OPTION) or not _is_array_field(name, column)]
     columns += [column > 0.0 for name, column in jobs.values.items() if name == FRICTION and column.dtype == float]
-    if not columns:
-        yield np.arange(len(jobs))
-        return
     groups: dict[str, list[int]] = {}
-    for index, values in enumerate(zip(*columns, strict=True)):
-        groups.setdefault(repr(values), []).append(index)
-    yield from map(np.array, groups.values())
+    for index, key in enumerate(map(repr, zip(*columns, strict=True)) if columns else [""] * len(jobs)):
+        groups.setdefault(key, []).append(index)
+    return map(np.array, groups.values())
 
 
 def _representative_scene(jobs: Jobs) -> Scenario | None:
@@ -90,44 +88,30 @@ def _steps(jobs: Jobs, scene: Scenario) -> NDArray[np.int64]:
     return np.floor(np.where(is_ordinary, ratio, 0.0)).astype(np.int64)
 
 
-def _run_batch(
-    jobs: Jobs, indices: Indices, steps: NDArray[np.int64], engine: Wang, scene: Scenario, outcomes: Outcomes, metrics: tuple[str, ...]
-) -> None:
-    """Run jobs in one call of the kernels; the verdict of one that is not ordinary stays empty: a job by itself gives the reason."""
+def _of_batch(jobs: Jobs, steps: NDArray[np.int64], engine: Wang, scene: Scenario, metrics: tuple[str, ...]) -> Outcomes:
+    """The outcomes of jobs in one call of the kernels; the verdict of one that is not ordinary stays empty: by itself it has a reason."""
+    outcomes = not_run(len(jobs), metrics)
     body, world, setup, starts, is_ordinary = _parameters(jobs, scene)
     if not is_ordinary.all():
         if is_ordinary.any():
-            _run_batch(jobs[is_ordinary], indices[is_ordinary], steps[is_ordinary], engine, scene, outcomes, metrics)
-        return
+            outcomes[is_ordinary] = _of_batch(jobs[is_ordinary], steps[is_ordinary], engine, scene, metrics)
+        return outcomes
     try:
         simulator = reference_impl.Simulator(body, world, jobs.dts, engine.methods())
         start = time.perf_counter()
         states = simulator.run(starts, int(steps[-1]), threads=1)
-        outcomes.time_per_step[indices] = (time.perf_counter() - start) / (int(steps[-1]) * len(jobs))
+        outcomes.time_per_step = (time.perf_counter() - start) / (int(steps[-1]) * len(jobs))
     except ValueError:
-        return  # a value that the kernels refuse
+        return outcomes  # a value that the kernels refuse
     motions, valid = motions_side_by_side(setup, states, jobs.dts, 0.5 * jobs.dts, steps, UNIT_TOLERANCE)
-    if not valid.any():
-        return
-    if not valid.all():
-        jobs, indices, steps, setup, states = jobs[valid], indices[valid], steps[valid], setup[valid], states[valid]
-        motions, _ = motions_side_by_side(setup, states, jobs.dts, 0.5 * jobs.dts, steps, UNIT_TOLERANCE)
-    outcomes.set_measured(indices, states, motions)
-    for number, row in enumerate(indices if metrics else ()):
+    outcomes.verdict[valid], outcomes.steps[valid] = "measured", steps[valid]
+    outcomes.state[valid] = states[np.arange(len(jobs)), steps][valid]
+    outcomes.standard_metrics[valid] = standard_metrics(motions)[valid]
+    for number in np.flatnonzero(valid).tolist() if metrics else ():
         rows, dt = int(steps[number]) + 1, float(jobs.dts[number])
         motion = Trajectory.from_states(dt * np.arange(rows, dtype=float), states[number, :rows], 0.5 * dt)
-        outcomes.metrics[row] = requested_metrics(scene_of(jobs, number), motion, metrics)
-
-
-def _batches(steps: NDArray[np.int64]) -> Iterator[slice]:
-    """Slices of jobs, which are in order of their number of steps, whose states take at most `BATCH_BYTES`."""
-    first = 0
-    while first < len(steps):
-        last = first + 1
-        while last < len(steps) and (last + 1 - first) * (1 + steps[last]) * 13 * 8 <= BATCH_BYTES:
-            last += 1
-        yield slice(first, last)
-        first = last
+        outcomes.metrics[number] = requested_metrics(scene_of(jobs, number), motion, metrics)
+    return outcomes
 
 
 def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, reference_impl.World, Setup, Array, NDArray[np.bool_]]:
@@ -136,10 +120,30 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
     A leading axis of 1 stands for values that all jobs share.
     """
     columns = {path_of(name): column for name, column in jobs.fields.items() if _is_array_field(name, column)}
-    bodies, is_ordinary = _bodies(scene, {path: column for path, column in columns.items() if path[0] == "body"})
+
+    def column(*path: str | int, otherwise: Any) -> Array:
+        return columns.get(path, np.full(len(jobs), otherwise))
+
+    def vectors(*path: str, otherwise: Array) -> Array:
+        return np.stack([column(*path, axis, otherwise=value) for axis, value in enumerate(otherwise)], axis=1)
+
+    bodies, is_ordinary = _bodies(scene, {path: values for path, values in columns.items() if path[0] == "body"})
     radius, vertices = (np.array([getattr(body, name) for body in bodies]) for name in ("rounding", "vertices"))
-    starts = _starts(jobs, scene, columns, vertices, radius)
-    world = _world(jobs, scene, columns)
+    starts = np.hstack([vectors("start", kind, otherwise=scene.initial_state[part]) for kind, part in PARTS.items()])
+    if any(path[:2] == ("start", "orientation") for path in columns):
+        starts[:, ORIENTATION] = [unit(tuple(q)) if any(q) else q for q in starts[:, ORIENTATION].tolist()]
+    if jobs.seeds is not None:
+        assert scene.ensemble is not None
+        starts = spread_starts(starts, scene.ensemble, jobs.seeds, vertices, radius, scene.floor is not None)
+    world = reference_world(scene)
+    if world.gravity is not None:
+        world = replace(world, gravity=vectors("gravity", "acceleration", otherwise=world.gravity))
+    if world.floor is not None:
+        floor = (column("floor", name, otherwise=value) for name, value in world.floor._asdict().items())
+        world = replace(world, floor=reference_impl.Floor(*floor))
+    if world.damping is not None:
+        linear, angular = (column("damping", name, otherwise=getattr(scene.damping, name)) for name in ("linear", "angular"))
+        world = replace(world, damping=(linear, angular))
     setup = Setup(
         mass=np.array([body.mass for body in bodies]),
         inertia=np.array([body.inertia_tensor for body in bodies]),
@@ -152,30 +156,9 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
         damping=None if world.damping is None else np.asarray(world.damping[0]),
         floor=scene.floor is not None,
     )
-    if scene.floor is not None:
-        is_ordinary = is_ordinary & (
-            setup.clearance >= -0.5 * TOUCHING * setup.size
-        )  # a start nearer to the limit is left to the scene's own check
+    if scene.floor is not None:  # a start nearer to the limit is left to the scene's own check
+        is_ordinary = is_ordinary & (setup.clearance >= -0.5 * TOUCHING * setup.size)
     return reference_bodies(bodies), world, setup, starts, np.broadcast_to(is_ordinary, len(jobs))
-
-
-def _world(jobs: Jobs, scene: Scenario, columns: dict[Path, Array]) -> reference_impl.World:
-    """What acts on the bodies, one value for each job."""
-
-    def column(path: Path, otherwise: float | Array) -> Array:
-        return columns.get(path, np.full(len(jobs), otherwise))
-
-    world = reference_world(scene)
-    if scene.gravity is not None:
-        gravity = [column(("gravity", "acceleration", axis), value) for axis, value in enumerate(scene.acceleration)]
-        world = replace(world, gravity=np.stack(gravity, axis=1))
-    if world.floor is not None:
-        floor = (column(("floor", name), getattr(world.floor, name)) for name in world.floor._fields)
-        world = replace(world, floor=reference_impl.Floor(*floor))
-    if world.damping is not None:
-        linear, angular = world.damping
-        world = replace(world, damping=(column(("damping", "linear"), linear), column(("damping", "angular"), angular)))
-    return world
 
 
 def _bodies(scene: Scenario, columns: dict[Path, Array]) -> tuple[list[Body], NDArray[np.bool_]]:
@@ -195,19 +178,3 @@ def _bodies(scene: Scenario, columns: dict[Path, Array]) -> tuple[list[Body], ND
     finite = np.isfinite(tensors).all(axis=(1, 2))
     is_definite = np.linalg.eigvalsh(np.where(finite[:, np.newaxis, np.newaxis], tensors, 0.0))[:, 0] > 0.0
     return found, is_definite & np.array([body is not scene.body for body in found])
-
-
-def _starts(jobs: Jobs, scene: Scenario, columns: dict[Path, Array], vertices: Array, radius: Array) -> Array:
-    """The start of each job, shape (B, 13)."""
-    starts = np.tile(scene.initial_state, (len(jobs), 1))
-    for kind, part in PARTS.items():
-        for axis in range(part.stop - part.start):
-            column = columns.get(("start", kind, axis))
-            if column is not None:
-                starts[:, part.start + axis] = column
-    if any(path[:2] == ("start", "orientation") for path in columns):
-        starts[:, ORIENTATION] = [unit(tuple(q)) if any(q) else q for q in starts[:, ORIENTATION].tolist()]
-    if jobs.seeds is None:
-        return starts
-    assert scene.ensemble is not None
-    return spread_starts(starts, scene.ensemble, jobs.seeds, vertices, radius, scene.floor is not None)

@@ -16,7 +16,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from fsspec.implementations.local import LocalFileSystem
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
 
 from dropspin.comparisons.results.folder import is_unfinished, written_whole
 from dropspin.comparisons.results.table import schema_of, stored_table
@@ -32,12 +32,6 @@ SCHEMA = schema_of((*TEXTS, "job", "seed", "steps"), NUMBERS)
 """The columns of every sweep; axes and requested metrics add others, of numbers or texts."""
 
 
-class _Versions(BaseModel):
-    model_config = ConfigDict(strict=True)
-
-    versions: dict[str, str | None]
-
-
 class Description(BaseModel):
     """The required content of `sweep.json`."""
 
@@ -46,7 +40,7 @@ class Description(BaseModel):
     identity: Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
     jobs: Annotated[int, Field(ge=0, le=2**53)]
     part_size: Annotated[int, Field(ge=1, le=2**53)]
-    provenance: _Versions
+    versions: Annotated[dict[str, str | None], Field(validation_alias=AliasPath("provenance", "versions"))]
 
 
 class SweepFolder:

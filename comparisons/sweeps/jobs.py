@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -78,17 +79,13 @@ class Jobs:
             content.pop("ensemble", None)  # which then has no effect
         for place, name in enumerate(self.fields):
             set_field(content, path_of(name), f"<{place}>")
-        template = to_json(content)
-        order = sorted(range(len(self.fields)), key=lambda place: template.index(b'"<%d>"' % place))
-        pieces, rest = [], template
-        for place in order:
-            piece, _, rest = rest.partition(b'"<%d>"' % place)
-            pieces.append(piece)
-        columns = [_as_json(list(self.fields.values())[place]) for place in order]
+        pieces = re.split(rb'"<(\d+)>"', to_json(content))  # every second one is the place of a field
+        columns = [_as_json(list(self.fields.values())[int(place)]) for place in pieces[1::2]]
         keys = []
         for label, dt, seed, *values in zip(self.labels(), self.dts.tolist(), self.starts(), *columns, strict=True):
-            physics = b"".join([part for pair in zip(pieces, values, strict=True) for part in pair]) + rest
-            keys.append(hashlib.sha256(physics + f"\n{label}\n{dt!r}\n{seed}".encode()).hexdigest()[:KEY_DIGITS])
+            pieces[1::2] = values
+            pieces_and_start = b"".join(pieces) + f"\n{label}\n{dt!r}\n{seed}".encode()
+            keys.append(hashlib.sha256(pieces_and_start).hexdigest()[:KEY_DIGITS])
         return keys
 
 

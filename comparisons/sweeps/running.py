@@ -6,15 +6,14 @@ as a sweep on one machine does. If a worker is lost, another one repeats its cur
 
 import multiprocessing
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
 from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.inputs import ignore
-from dropspin.comparisons.running.parallel import as_done, work_in_parallel
+from dropspin.comparisons.running.parallel import as_done, started_crews, work_in_parallel
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.sweeps.folder import Description, SweepFolder, count
+from dropspin.comparisons.sweeps.folder import Description, SweepFolder
 from dropspin.comparisons.sweeps.jobs import Sweep
 from dropspin.comparisons.sweeps.work import Part, Work, installed_versions
 from dropspin.reference_impl.threads import usable_cores
@@ -49,19 +48,18 @@ def run_sweep(
     """
     work = Work.of(sweep, resources)
     folder = SweepFolder(where, work.identity)
-    earlier = folder.description()
-    kept = 0
+    earlier, present = folder.description(), folder.parts()
+    kept = sum(map(len, present))
     if earlier is not None and SweepFolder(where).parts():  # without a part, the sweep may be given again
         _verify_same_sweep(where, earlier, work)
-        kept = count(where)
         if not resume:
             raise DropspinError(
                 f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; resume it with --resume, or choose another folder with -o."
             )
     report = on_progress or ignore
     report(kept)
-    present = {jobs.start for jobs in folder.parts()}
-    missing = (part for part in work.parts if part.first not in present)
+    starts = {jobs.start for jobs in present}
+    missing = (part for part in work.parts if part.first not in starts)
     if scheduler is None:
         folder.begin(work.description)
         _run_here(work, missing, folder, report)
@@ -75,7 +73,7 @@ def _verify_same_sweep(where: str, earlier: Description, work: Work) -> None:
     """Raise `DropspinError` unless a folder holds this sweep, run with the installed versions."""
     if earlier.identity == work.identity:
         return
-    then, now = earlier.provenance.versions, work.versions
+    then, now = earlier.versions, work.versions
     changed = [f"{name} {then.get(name)}, now {now[name]}" for name in now if then.get(name) != now[name]]
     difference = f"a sweep that was run with {', '.join(changed)}" if changed else "another sweep: the specs differ"
     raise DropspinError(f"{where}: holds {difference}; choose another folder with -o.")
@@ -85,8 +83,7 @@ def _run_here(work: Work, parts: Iterator[Part], folder: SweepFolder, on_progres
     def run_part(part: Part, processes: EngineProcesses, raise_if_stopping: Callable[[], None]) -> None:
         folder.write(*part, work.table(part, processes, raise_if_stopping))
 
-    with ExitStack() as stack:
-        crews = [stack.enter_context(EngineProcesses(work.resources)) for _ in range(usable_cores())]
+    with started_crews(None, usable_cores(), [], work.resources) as crews:
         work_in_parallel(parts, run_part, crews, lambda part, _: on_progress(part.last - part.first), lambda: on_progress(0))
 
 

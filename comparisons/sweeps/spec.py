@@ -1,7 +1,8 @@
 """The spec of a sweep: a TOML file or a mapping, verified before anything runs."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import permutations
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -97,14 +98,13 @@ def load_sweep(spec: str | Path | Mapping[str, Any]) -> Sweep:
     else:
         where, content, folder = str(spec), read_toml(Path(spec), str(spec), "spec"), Path(spec).parent
     written = validated(Spec, where, content)
-    draws = validated(Draws, f"{where}: random", written.random) if written.random else None
-    axes = _axes(where, written.grid)
-    if draws is not None:
+    axes, draws = _axes(f"{where}: grid", written.grid), None
+    if written.random:
+        draws = validated(Draws, f"{where}: random", written.random)
+        axes += _axes(f"{where}: random", draws.model_extra or {}, draws)
         if not draws.model_extra:
-            raise DropspinError(
-                f"{where}: random: no field is given; add one with its range, such as body.mass = {{from = 1.0, to = 2.0}}."
-            )
-        axes += _axes(where, draws.model_extra, draws)
+            example = "body.mass = {from = 1.0, to = 2.0}"
+            raise DropspinError(f"{where}: random: no field is given; add one with its range, such as {example}.")
     sweep = Sweep(
         scenes=tuple(_scene(where, name, folder) for name in written.scenes),
         engines=tuple(present_entry(name).adapter for name in written.engines),
@@ -126,23 +126,22 @@ def _scene(where: str, name: str, folder: Path) -> Scenario:
         raise DropspinError(f"{where}: scenes: {error}") from None
 
 
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Axes by their dotted names: TOML reads floor.restitution without quotes as a table in a table."""
-    found = {}
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Fields by their dotted names: TOML reads floor.restitution without quotes as a table in a table."""
     for key, value in table.items():
-        is_table = isinstance(value, Mapping) and not {"from", "to", "count"} & value.keys()
-        for name, given in (_flattened(value, f"{prefix}{key}.") if is_table else {f"{prefix}{key}": value}).items():
-            if name in found:
-                raise DropspinError(f"{name}: is given twice; give it once.")
-            found[name] = given
-    return found
+        if isinstance(value, Mapping) and not {"from", "to", "count"} & value.keys():
+            yield from _flattened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
 
 
 def _axes(where: str, table: Mapping[str, Any], draws: Draws | None = None) -> list[SweepAxis]:
     """The axes of the table [grid], or of [random] with its draws."""
     axes: list[SweepAxis] = []
-    for name, given in _flattened(table).items():
-        here = f"{where}: {'grid' if draws is None else 'random'}: {name}"
+    for name, given in _flattened(table):
+        here = f"{where}: {name}"
+        if any(axis.name == name for axis in axes):
+            raise DropspinError(f"{here}: is given twice; give it once.")
         if isinstance(given, Mapping) and draws is None:
             axes.append(Spaced(name, **validated(CountedRange, here, given).model_dump()))
         elif isinstance(given, Mapping) and draws is not None:
@@ -178,12 +177,11 @@ def _canonical(here: str, name: str, value: Any) -> Any:
 def _verify_names(where: str, sweep: Sweep) -> None:
     """Raise `DropspinError` if a scene, an engine, a field or a metric is named twice or the time step is not named once."""
     names = [axis.name for axis in sweep.axes]
-    for name in names:
-        if names.count(name) > 1:
+    for name, other in permutations(names, 2):
+        if name == other:
             raise DropspinError(f"{where}: {name}: is in both [grid] and [random]; remove it from one of them.")
-        for part in names:
-            if part.startswith((f"{name}.", f"{name}[")):
-                raise DropspinError(f"{where}: {part}: is a part of {name}, which is swept as well; leave one of them out.")
+        if other.startswith((f"{name}.", f"{name}[")):
+            raise DropspinError(f"{where}: {other}: is a part of {name}, which is swept as well; leave one of them out.")
     if ("dt" in names) == bool(sweep.dts):
         fault = "is given twice" if sweep.dts else "is missing"
         raise DropspinError(f"{where}: the time step {fault}; give dts = [...], or dt in [grid] or [random] [s].")
@@ -240,14 +238,12 @@ def _verify_some_scene(sweep: Sweep, scene: Scenario, axis: SweepAxis, value: An
     """Raise the scene's error for a value if it is raised with the other fields at the scene's values, at their first and at their last."""
     others = [other for other in sweep.axes if other.name not in (axis.name, "dt") and not other.name.startswith(OPTION)]
     errors = []
-    for index in (None, 0, -1):
-        company = [] if index is None else [(other.name, other.values[index]) for other in others]
+    for company in ([], *([(other.name, other.values[index]) for other in others] for index in (0, -1))):
         try:
             with_fields(scene, [*company, (axis.name, value)])
+            return
         except SceneError as error:
             errors.append(error)
         except (KeyError, IndexError, TypeError):
             raise NoSuchField(f"scene {scene.name!r} has no such field.") from None
-        else:
-            return
     raise errors[0]

@@ -19,7 +19,7 @@ from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimi
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.sweeps.arrays import run_side_by_side
 from dropspin.comparisons.sweeps.jobs import Jobs, Sweep
-from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS, Outcomes, concatenated, run_scenes
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS, Outcomes, concatenated, not_run, run_scenes, set_breakdown
 from dropspin.reference_impl import sources
 
 LARGEST_PART = 4000  # jobs
@@ -117,24 +117,23 @@ class Work:
         entry = EngineEntry(jobs.engine.label, jobs.engine)
         first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
 
-        def outcome(number: int) -> Outcomes:
+        def run(first: int, last: int) -> Outcomes:
             verify_running()
-            found = processes.call(entry, _run_in_process, self.sweep, number, number + 1)
+            found = processes.call(entry, _run_in_process, self.sweep, first, last)
             if not isinstance(found, Breakdown):
                 return found
             verify_running()  # a process that ended with the sweep has not failed
-            broken = Outcomes.empty(1, len(self.sweep.metrics))
-            broken.set_breakdown(0, found)
+            if last > first + 1:
+                return concatenated([run(number, number + 1) for number in range(first, last)])
+            broken = not_run(1, self.sweep.metrics)
+            set_breakdown(broken[0], found)
             return broken
 
-        verify_running()
-        found = processes.call(entry, _run_in_process, self.sweep, first, last)
-        if isinstance(found, Breakdown):
-            return concatenated([outcome(number) for number in range(first, last)])
+        found = run(first, last)
         # An exception may be due to earlier jobs, for example to a leak. It counts if the job raises it in a new process as well.
         for index in np.flatnonzero(found.verdict == "crashed").tolist():
             processes.renew(entry)
-            found[index] = outcome(first + index)
+            found[index] = run(first + index, first + index + 1)[0]
         return found
 
 
@@ -156,11 +155,9 @@ def run_jobs(sweep: Sweep, first: int, last: int) -> Outcomes:
     """
     found = []
     for jobs in sweep.jobs(first, last):
-        outcomes, is_reference = Outcomes.empty(len(jobs), len(sweep.metrics)), isinstance(jobs.engine, Wang)
-        if is_reference:
-            run_side_by_side(jobs, outcomes, sweep.metrics)
-        run_scenes(jobs, outcomes, sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
-        found.append(outcomes)
+        is_reference = isinstance(jobs.engine, Wang)
+        found.append(run_side_by_side(jobs, sweep.metrics) if is_reference else not_run(len(jobs), sweep.metrics))
+        run_scenes(jobs, found[-1], sweep.metrics, in_batches=jobs.engine.steps_batches and not is_reference)
     return concatenated(found)
 
 

@@ -16,7 +16,7 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.motions import Motions, Setup
 from dropspin.comparisons.running.verification import UNIT_TOLERANCE
-from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, run_scenes, standard_metrics
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, concatenated, not_run, run_scenes, standard_metrics
 from dropspin.comparisons.sweeps.spec import load_sweep
 from dropspin.comparisons.sweeps.work import run_jobs
 from dropspin.scenarios import load, names
@@ -92,7 +92,7 @@ def run_one_by_one(sweep):
     """Each job by itself, through Engine.prepare(...).record."""
     found = []
     for jobs in sweep.jobs(0, sweep.size):
-        outcomes = Outcomes.empty(len(jobs), len(sweep.metrics))
+        outcomes = not_run(len(jobs), sweep.metrics)
         run_scenes(jobs, outcomes, sweep.metrics, in_batches=False)
         found.append(outcomes)
     return concatenated(found)

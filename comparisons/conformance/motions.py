@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences, exact_solution
 from dropspin.comparisons.engines.base import Engine, KnownLimitation
-from dropspin.comparisons.faults.fault_model import Exact, FaultModel
+from dropspin.comparisons.faults.fault_model import FaultModel
 from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
@@ -29,7 +29,6 @@ from dropspin.scenarios.truths import LAWS, Law
 
 Array = NDArray[np.float64]
 
-NO_FAULT = FaultModel("")
 SINGLY = tuple(fault for fault in FAULT_MODELS if fault.about != "start")  # the start has a check of its own
 QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("angular velocity", "rad/s"))
 """Those of `differences`."""
@@ -101,11 +100,9 @@ def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Arra
     # The exact solution of a box on its corner takes too long for thousands of pairs.
     counts = (1, 2) if _has_pairs(probe) else (1,)
     for count in counts:
-        faults, motions = _motions_with_faults(probe, count)
-        if not faults:
-            continue
-        off = np.round(probe.off(found, motions), 3)
-        candidates = [faults[number] for number in np.argsort(off, kind="stable") if off[number] <= 1.0]
+        motions = _motions_with_faults(probe, count)
+        off = dict(zip(motions, np.round(probe.off(found, np.array([*motions.values()])), 3), strict=True))
+        candidates = sorted((fault for fault in motions if off[fault] <= 1.0), key=off.__getitem__)
         others = [other for other in PROBES if other != probe and (count == 1 or _has_pairs(other))]
         best = _best(candidates, others, motion_of)
         if best is not None:
@@ -121,10 +118,7 @@ def _best(candidates: Iterable[FaultModel], probes: Iterable[Probe], motion_of: 
     """The fault that gives the engine's states of the most probes, without those that change a probe in which the engine is right."""
     explained = dict.fromkeys(candidates, 0)
     for probe in probes:
-        known: Exact = {}
-        exact = NO_FAULT.motion(probe.scene, probe.times, known)
-        assert exact is not None
-        motions = {fault: states for fault in explained if (states := fault.motion(probe.scene, probe.times, known)) is not None}
+        exact, motions = probe.exact, _motions(probe, explained)
         changed = {fault: states for fault, states in motions.items() if probe.off(states, exact) > 1.0}
         found = motion_of(probe) if changed else None
         if found is None:
@@ -138,15 +132,13 @@ def _best(candidates: Iterable[FaultModel], probes: Iterable[Probe], motion_of: 
 
 
 @cache
-def _motions_with_faults(probe: Probe, count: int) -> tuple[list[FaultModel], Array]:
-    """All faults, or pairs of them, whose motion of a probe is known, and these motions, shape (faults, 2, 13)."""
-    known: Exact = {}
-    found = [
-        (fault, motion)
-        for fault in (SINGLY if count == 1 else _pairs())
-        if (motion := fault.motion(probe.scene, probe.times, known)) is not None
-    ]
-    return [fault for fault, _ in found], np.array([motion for _, motion in found])
+def _motions_with_faults(probe: Probe, count: int) -> dict[FaultModel, Array]:
+    return _motions(probe, SINGLY if count == 1 else _pairs())
+
+
+def _motions(probe: Probe, faults: Iterable[FaultModel]) -> dict[FaultModel, Array]:
+    """The states of a probe with each of some faults for which they are known, shape (2, 13)."""
+    return {fault: states for fault in faults if (states := fault.motion(probe.scene, probe.times)) is not None}
 
 
 def explain_start(scene: Scenario, state: Array, allowed: float) -> FaultModel | None:

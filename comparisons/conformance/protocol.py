@@ -17,7 +17,7 @@ from dropspin.comparisons.conformance.motions import explain_start
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted, described
 from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, FLIGHTS, PROBES, accepted_scene, recorded, state_after
 from dropspin.comparisons.engines.base import Diverged, Engine
-from dropspin.comparisons.running.verification import MULTIPLE, BuildMismatch, verified_record, verify_build, verify_start
+from dropspin.comparisons.running.verification import MULTIPLE, BuildMismatch, verified_claims, verified_record, verify_build, verify_start
 from dropspin.scenarios import Scenario, load, names
 
 Array = NDArray[np.float64]
@@ -31,12 +31,8 @@ ASYMMETRIC = next(probe.scene for probe in PROBES if probe.name == "tumbling")
 
 def check_claims(engine: Engine) -> str:
     """The class has a valid order and precision."""
-    order = engine.order
-    if not (order is None or (isinstance(order, int | float) and order > 0)):
-        raise CheckFailed(f"order is {order!r}; it must be None (no claim), a number above 0, or inf (exact)")
-    if engine.precision not in (np.float32, np.float64):
-        raise CheckFailed(f"precision is {engine.precision!r}; it must be numpy.float64 or numpy.float32")
-    return f"order {order if order is not None else 'not claimed'}, {np.dtype(engine.precision).name}"
+    _, _, precision = verified_claims(engine, ASYMMETRIC)
+    return f"order {'not claimed' if engine.order is None else engine.order}, {np.dtype(precision).name}"
 
 
 def check_refusals(engine: Engine) -> str:

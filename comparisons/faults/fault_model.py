@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,6 @@ Reported = Callable[[Array], Array]
 """From states to those that an adapter reports, shape (n, 13)."""
 Change = Callable[[Array, Array], Array]
 """From a part of states and their orientations to the changed part."""
-Exact = dict[Scenario, Array | None]
-"""The exact states of scenes at some times, shape (n, 13); None for a scene without an exact solution at all of them."""
 
 
 def unchanged_scene(scene: Scenario) -> Scenario:
@@ -50,18 +49,12 @@ class FaultModel:
     is_peculiarity: bool = False
     about: str = ""
 
-    def motion(self, scene: Scenario, times: Array, known: Exact) -> Array | None:
-        """The states of a scene with this fault at some times [s], shape (n, 13); None without an exact solution.
-
-        Many faults simulate the same scene: `known` holds the exact states found before, and receives those found now.
-        """
+    def motion(self, scene: Scenario, times: Array) -> Array | None:
+        """The states of a scene with this fault at some times [s], shape (n, 13); None without an exact solution."""
         try:
-            simulated = self.simulated(scene)
-            if simulated not in known:
-                known[simulated] = _exact_states(simulated, times)
+            states = _exact_states(self.simulated(scene), tuple(times.tolist()))
         except (DropspinError, ValueError):  # the body is impossible, or starts below the floor
             return None
-        states = known[simulated]
         return None if states is None else self.reported(states)
 
     def start(self, scene: Scenario) -> Array:
@@ -78,9 +71,10 @@ class FaultModel:
         )
 
 
-def _exact_states(scene: Scenario, times: Array) -> Array | None:
-    truth = truth_for(scene)
-    return None if truth is None or not truth.covers(times).all() else truth(times).states
+@lru_cache(maxsize=4096)  # many faults simulate the same scene
+def _exact_states(scene: Scenario, times: tuple[float, ...]) -> Array | None:
+    truth, t = truth_for(scene), np.array(times)
+    return None if truth is None or not truth.covers(t).all() else truth(t).states
 
 
 def changed_table(table: str, **values: Any) -> Simulated:

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 
 import numpy as np
@@ -35,13 +35,12 @@ def body_rates(states: Array) -> Array:
     return rotate(conjugate(states[:, ORIENTATION]), states[:, SPIN])
 
 
-def nesc_brick(source: Source) -> list[Result]:
+def nesc_brick(source: Source) -> Iterator[Result]:
     """The rates of each tool beside the exact ones: its largest error, and for tools that agree with each other, their common decimals."""
     exact = truth_of(source.scene("brick"))
     decimals = source.parameters["decimals"]
     with (DATA / source.parameters["rates"]).open(encoding="utf-8", newline="") as file:
         table = [(tool, list(rows)) for tool, rows in groupby(csv.DictReader(file), lambda row: row["tool"])]
-    results = []
     for tool, rows in table:
         times = np.array([float(row["time"]) for row in rows])
         printed = np.array([[float(row[rate]) for rate in RATES] for row in rows])
@@ -49,13 +48,12 @@ def nesc_brick(source: Source) -> list[Result]:
         name = f"sim {tool}"
         if tool in source.parameters["agree"]:
             equal = int(sum(f"{a:.{decimals}f}" == f"{b:.{decimals}f}" for a, b in zip(printed.flat, rates.flat, strict=True)))
-            results.append(_count(source, name, f"{printed.size} rates, {decimals} decimals", printed.size, equal))
+            yield _count(source, name, f"{printed.size} rates, {decimals} decimals", printed.size, equal)
         worst, rate = np.unravel_index(np.argmax(np.abs(printed - rates)), printed.shape)
         text = rows[worst][RATES[rate]]
         quantity = f"{RATES[rate]}, {times[worst]:.0f} s [deg/s]"
         error = Agreement(f"{rates[worst, rate]:.{DECIMALS}f}", float(printed[worst, rate] - rates[worst, rate]), agrees=False)
-        results.append(_beside_exact(source, name, quantity, text, error, is_claimed=False))
-    return results
+        yield _beside_exact(source, name, quantity, text, error, is_claimed=False)
 
 
 def _beside_exact(source: Source, tool: str, quantity: str, published: str, found: Agreement, *, is_claimed: bool = True) -> Result:
@@ -76,22 +74,19 @@ def _digits(source: Source, tool: str, quantity: str, published: float, here: fl
     return _beside_exact(source, tool, quantity, text, agreement(text, here))
 
 
-def kane_free_body(source: Source) -> list[Result]:
+def kane_free_body(source: Source) -> Iterator[Result]:
     """Kane's solution of the axisymmetric body, and the simple rotations with which Drake tests it."""
     scene = source.scene("cylinder")
     truth = truth_of(scene)
     *times, last = source.parameters["times"]
-    results = []
     for time in times:
-        published = kane(scene, time)
-        here = _kane_values(truth, time, published)
-        equal = sum(f"{published[name]:.{DECIMALS}f}" == f"{here[name]:.{DECIMALS}f}" for name in published)
-        results.append(_count(source, "formula", f"{len(published)} values, {time:g} s", len(published), equal))
-    published = kane(scene, last)
-    here = _kane_values(truth, last, published)
-    results += [_digits(source, "formula", f"{name} at {last:g} s", published[name], here[name]) for name in published]
+        results = _kane_results(source, scene, truth, time)
+        equal = sum(result.here == result.published for result in results)
+        yield _count(source, "formula", f"{len(results)} values, {time:g} s", len(results), equal)
+    yield from _kane_results(source, scene, truth, last)
     simple = source.parameters["simple"]
-    return results + [_simple_rotation(source, scene, axis, simple["rate"], simple["time"]) for axis in simple["axes"]]
+    for axis in simple["axes"]:
+        yield _simple_rotation(source, scene, axis, simple["rate"], simple["time"])
 
 
 def kane(scene: Scenario, t: float) -> dict[str, float]:
@@ -118,12 +113,14 @@ def kane(scene: Scenario, t: float) -> dict[str, float]:
     }
 
 
-def _kane_values(truth: Truth, t: float, published: Mapping[str, float]) -> dict[str, float]:
-    """The same values of the exact solution; of the two quaternions of the orientation, the one nearer to the published one."""
-    state = truth.states(np.array([t]))
+def _kane_results(source: Source, scene: Scenario, truth: Truth, t: float) -> list[Result]:
+    """Kane's values beside the exact ones; of the two quaternions of the orientation, the one nearer to the published one."""
+    published, state = kane(scene, t), truth.states(np.array([t]))
     quaternion = state[0, ORIENTATION]
     sign = math.copysign(1.0, float(quaternion @ list(published.values())[:4]))
-    return dict(zip(published, map(float, [*(sign * quaternion), *body_rates(state)[0], *state[0, POSITION]]), strict=True))
+    here = [*(sign * quaternion), *body_rates(state)[0], *state[0, POSITION]]
+    values = zip(published.items(), here, strict=True)
+    return [_digits(source, "formula", f"{name} at {t:g} s", value, float(exact)) for (name, value), exact in values]
 
 
 def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rate: float, time: float) -> Result:
@@ -139,16 +136,15 @@ def _simple_rotation(source: Source, scene: Scenario, axis: Sequence[float], rat
     return _beside_exact(source, "simple rotation", quantity, bound, found)
 
 
-def housner_block(source: Source) -> list[Result]:
+def housner_block(source: Source) -> Iterator[Result]:
     """Housner's ratio of kinetic energies and period beside the exact solution of the block."""
-    results = []
     for slope in source.parameters["slopes"]:
         alpha = math.atan(slope)
         scene = rocking_scene(alpha, 0.5)
         impact = truth_of(scene).events[0]
         before, after = (Trajectory.from_states(np.zeros(1), state[None]) for state in (impact.before, impact.after))
         ratio = float((kinetic_energy(scene, after) / kinetic_energy(scene, before))[0])
-        results.append(_digits(source, "restitution", f"r, tan α = {slope:g}", housner_ratio(alpha), ratio))
+        yield _digits(source, "restitution", f"r, tan α = {slope:g}", housner_ratio(alpha), ratio)
     for alpha, share, digits in source.parameters["periods"]:
         published = housner_period(share)
         exact = 4.0 * truth_of(rocking_scene(alpha, share)).events[0].time
@@ -157,8 +153,7 @@ def housner_block(source: Source) -> list[Result]:
         if not is_slender:
             found = found._replace(difference=published - exact)
         quantity = f"T [s], α = {alpha:g}, θ₀ = {share:g} α"
-        results.append(_beside_exact(source, "period", quantity, f"{published:.{digits}g}", found, is_claimed=is_slender))
-    return results
+        yield _beside_exact(source, "period", quantity, f"{published:.{digits}g}", found, is_claimed=is_slender)
 
 
 RADIUS, GRAVITY = 1.0, 9.81
@@ -192,20 +187,19 @@ def rocking_scene(alpha: float, share: float) -> Scenario:
     )
 
 
-def bouncing_ball(source: Source) -> list[Result]:
+def bouncing_ball(source: Source) -> Iterator[Result]:
     """The heights that the source prints beside the exact bounces, and the time from which the ball lies still."""
     scene = source.scene("bounces")
     truth = truth_of(scene)
-    results = []
     for time, text in source.parameters["heights"].items():
         exact = float(truth.states(np.array([float(time)]))[0, POSITION][1]) - scene.body.rounding
         error = Agreement(f"{exact:.{DECIMALS}f}", float(text) - exact, agrees=False)
-        results.append(_beside_exact(source, "FMU", f"height at {time} s [m]", text, error, is_claimed=False))
+        yield _beside_exact(source, "FMU", f"height at {time} s [m]", text, error, is_claimed=False)
     text, exact = source.parameters["rests_from"], truth.events[-1].time
     error = Agreement(f"{exact:.6f}", float(text) - exact, agrees=False)
-    return [*results, _beside_exact(source, "FMU", "at rest from [s]", text, error, is_claimed=False)]
+    yield _beside_exact(source, "FMU", "at rest from [s]", text, error, is_claimed=False)
 
 
-FORMULAS: Mapping[str, Callable[[Source], list[Result]]] = {
+FORMULAS: Mapping[str, Callable[[Source], Iterator[Result]]] = {
     formula.__name__: formula for formula in (nesc_brick, kane_free_body, housner_block, bouncing_ball)
 }

@@ -46,14 +46,10 @@ def reproduce(
                 entry = engine_entry(group.by) if group.by else EngineEntry("", None, "missing", group.why_not)
                 for case in group.cases:
                     callback(f"{source.name}, {entry.label}", done / total)
-                    results += _of_case(source, group, case, _measure(processes, entry, source, group, case.dt))
+                    measured = processes.call(entry, _measured, source.scene(group.scene), case.dt, group.quantities, group.since)
+                    results += _of_case(source, group, case, measured)
                     done += 1
     return results
-
-
-def _measure(processes: EngineProcesses, entry: EngineEntry, source: Source, group: Group, dt: float) -> list[float] | Breakdown:
-    """The quantities of a run in the engine's process."""
-    return processes.call(entry, _measured, source.scene(group.scene), dt, group.quantities, group.since)
 
 
 def _measured(entry: EngineEntry, scene: Scenario, dt: float, names: Sequence[str], since: str) -> list[float]:

@@ -6,7 +6,7 @@ DropspinError
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 
 class DropspinError(Exception):
@@ -33,6 +33,13 @@ class UnknownName(DropspinError):
     def __init__(self, what: str, given: str, known: Iterable[str]) -> None:
         known = sorted(known)
         super().__init__(f"{what} {given!r} is unknown.{did_you_mean(given, known)} Known: {', '.join(known) or 'none'}.")
+
+
+def verify_known(what: str, names: Iterable[str], known: Collection[str]) -> None:
+    """Raise `UnknownName` for the first of some names that is not among the known ones; `what` is the kind of thing that they denote."""
+    for name in names:
+        if name not in known:
+            raise UnknownName(what, name, known)
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:

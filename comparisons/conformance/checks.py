@@ -11,11 +11,11 @@ from dropspin.comparisons.conformance.outcomes import CheckOutcome, CheckResult,
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.entries import present_entry
-from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.verification import BuildMismatch
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 
 CHECKS: dict[str, Callable[[Engine], str]] = {
     "compilation": timing.check_compilation,
@@ -60,29 +60,21 @@ def conform(
         EngineMissing: The engine is not installed.
         EngineBroken: It cannot be imported or constructed.
     """
-    for unknown in set(checks) - CHECKS.keys():
-        raise UnknownName("check", unknown, CHECKS)
-    entry = present_entry(engine)
-    found = []
+    verify_known("check", checks, CHECKS)
+    entry, found = present_entry(engine), []
     with tempfile.TemporaryDirectory() as folder, EngineProcesses(resources) as processes:
         for check in checks or CHECKS:
-            result = processes.call(entry, _run_check, check, folder)
+            result = processes.call(entry, run_check, check, folder)
             if isinstance(result, Breakdown):
                 result = CheckResult(check, cast(CheckOutcome, result.verdict), result.reason)
             found.append(result)
-            if on_result is not None:
-                on_result(found[-1])
+            (on_result or ignore)(result)
     return found
 
 
-def _run_check(entry: EngineEntry, check: str, folder: str) -> CheckResult:
-    """Run one check in the engine's process; temporary files go to a folder of the parent, because the engine may end this process."""
+def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> CheckResult:
+    """Run one check in this process; temporary files go to a folder of the caller, because the engine may end this process."""
     tempfile.tempdir = folder
-    return run_check(entry, check)
-
-
-def run_check(entry: EngineEntry, check: str) -> CheckResult:
-    """Run one check in this process."""
     try:
         return CheckResult(check, "passed", CHECKS[check](entry.adapter))
     except (NotPassed, BuildMismatch) as ended:

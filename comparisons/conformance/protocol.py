@@ -8,7 +8,6 @@ import json
 import os
 import tempfile
 from contextlib import chdir
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +77,8 @@ def _verify_built(engine: Engine, scene: Scenario) -> bool:
     with engine.prepare(scene, DT) as simulation:
         state = simulation.state()
         if not (isinstance(state, np.ndarray) and state.shape == (13,) and np.isrealobj(state)):
-            raise CheckFailed(f"state() returns {_kind(state)}; it must return a NumPy array of 13 real numbers, shape (13,)")
+            kind = f"an array of {state.dtype}, shape {state.shape}" if isinstance(state, np.ndarray) else f"a {type(state).__name__}"
+            raise CheckFailed(f"state() returns {kind}; it must return a NumPy array of 13 real numbers, shape (13,)")
         if not np.isfinite(state).all():
             raise CheckFailed(f"the state at the start is not finite: {state.tolist()}")
         try:
@@ -212,7 +212,3 @@ def check_files(engine: Engine) -> str:
     if left:
         raise CheckFailed(f"files are left in the working directory: {', '.join(left)}")
     return f"no file is written to the working directory{breakdown}"
-
-
-def _kind(found: Any) -> str:
-    return f"an array of {found.dtype}, shape {found.shape}" if isinstance(found, np.ndarray) else f"a {type(found).__name__}"

@@ -6,6 +6,7 @@ stepped in long calls and in short ones.
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from dropspin.comparisons.running.recording import record
 from dropspin.comparisons.running.start_phases import START_PHASES
 from dropspin.comparisons.running.verification import BuildMismatch, verified_batch, verify_starts
 from dropspin.comparisons.symmetries.findings import STEP_MULTIPLE, Finding, judged
-from dropspin.comparisons.symmetries.study import batch_member, effects_of_rounding, findings_of, perturbed_starts
+from dropspin.comparisons.symmetries.study import batch_member, effects_of_rounding, findings_of
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.text import counted
 from dropspin.scenarios.variations import whole_steps
@@ -151,7 +152,7 @@ def _verify_single(engine: Engine, member: Scenario, dt: float, rows: Array, lag
         raise CheckFailed(f"velocity_lag is {lag!r}; that of a single simulation is {alone.velocity_lag!r}")
     entry = EngineEntry(engine.label, engine)
     # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
-    effects = (lambda: effects_of_rounding(entry, member, dt, alone.states, perturbed_starts(entry, member))) if engine.compiles else None
+    effects = partial(effects_of_rounding, entry, member, dt, alone.states) if engine.compiles else None
     none = Finding(member.name, engine.label, "", "not run")
     found = judged(none, member, dt, [(alone.states, rows)], effects, engine.precision)
     if found.status not in ("kept", "rounding"):

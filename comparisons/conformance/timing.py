@@ -15,7 +15,7 @@ from dropspin.comparisons.conformance.probes import A_FEW_STEPS, DT, accepted_sc
 from dropspin.comparisons.conformance.protocol import relative_difference
 from dropspin.comparisons.engines.base import Engine, Simulation
 from dropspin.comparisons.running.timing import time_steps
-from dropspin.scenarios import Scenario, Trajectory
+from dropspin.scenarios import Scenario
 from dropspin.scenarios.rotations import angle_between_orientations
 from dropspin.scenarios.state import ORIENTATION, POSITION, VELOCITY
 from dropspin.scenarios.text import rounded
@@ -73,12 +73,14 @@ def check_time(engine: Engine) -> str:
             raise CheckFailed(f"the attitude is {_off(late)}")
     with suppress(Declined):
         late = _late(_ticks(engine, "falling straight", STEPS_TRIED[0], _by_velocity))
-        if abs(late) > LATE and abs(_runs_ahead(*_fall(engine))[0] + late) < LATE:
-            count = "more steps than were taken, such as twice in the first one" if late < 0.0 else "fewer steps than were taken"
-            side = "ahead" if late < 0.0 else "behind"
-            raise CheckFailed(f"velocity and position of a fall run {side} by {_steps(late)}: gravity acts in {count}")
-        if abs(late) > LATE and abs(late - _velocity_lag(*_fall(engine))[1]) > LATE:
-            raise CheckFailed(f"velocity is {_off(late)}")
+        if abs(late) > LATE:
+            _, stated_lag, ahead, _ = _fall(engine)
+            if abs(ahead + late) < LATE:
+                count = "more steps than were taken, such as twice in the first one" if late < 0.0 else "fewer steps than were taken"
+                side = "ahead" if late < 0.0 else "behind"
+                raise CheckFailed(f"velocity and position of a fall run {side} by {_steps(late)}: gravity acts in {count}")
+            if abs(late - stated_lag) > LATE:
+                raise CheckFailed(f"velocity is {_off(late)}")
     return f"steps have the length asked for, {asked} s"
 
 
@@ -121,9 +123,7 @@ def _by_velocity(scene: Scenario, rows: Array) -> Array:
 
 def check_velocity_lag(engine: Engine) -> str:
     """`velocity_lag` is the time by which velocity lags position: how much faster a falling body moves than its velocity says, over g."""
-    fall = _fall(engine)
-    measured, stated = _velocity_lag(*fall)
-    ahead, noise = _runs_ahead(*fall)
+    measured, stated, ahead, noise = _fall(engine)
     if noise > LAG_TOLERANCE:
         raise Noted(f"a fall does not lag by the same time throughout, but by {noise:.2g} steps more or less")
     if abs(measured) > LARGEST_LAG:
@@ -138,29 +138,22 @@ def check_velocity_lag(engine: Engine) -> str:
     return f"velocity lags position by {stated:.3g} steps"
 
 
-def _fall(engine: Engine) -> tuple[Scenario, Trajectory]:
-    """A fall of few steps, so that rounding adds up to little."""
-    scene = accepted_scene(engine, "falling", "falling straight")
-    motion = few_steps(engine, scene, STEPS_TRIED[0])
+def _fall(engine: Engine) -> tuple[float, float, float, float]:
+    """Measurements of a fall, in steps: of few steps, so that rounding adds up to little.
+
+    By how much velocity lags position, that by `velocity_lag`, by how much the fall runs ahead of the exact one, and the largest deviation
+    of that from a constant number.
+    """
+    scene, dt = accepted_scene(engine, "falling", "falling straight"), STEPS_TRIED[0]
+    motion = few_steps(engine, scene, dt)
     if not np.isfinite(motion.states).all():
         raise CheckFailed("the state is not finite after a fall")
-    return scene, motion
-
-
-def _velocity_lag(scene: Scenario, motion: Trajectory) -> tuple[float, float]:
-    """The lag of velocity behind position in a fall, measured and stated, in steps."""
-    g, dt = scene.acceleration, STEPS_TRIED[0]
-    moved = (motion.position[STARTED + 2 :] - motion.position[STARTED:-2]) / (2.0 * dt)
-    return float(np.mean((moved - motion.velocity[STARTED + 1 : -1]) @ g) / (g @ g * dt)), motion.velocity_lag / dt
-
-
-def _runs_ahead(scene: Scenario, motion: Trajectory) -> tuple[float, float]:
-    """By how many steps a fall runs ahead of the exact one, and the largest deviation from a constant number."""
     t, g = motion.t[STARTED:], scene.acceleration
-    ahead = (motion.position[STARTED:] - exact_solution(scene)(t).position) @ g / (g @ g * STEPS_TRIED[0])
+    moved = (motion.position[STARTED + 2 :] - motion.position[STARTED:-2]) / (2.0 * dt)
+    lag = float(np.mean((moved - motion.velocity[STARTED + 1 : -1]) @ g) / (g @ g * dt))
+    ahead = (motion.position[STARTED:] - exact_solution(scene)(t).position) @ g / (g @ g * dt)
     fitted = polyfit(t, ahead, 2)  # what remains of the first steps is constant; damping and wrong gravity grow with t²
-    noise = float(np.abs(ahead - polyval(t, fitted)).max() / t[-1])
-    return float(fitted[1]), noise
+    return lag, motion.velocity_lag / dt, float(fitted[1]), float(np.abs(ahead - polyval(t, fitted)).max() / t[-1])
 
 
 def _suggested_lag(steps: float) -> str:

@@ -57,19 +57,11 @@ def _with_spin(change: Change) -> Reported:
 
 
 def _rolled(by: int) -> Change:
-    return lambda part, _: np.roll(part, by, axis=1)
+    return lambda _, part: np.roll(part, by, axis=1)
 
 
 def _times(factor: float | Array) -> Change:
-    return lambda part, _: factor * part
-
-
-def _to_body(vectors: Array, orientation: Array) -> Array:
-    return unrotate(orientation, vectors)
-
-
-def _to_world(vectors: Array, orientation: Array) -> Array:
-    return rotate(orientation, vectors)
+    return lambda _, part: factor * part
 
 
 def _z_up(sign: float, but: slice | None = None) -> Reported:
@@ -94,7 +86,7 @@ def _left_handed(states: Array) -> Array:
 
 def _not_set(part: slice) -> Simulated:
     """The scene with a part of its start at the origin, not turned, or at rest."""
-    return changed_start(changed_part(part, lambda values, _: np.eye(13)[[6], part]))
+    return changed_start(changed_part(part, lambda _, values: np.eye(13)[[6], part]))
 
 
 REORDERED = "the quaternion appears to be reordered from [w, x, y, z], which was not its order"
@@ -108,18 +100,18 @@ CONVENTIONS = (
         ORIENTATION,
         "the orientation appears to be inverted, world to body",
         BODY_TO_WORLD,
-        wrong=lambda q, _: conjugate(q),
-        right=lambda q, _: conjugate(q),
+        wrong=lambda _, q: conjugate(q),
+        right=lambda _, q: conjugate(q),
     ),
-    *_convention(SPIN, "angular velocity appears to be in the body frame", IN_WORLD, _to_body, _to_world),
-    *_convention(SPIN, CONVERTED, IN_WORLD, _to_world, _to_body),
-    *_convention(VELOCITY, "velocity appears to be in the body frame", IN_WORLD, _to_body, _to_world),
+    *_convention(SPIN, "angular velocity appears to be in the body frame", IN_WORLD, unrotate, rotate),
+    *_convention(SPIN, CONVERTED, IN_WORLD, rotate, unrotate),
+    *_convention(VELOCITY, "velocity appears to be in the body frame", IN_WORLD, unrotate, rotate),
     *_convention(
         SPIN,
         "angular velocity appears to be in degrees per second",
         "a state has rad/s",
-        wrong=lambda w, _: np.rad2deg(w),
-        right=lambda w, _: np.deg2rad(w),
+        wrong=lambda _, w: np.rad2deg(w),
+        right=lambda _, w: np.deg2rad(w),
     ),
     *_convention(SPIN, "angular velocity has the opposite sign", "it is right-handed", _times(-1.0), _times(-1.0)),
     *_convention(VELOCITY, "velocity has the opposite sign", "it is the rate of the position", _times(-1.0), _times(-1.0)),

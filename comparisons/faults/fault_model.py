@@ -18,7 +18,7 @@ Simulated = Callable[[Scenario], Scenario]
 Reported = Callable[[Array], Array]
 """From states to those that an adapter reports, shape (n, 13)."""
 Change = Callable[[Array, Array], Array]
-"""From a part of states and their orientations to the changed part."""
+"""From the orientations of states and a part of them to the changed part."""
 
 
 def unchanged_scene(scene: Scenario) -> Scenario:
@@ -88,11 +88,11 @@ def changed_start(change: Reported) -> Simulated:
 
 
 def changed_part(part: slice, change: Change) -> Reported:
-    """States with a part changed, by a function of the part and of the orientations."""
+    """States with a part changed, by a function of the orientations and of the part."""
 
     def changed(states: Array) -> Array:
         states = states.copy()
-        states[:, part] = change(states[:, part], states[:, ORIENTATION])
+        states[:, part] = change(states[:, ORIENTATION], states[:, part])
         return states
 
     return changed

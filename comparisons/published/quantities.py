@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.mechanics import angular_momentum, energy, kinetic_energy
 
 Array = NDArray[np.float64]
@@ -67,8 +67,7 @@ def quantity(name: str) -> Quantity:
     """
     if at := AT.fullmatch(name):
         return _at(at[1], float(at[2]))
-    if name not in QUANTITIES:
-        raise UnknownName("quantity", name, QUANTITIES)
+    verify_known("quantity", [name], QUANTITIES)
     return lambda scene, motion: float(QUANTITIES[name](_Run(scene, motion)))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import Field
 
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.loading import from_mapping, read_toml
 from dropspin.scenarios.tables import Table
 
@@ -105,7 +105,5 @@ def sources(names: Iterable[str] = ()) -> list[Source]:
     """
     known = source_names()
     chosen = list(dict.fromkeys(names)) or known
-    for name in chosen:
-        if name not in known:
-            raise UnknownName("source", name, known)
+    verify_known("source", chosen, known)
     return [Source.model_validate({"name": name, **read_toml(DATA / f"{name}.toml", name)}) for name in chosen]

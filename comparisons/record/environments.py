@@ -20,7 +20,8 @@ from dropspin.comparisons.engines.packages import is_npm
 from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.running.processes import Closed
-from dropspin.scenarios import DropspinError, UnknownName
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.errors import verify_known
 
 POLL = 0.5  # s
 LONGEST_REASON = 300
@@ -46,8 +47,7 @@ def releases(package: str, oldest: str) -> list[str]:
         DropspinError: pip or npm is not installed, cannot ask its index, or the index lacks the package or the oldest release.
     """
     listed = _npm_releases(package) if is_npm(package) else _pip_releases(package)
-    if oldest not in listed:
-        raise UnknownName(f"{package}'s oldest release", oldest, listed)
+    verify_known(f"{package}'s oldest release", [oldest], listed)
     return listed[listed.index(oldest) :]
 
 

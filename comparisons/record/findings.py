@@ -96,8 +96,8 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
     """
     tables: dict[str, list[list[dict[str, Any]]]] = {}
     for path in sorted((Path(folder) / OWN).glob("*.parquet")):
-        one = stored(path)
-        tables.setdefault(one.engine, []).append(one.rows)
+        _, rows = stored(path)
+        tables.setdefault(rows[0]["engine"], []).append(rows)
     if not tables:
         raise DropspinError(f"{folder}: has no release that was measured here; give a folder that dropspin record wrote.")
     found = {engine: _of_one_machine(own) for engine, own in tables.items()}
@@ -130,12 +130,12 @@ def others(folder: str | Path, own: Mapping[str, Sequence[Release]]) -> dict[str
     """
     found: dict[str, list[Other]] = {}
     for path in sorted((Path(folder) / OTHERS).glob("*.parquet")):
-        one = stored(path)
-        sent = release_of(one.rows)
-        here = next((release.cases for release in own.get(one.engine, ()) if release.name == sent.name), {})
+        _, rows = stored(path)
+        engine, sent = rows[0]["engine"], release_of(rows)
+        here = next((release.cases for release in own.get(engine, ()) if release.name == sent.name), {})
         pairs = [(case, here[key]) for key, case in sent.cases.items() if key in here]
         same = sum((case.verdict, case.trajectory) == (mine.verdict, mine.trajectory) for case, mine in pairs)
-        found.setdefault(one.engine, []).append(Other(sent.name, sent.first, len(pairs), same))
+        found.setdefault(engine, []).append(Other(sent.name, sent.first, len(pairs), same))
     return {engine: sorted(sent, key=lambda other: numbers_of(other.name)) for engine, sent in found.items()}
 
 
@@ -164,8 +164,8 @@ def _case(rows: Sequence[Row]) -> Case:
     first = rows[0]
     values = {row["metric"]: row["value"] for row in rows if row["metric"]}
     banded = next((row for row in rows if not math.isnan(row["low"])), first)
-    costs = (first[name] for name in ("cost", "median_cost", "relative_cost"))
-    return Case(first["verdict"], first["reason"], first["trajectory"], values, banded["low"], banded["high"], *costs)
+    same = {name: first[name] for name in ("verdict", "reason", "trajectory", "cost", "median_cost", "relative_cost")}
+    return Case(**same, values=values, low=banded["low"], high=banded["high"])
 
 
 problem = cache(load)

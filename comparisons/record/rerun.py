@@ -3,16 +3,16 @@
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Event
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from dropspin.comparisons.engines.registry import parsed
 from dropspin.comparisons.record.environments import NotMeasured, measured
 from dropspin.comparisons.record.findings import Case, Release, read, release_of
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import BLANK, MACHINE, machine
-from dropspin.scenarios import DropspinError, UnknownName
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.errors import verify_known
 
-Kind = TypeVar("Kind")
 NONE = Case("not measured", "", "", {})
 
 
@@ -67,19 +67,16 @@ def _recorded(folder: str | Path, engine: str, label: str, release: str, scene: 
     Raises:
         DropspinError: The record has no such cell.
     """
-    releases = {one.name: one for one in _known("engine of the record", engine, read(folder))}
-    found = _known(f"release of {engine} in the record", release, releases)
+    engines = read(folder)
+    verify_known("engine of the record", [engine], engines)
+    releases = {one.name: one for one in engines[engine]}
+    verify_known(f"release of {engine} in the record", [release], releases)
+    found = releases[release]
     if not found.cases:
         raise DropspinError(f"{engine} {release} has no results in the record: {found.reason}.")
-    _known("engine with options in the record", label, {of: found for of, _, _ in found.cases})
-    _known(f"scene of {label} in the record", scene, {name: found for of, name, _ in found.cases if of == label})
+    verify_known("engine with options in the record", [label], {of for of, _, _ in found.cases})
+    verify_known(f"scene of {label} in the record", [scene], {name for of, name, _ in found.cases if of == label})
     return found
-
-
-def _known(what: str, name: str, known: Mapping[str, Kind]) -> Kind:
-    if name not in known:
-        raise UnknownName(what, name, known)
-    return known[name]
 
 
 def _surroundings(release: Release) -> dict[str, str]:

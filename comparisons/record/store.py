@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -53,15 +53,6 @@ def machine() -> dict[str, str]:
     return {"processor": processor(), "system": system, "python": platform.python_version()}
 
 
-class Stored(NamedTuple):
-    """A file of the record: its path, its engine, its content, and its rows."""
-
-    path: Path
-    engine: str
-    content: bytes
-    rows: list[dict[str, Any]]
-
-
 class Record:
     """The folder of the record.
 
@@ -83,7 +74,7 @@ class Record:
     def own(self, engine: str, release: str) -> Iterator[tuple[Path, list[dict[str, Any]]]]:
         """The files that were measured here of a release, and their rows."""
         for path in sorted((self.folder / OWN).glob(f"{engine}-{release}-*.parquet")):
-            yield path, stored(path).rows
+            yield path, stored(path)[1]
 
     def has(self, engine: str, release: str, same: Row) -> bool:
         """Whether a release is measured, with this plan, adapter and machine; one that was not installable may be another day."""
@@ -130,17 +121,16 @@ class Record:
         Raises:
             DropspinError: A file is refused; none is added then.
         """
-        sent = [stored(path) for place in places for path in _files(Path(place))]
-        known = {path.name for path in self.folder.rglob("*.parquet")}
-        new = {one.path.name: one for one in sent if one.path.name not in known}
-        for name, one in new.items():
+        sent = {path.name: stored(path)[0] for place in places for path in _files(Path(place))}
+        new = sent.keys() - {path.name for path in self.folder.rglob("*.parquet")}
+        for name in new:
             with written_whole(self.folder / OTHERS / name) as unfinished:
-                unfinished.write_bytes(one.content)
-        return list(new)
+                unfinished.write_bytes(sent[name])
+        return [name for name in sent if name in new]
 
 
-def stored(path: Path) -> Stored:
-    """A file of the record: what `Record.write` wrote, with the hash of the content in its name.
+def stored(path: Path) -> tuple[bytes, list[dict[str, Any]]]:
+    """The content and the rows of a file of the record: what `Record.write` wrote, with the hash of the content in its name.
 
     Raises:
         DropspinError: It is not such a file, or it was changed.
@@ -159,7 +149,7 @@ def stored(path: Path) -> Stored:
         _verify(rows, named[1], named[2])
     except Exception as error:  # whatever pyarrow raises for a file that is none
         raise DropspinError(f"{path.name}: refused: {' '.join(str(error).split())}.") from None
-    return Stored(path, named[1], content, rows)
+    return content, rows
 
 
 def _files(place: Path) -> list[Path]:

@@ -5,6 +5,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -16,7 +17,7 @@ from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import Record, machine
 from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.parallel import as_done
-from dropspin.scenarios import UnknownName
+from dropspin.scenarios.errors import verify_known
 
 
 def record(
@@ -46,13 +47,9 @@ def record(
         DropspinError: There is no such engine or release, an index cannot be asked, the record cannot be written, or the scheduler does
             not answer or is lost.
     """
-    for engine in engines:
-        if engine not in plan.engines:
-            raise UnknownName("engine of the record", engine, plan.engines)
+    verify_known("engine of the record", engines, plan.engines)
     listed = {engine: releases(own.package, own.oldest) for engine, own in plan.engines.items() if engine in (engines or plan.engines)}
-    for release in chosen:
-        if release not in (known := [one for names in listed.values() for one in names]):
-            raise UnknownName("release", release, known)
+    verify_known("release", chosen, list(chain(*listed.values())))
     record.write_releases(listed)
     common = {engine: {"plan": plan.digest(engine), "adapter": _code(engine)} for engine in listed}
     with _workers(jobs, scheduler) as (workers, machines):

@@ -22,24 +22,16 @@ from dropspin.comparisons.running.inputs import MOST_STEPS, EngineEntry, SceneLi
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.scenarios import DropspinError, Scenario
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 
 IN_FLIGHT = (
-    "wang",
-    "wang[rotation=gyroscopic]",
-    "wang[rotation=rk4]",
-    "mujoco",
-    "mujoco[integrator=implicitfast]",
-    "mujoco[integrator=rk4]",
-    "pybullet",
-    "pybullet[coordinates=multibody,velocity_clamp=kept]",
+    *("wang", "wang[rotation=gyroscopic]", "wang[rotation=rk4]"),
+    *("mujoco", "mujoco[integrator=implicitfast]", "mujoco[integrator=rk4]"),
+    *("pybullet", "pybullet[coordinates=multibody,velocity_clamp=kept]"),
 )
 ON_A_FLOOR = (
-    "wang",
-    "wang[contact=sequential,law=coulomb,rotation=rk4]",
-    "mujoco",
-    "pybullet",
-    "pybullet[coordinates=multibody,velocity_clamp=kept]",
+    *("wang", "wang[contact=sequential,law=coulomb,rotation=rk4]", "mujoco"),
+    *("pybullet", "pybullet[coordinates=multibody,velocity_clamp=kept]"),
 )
 SCENES = ("spin-principal", "spin-asymmetric", "drop-ball-lively", "drop-box-flat", "rock-block")
 """A rotation that every method reproduces, one that few reproduce, a ball and a box that bounce, and a block that comes to rest."""
@@ -197,9 +189,8 @@ def find_limits(
 
 def _axes(scene: Scenario, names: Sequence[str]) -> list[Axis]:
     """The axes with these names, or all axes that a scene has."""
+    verify_known("axis", names, AXES)
     for name in names:
-        if name not in AXES:
-            raise UnknownName("axis", name, AXES)
         if not AXES[name].applies(scene):
             has = ", ".join(axis.name for axis in AXES.values() if axis.applies(scene))
             raise DropspinError(f"axis {name!r}: {scene.name} does not have it; it has {has}.")

@@ -15,7 +15,7 @@ from dropspin.comparisons.sweeps.axes import Drawn, Listed, Spaced, Spacing, Swe
 from dropspin.comparisons.sweeps.jobs import OPTION, Sweep, configured
 from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError, Scenario, SceneError, load
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 from dropspin.scenarios.loading import TOO_LARGE, read_toml
 from dropspin.scenarios.tables import Number, Positive, Table
 from dropspin.scenarios.validation import shown, validated
@@ -185,9 +185,8 @@ def _verify_names(where: str, sweep: Sweep) -> None:
     if ("dt" in names) == bool(sweep.dts):
         fault = "is given twice" if sweep.dts else "is missing"
         raise DropspinError(f"{where}: the time step {fault}; give dts = [...], or dt in [grid] or [random] [s].")
+    verify_known(f"{where}: metric", sweep.metrics, METRICS)
     for metric in sweep.metrics:
-        if metric not in METRICS:
-            raise UnknownName(f"{where}: metric", metric, METRICS)
         if metric in STANDARD_METRICS:
             raise DropspinError(f"{where}: metrics: {metric!r} is measured in every sweep; leave it out.")
     if len({scene.name for scene in sweep.scenes}) < len(sweep.scenes):

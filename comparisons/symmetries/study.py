@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import chain, product
 
 import numpy as np
@@ -140,10 +141,7 @@ def findings_of(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name
 
 def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> tuple[Pairs, Effects | None]:
     """The motions that should be equal, and the function that measures effects of rounding; None if it has no effect."""
-
-    def effects() -> list[Array]:
-        return effects_of_rounding(entry, scene, dt, own, perturbed_starts(entry, scene))
-
+    effects = partial(effects_of_rounding, entry, scene, dt, own)
     if name == AGAIN:
         return [(own, states_of(entry, scene, dt))], None
     if name in SYMMETRIES:
@@ -179,10 +177,7 @@ def _halves(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> tuple
     rest = states_of(entry, nominal, dt)
 
     def effects() -> list[Array]:
-        return [
-            np.concatenate([np.zeros(half), effect])
-            for effect in effects_of_rounding(entry, nominal, dt, rest, perturbed_starts(entry, nominal))
-        ]
+        return [np.concatenate([np.zeros(half), effect]) for effect in effects_of_rounding(entry, nominal, dt, rest)]
 
     return [(own, np.concatenate([own[:half], rest]))], effects
 
@@ -199,10 +194,12 @@ def _transformed(entry: EngineEntry, scene: Scenario, dt: float, own: Array, sym
     return [(own, symmetry.back(times, states))], effects
 
 
-def effects_of_rounding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario]) -> list[Array]:
+def effects_of_rounding(
+    entry: EngineEntry, scene: Scenario, dt: float, own: Array, starts: Iterable[Scenario] | None = None
+) -> list[Array]:
     """The differences of an engine's motion of a scene, states of shape (n, 13), and those from perturbed starts, each of shape (n,)."""
     found = []
-    for start in starts:
+    for start in perturbed_starts(entry, scene) if starts is None else starts:
         with suppress(Breakdown):
             found.append(differences(scene, own, states_of(entry, start, dt)))
     return found

@@ -22,7 +22,7 @@ from dropspin.comparisons.running.parallel import results_in_parallel, started_c
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.symmetries.findings import Effects, Finding, Status, judged
-from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, perturbed_starts, states_of
+from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 
 Array = NDArray[np.float64]
@@ -112,7 +112,7 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
         """Of rounding, on each of two engines."""
         for entry, own in both:
             if entry.label not in effects:
-                found = processes.call(entry, effects_of_rounding, scene, dt, own, perturbed_starts(entry, scene))
+                found = processes.call(entry, effects_of_rounding, scene, dt, own)
                 effects[entry.label] = [] if isinstance(found, Breakdown) else found
         return [effect for entry, _ in both for effect in effects[entry.label]]
 
@@ -134,7 +134,8 @@ def _compared(
 ) -> TwinFinding:
     """The finding for two motions of a scene; `none` is that of engines without motions."""
     difference, unequal = differences(scene, *motions), (motions[0] != motions[1]).any(axis=1)
-    until = min(_first_flight_end(scene, dt, states) for states in motions) + 1
+    times = dt * np.arange(len(difference), dtype=float)
+    until = 1 + min(int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end) for states in motions)
     judgement = judged(Finding(scene.name, none.engine, none.twin, "not run"), scene, dt, [motions], effects, precision)
     return replace(
         none,
@@ -145,11 +146,6 @@ def _compared(
         beyond={level: _first(difference > level) for level in LEVELS},
         unexplained=judgement.step,
     )
-
-
-def _first_flight_end(scene: Scenario, dt: float, states: Array) -> int:
-    times = dt * np.arange(len(states), dtype=float)
-    return int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end)
 
 
 def _first(rows: NDArray[np.bool_]) -> int | None:

@@ -23,28 +23,17 @@ from dropspin.comparisons.tradeoff.costs import WORLDS, cost, costs_per_world, l
 from dropspin.comparisons.tradeoff.errors import BUDGET, Ladder, errors_over_steps
 from dropspin.comparisons.tradeoff.points import CostPoint, TradeOff, spread
 from dropspin.scenarios import DropspinError, Scenario, truth_for
-from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.errors import verify_known
 
 IN_FLIGHT = (
-    "wang",
-    "wang[rotation=gyroscopic]",
-    "wang[rotation=implicit-gyroscopic]",
-    "wang[rotation=midpoint]",
-    "wang[rotation=rk4]",
-    "wang[rotation=exact]",
-    "mujoco",
-    "mujoco[integrator=implicitfast]",
-    "mujoco[integrator=rk4]",
-    "pybullet",
+    *("wang", "wang[rotation=gyroscopic]", "wang[rotation=implicit-gyroscopic]"),
+    *("wang[rotation=midpoint]", "wang[rotation=rk4]", "wang[rotation=exact]"),
+    *("mujoco", "mujoco[integrator=implicitfast]", "mujoco[integrator=rk4]", "pybullet"),
 )
 ON_A_FLOOR = (
-    "wang",
-    "wang[contact=sequential,law=coulomb,rotation=rk4]",
-    "mujoco",
-    "mujoco[spring_steps=20]",
-    "mujoco[integrator=rk4,spring_steps=20]",
-    "pybullet",
-    "pybullet[coordinates=multibody]",
+    *("wang", "wang[contact=sequential,law=coulomb,rotation=rk4]"),
+    *("mujoco", "mujoco[spring_steps=20]", "mujoco[integrator=rk4,spring_steps=20]"),
+    *("pybullet", "pybullet[coordinates=multibody]"),
 )
 ROUNDS, BATCH_ROUNDS = 9, 3
 MOST_WORLDS = 1 << 20
@@ -102,8 +91,7 @@ def tradeoff(
     of_the_motion = leading_metric(scene)
     chosen = of_the_motion if metric is None else metric
     known = [one.name for one in metrics_for(scene, truth)]
-    if chosen not in known:
-        raise UnknownName(f"{scene.name}'s metric", chosen, known)
+    verify_known(f"{scene.name}'s metric", [chosen], known)
     asked = engine_entries(engines, IN_FLIGHT if scene.floor is None else ON_A_FLOOR)
     levels = {entry.label: [] if entry.engine is None else entry.engine.accuracy_levels() for entry in asked}
     entries = {one.label: one for entry in asked for one in (entry, *engine_entries(levels[entry.label]))}

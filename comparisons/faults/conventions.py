@@ -64,6 +64,10 @@ def _times(factor: float | Array) -> Change:
     return lambda _, part: factor * part
 
 
+def _inverted(_: Array, orientation: Array) -> Array:
+    return conjugate(orientation)
+
+
 def _z_up(sign: float, but: slice | None = None) -> Reported:
     """States in a frame with z up, (x, y, z) reported as (x, -z, y) or (x, z, -y), except for one part of them."""
 
@@ -93,26 +97,15 @@ REORDERED = "the quaternion appears to be reordered from [w, x, y, z], which was
 CONVERTED = "angular velocity appears to be converted from the body frame, in which it was not"
 BODY_TO_WORLD = "a state has [x, y, z, w], body to world"
 IN_WORLD = "a state has it in the world frame"
+IN_DEGREES = "angular velocity appears to be in degrees per second"
 CONVENTIONS = (
     *_convention(ORIENTATION, "the quaternion appears to be ordered [w, x, y, z]", BODY_TO_WORLD, _rolled(1), _rolled(-1)),
     *_convention(ORIENTATION, REORDERED, BODY_TO_WORLD, _rolled(-1), _rolled(1)),
-    *_convention(
-        ORIENTATION,
-        "the orientation appears to be inverted, world to body",
-        BODY_TO_WORLD,
-        wrong=lambda _, q: conjugate(q),
-        right=lambda _, q: conjugate(q),
-    ),
+    *_convention(ORIENTATION, "the orientation appears to be inverted, world to body", BODY_TO_WORLD, _inverted, _inverted),
     *_convention(SPIN, "angular velocity appears to be in the body frame", IN_WORLD, unrotate, rotate),
     *_convention(SPIN, CONVERTED, IN_WORLD, rotate, unrotate),
     *_convention(VELOCITY, "velocity appears to be in the body frame", IN_WORLD, unrotate, rotate),
-    *_convention(
-        SPIN,
-        "angular velocity appears to be in degrees per second",
-        "a state has rad/s",
-        wrong=lambda _, w: np.rad2deg(w),
-        right=lambda _, w: np.deg2rad(w),
-    ),
+    *_convention(SPIN, IN_DEGREES, "a state has rad/s", _times(np.rad2deg(1.0)), _times(np.deg2rad(1.0))),
     *_convention(SPIN, "angular velocity has the opposite sign", "it is right-handed", _times(-1.0), _times(-1.0)),
     *_convention(VELOCITY, "velocity has the opposite sign", "it is the rate of the position", _times(-1.0), _times(-1.0)),
     *_convention(RATES, "velocity and angular velocity appear to be swapped", "velocity comes first", _rolled(3), _rolled(3)),

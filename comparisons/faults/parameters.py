@@ -22,11 +22,6 @@ MULTIPLIES = "an engine that multiplies the values of two bodies needs 1 for the
 AVERAGES = "an engine that averages the values of two bodies needs the scene's value on both"
 
 
-def _faults_of(about: str, faults: dict[str, Simulated]) -> list[FaultModel]:
-    """Faults of one thing in the scene that is simulated: a message and a change of the scene each."""
-    return [FaultModel(message, simulated, about=about) for message, simulated in faults.items()]
-
-
 def _gravity(change: Callable[[Array, float], Array]) -> Simulated:
     """A change of gravity, by a function of the acceleration and of the mass."""
 
@@ -85,87 +80,72 @@ def _scaled(size: str, by: float) -> Simulated:
     return scaled
 
 
+PARAMETERS: dict[str, dict[str, Simulated]] = {
+    "gravity": {
+        "gravity is omitted": _gravity(lambda g, _: 0.0 * g),
+        "gravity has the opposite sign; the scene gives an acceleration, y up": _gravity(lambda g, _: -g),
+        "gravity is 9.81 m/s² along -y for every scene": _gravity(lambda g, _: 9.81 * np.array([0.0, -1.0, 0.0])),
+        "gravity is 9.81 m/s² along -z for every scene; y is up": _gravity(lambda g, _: 9.81 * np.array([0.0, 0.0, -1.0])),
+        "gravity acts along -z; y is up": _gravity(lambda g, _: np.linalg.norm(g) * np.array([0.0, 0.0, -1.0])),
+        "gravity acts along -y with the scene's magnitude; it is a vector": _gravity(
+            lambda g, _: np.linalg.norm(g) * np.array([0.0, -1.0, 0.0])
+        ),
+        "gravity's y and z appear to be swapped; y is up": _gravity(lambda g, _: g[[0, 2, 1]]),
+        "gravity appears to be given in a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, 1, -1]),
+        "gravity appears to be rotated into a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, -1, 1]),
+        "gravity is multiplied by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass),
+        "gravity is divided by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass**-1.0),
+        "gravity acts twice": _gravity(lambda g, _: 2.0 * g),
+    },
+    "damping": {
+        "damping is omitted": lambda scene: scene.model_copy(update={"damping": None}),
+        "angular damping is omitted": changed_table("damping", angular=0.0),
+        "linear damping is omitted": changed_table("damping", linear=0.0),
+        "linear damping acts on the angular velocity as well": _angular_like_linear,
+    },
+    "mass": {"mass is 1 kg for every scene": changed_table("body", mass=1.0)},
+    "inertia": {
+        "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball": _as_a_ball,
+        **{f"the moments of inertia appear to be permuted to ({named})": _permuted_moments(order) for order, named in ORDERS.items()},
+        "products of inertia are omitted: the body's own axes are not principal axes": _scaled_inertia(lambda mass: 1.0),
+        "inertia is twice as large": _scaled_inertia(lambda mass: 2.0),
+        "inertia is half as large": _scaled_inertia(lambda mass: 0.5),
+        "inertia is multiplied by the mass": _scaled_inertia(lambda mass: mass),
+        "inertia is divided by the mass": _scaled_inertia(lambda mass: 1.0 / mass),
+        "inertia is that of the solid shape for every scene": changed_table("body", inertia="solid"),
+    },
+    "floor": {"the body falls through the floor": lambda scene: scene.model_copy(update={"floor": None})},
+    "restitution": {
+        "restitution is 0 for every scene": changed_table("floor", restitution=0.0),
+        "restitution is 1 for every scene": changed_table("floor", restitution=1.0),
+        f"restitution appears to be squared; {MULTIPLIES}": changed_table("floor", restitution=lambda e: e**2),
+        f"restitution appears to be halved; {AVERAGES}": changed_table("floor", restitution=lambda e: e / 2),
+        "restitution is the mean of the scene's value and 1": changed_table("floor", restitution=lambda e: (e + 1) / 2),
+        "restitution is 0 below a speed that the engine sets; the scene's rest_speed is 0": changed_table("floor", rest_speed=SLOW),
+    },
+    "friction": {
+        "friction is omitted": changed_table("floor", friction="none"),
+        "friction is infinite for every scene": changed_table("floor", friction="infinite"),
+        "friction is 0.5 for every scene": changed_table("floor", friction=0.5),
+        "friction is 1 for every scene": changed_table("floor", friction=1.0),
+        f"friction appears to be squared; {MULTIPLIES}": _friction(lambda mu: mu**2),
+        f"friction appears to be halved; {AVERAGES}": _friction(lambda mu: mu / 2),
+    },
+    "size": {
+        **{f"the box's extents appear to be permuted to ({named})": _permuted_extents(order) for order, named in ORDERS.items()},
+        "the sphere is half as large as it should be: is a radius read as a diameter?": _scaled("radius", 0.5),
+        "the sphere is twice as large as it should be: is a diameter read as a radius?": _scaled("radius", 2.0),
+        "the box is half as large as it should be: are half extents read as extents?": _scaled("half_extents", 0.5),
+        "the box is twice as large as it should be: are extents read as half extents?": _scaled("half_extents", 2.0),
+    },
+}
+"""By what is wrong: the message of each fault, and the scene that is simulated."""
 FAULT_MODELS = (
     *CONVENTIONS,
-    *_faults_of(
-        "gravity",
-        {
-            "gravity is omitted": _gravity(lambda g, _: 0.0 * g),
-            "gravity has the opposite sign; the scene gives an acceleration, y up": _gravity(lambda g, _: -g),
-            "gravity is 9.81 m/s² along -y for every scene": _gravity(lambda g, _: 9.81 * np.array([0.0, -1.0, 0.0])),
-            "gravity is 9.81 m/s² along -z for every scene; y is up": _gravity(lambda g, _: 9.81 * np.array([0.0, 0.0, -1.0])),
-            "gravity acts along -z; y is up": _gravity(lambda g, _: np.linalg.norm(g) * np.array([0.0, 0.0, -1.0])),
-            "gravity acts along -y with the scene's magnitude; it is a vector": _gravity(
-                lambda g, _: np.linalg.norm(g) * np.array([0.0, -1.0, 0.0])
-            ),
-            "gravity's y and z appear to be swapped; y is up": _gravity(lambda g, _: g[[0, 2, 1]]),
-            "gravity appears to be given in a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, 1, -1]),
-            "gravity appears to be rotated into a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, -1, 1]),
-            "gravity is multiplied by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass),
-            "gravity is divided by the mass; it is an acceleration, not a force": _gravity(lambda g, mass: g * mass**-1.0),
-            "gravity acts twice": _gravity(lambda g, _: 2.0 * g),
-        },
-    ),
-    *_faults_of(
-        "damping",
-        {
-            "damping is omitted": lambda scene: scene.model_copy(update={"damping": None}),
-            "angular damping is omitted": changed_table("damping", angular=0.0),
-            "linear damping is omitted": changed_table("damping", linear=0.0),
-            "linear damping acts on the angular velocity as well": _angular_like_linear,
-        },
-    ),
-    *_faults_of("mass", {"mass is 1 kg for every scene": changed_table("body", mass=1.0)}),
-    FaultModel(
-        "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball",
-        simulated=_as_a_ball,
-        is_peculiarity=True,
-        about="inertia",
-    ),
-    *_faults_of(
-        "inertia",
-        {
-            **{f"the moments of inertia appear to be permuted to ({named})": _permuted_moments(order) for order, named in ORDERS.items()},
-            "products of inertia are omitted: the body's own axes are not principal axes": _scaled_inertia(lambda mass: 1.0),
-            "inertia is twice as large": _scaled_inertia(lambda mass: 2.0),
-            "inertia is half as large": _scaled_inertia(lambda mass: 0.5),
-            "inertia is multiplied by the mass": _scaled_inertia(lambda mass: mass),
-            "inertia is divided by the mass": _scaled_inertia(lambda mass: 1.0 / mass),
-            "inertia is that of the solid shape for every scene": changed_table("body", inertia="solid"),
-        },
-    ),
-    *_faults_of("floor", {"the body falls through the floor": lambda scene: scene.model_copy(update={"floor": None})}),
-    *_faults_of(
-        "restitution",
-        {
-            "restitution is 0 for every scene": changed_table("floor", restitution=0.0),
-            "restitution is 1 for every scene": changed_table("floor", restitution=1.0),
-            f"restitution appears to be squared; {MULTIPLIES}": changed_table("floor", restitution=lambda e: e**2),
-            f"restitution appears to be halved; {AVERAGES}": changed_table("floor", restitution=lambda e: e / 2),
-            "restitution is the mean of the scene's value and 1": changed_table("floor", restitution=lambda e: (e + 1) / 2),
-            "restitution is 0 below a speed that the engine sets; the scene's rest_speed is 0": changed_table("floor", rest_speed=SLOW),
-        },
-    ),
-    *_faults_of(
-        "friction",
-        {
-            "friction is omitted": changed_table("floor", friction="none"),
-            "friction is infinite for every scene": changed_table("floor", friction="infinite"),
-            "friction is 0.5 for every scene": changed_table("floor", friction=0.5),
-            "friction is 1 for every scene": changed_table("floor", friction=1.0),
-            f"friction appears to be squared; {MULTIPLIES}": _friction(lambda mu: mu**2),
-            f"friction appears to be halved; {AVERAGES}": _friction(lambda mu: mu / 2),
-        },
-    ),
-    *_faults_of(
-        "size",
-        {
-            **{f"the box's extents appear to be permuted to ({named})": _permuted_extents(order) for order, named in ORDERS.items()},
-            "the sphere is half as large as it should be: is a radius read as a diameter?": _scaled("radius", 0.5),
-            "the sphere is twice as large as it should be: is a diameter read as a radius?": _scaled("radius", 2.0),
-            "the box is half as large as it should be: are half extents read as extents?": _scaled("half_extents", 0.5),
-            "the box is twice as large as it should be: are extents read as half extents?": _scaled("half_extents", 2.0),
-        },
+    *(
+        FaultModel(message, simulated, is_peculiarity=simulated is _as_a_ball, about=about)
+        for about, faults in PARAMETERS.items()
+        for message, simulated in faults.items()
     ),
 )
 """All faults of adapters that are known; earlier ones are preferred where several give the same motion."""

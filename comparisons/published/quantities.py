@@ -6,7 +6,6 @@ No state is synchronised: sources take velocities as they are beside positions, 
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,42 +22,6 @@ BALLS = 49
 """Balls of SimBenchmark's bouncing test, which do not touch each other and move alike; their energies add up."""
 
 
-@dataclass(frozen=True)
-class _Run:
-    """What quantities are made of; a subscript 0 is the start."""
-
-    scene: Scenario
-    motion: Trajectory
-
-    @property
-    def momentum(self) -> Array:
-        """L [kg m²/s], shape (n, 3)."""
-        return angular_momentum(self.scene, self.motion)
-
-    @property
-    def momentum_errors(self) -> Array:
-        """|L - L₀| [kg m²/s], shape (n,)."""
-        momentum = self.momentum
-        return np.asarray(np.linalg.norm(momentum - momentum[0], axis=1))
-
-    @property
-    def energy(self) -> Array:
-        """E [J], kinetic and potential, which is 0 at the initial position, shape (n,)."""
-        return energy(self.scene, self.motion, synchronised=False)
-
-    @property
-    def kinetic_ratios(self) -> Array:
-        """Kinetic energy over that at the start, shape (n,)."""
-        kinetic = kinetic_energy(self.scene, self.motion)
-        return kinetic / kinetic[0]
-
-    @property
-    def from_parabola(self) -> Array:
-        """Vectors from the parabola x₀ + v₀ t + g t²/2 [m], shape (n, 3)."""
-        t, motion = self.motion.t[:, None], self.motion
-        return motion.position - (motion.position[0] + motion.velocity[0] * t + 0.5 * self.scene.acceleration * t**2)
-
-
 def quantity(name: str) -> Quantity:
     """The quantity of a name; `height at T s` [m] and `speed at T s` [m/s] exist for every time T of a step.
 
@@ -68,7 +31,7 @@ def quantity(name: str) -> Quantity:
     if at := AT.fullmatch(name):
         return _at(at[1], float(at[2]))
     verify_known("quantity", [name], QUANTITIES)
-    return lambda scene, motion: float(QUANTITIES[name](_Run(scene, motion)))
+    return lambda scene, motion: float(QUANTITIES[name](scene, motion))
 
 
 def _at(what: str, time: float) -> Quantity:
@@ -79,29 +42,62 @@ def _at(what: str, time: float) -> Quantity:
     return value
 
 
-def _rebound_height(run: _Run) -> float:
+def _momentum_errors(scene: Scenario, motion: Trajectory) -> Array:
+    """|L - L₀| [kg m²/s], shape (n,)."""
+    momentum = angular_momentum(scene, motion)
+    return np.asarray(np.linalg.norm(momentum - momentum[0], axis=1))
+
+
+def _momentum(scene: Scenario, motion: Trajectory) -> Any:
+    """|L₀| [kg m²/s]."""
+    return np.linalg.norm(angular_momentum(scene, motion)[0])
+
+
+def _energy(scene: Scenario, motion: Trajectory) -> Array:
+    """E [J], kinetic and potential, which is 0 at the initial position, shape (n,)."""
+    return energy(scene, motion, synchronised=False)
+
+
+def _kinetic_ratios(scene: Scenario, motion: Trajectory) -> Array:
+    """Kinetic energy over that at the start, shape (n,)."""
+    kinetic = kinetic_energy(scene, motion)
+    return kinetic / kinetic[0]
+
+
+def _from_parabola(scene: Scenario, motion: Trajectory) -> Array:
+    """Distances from the parabola x₀ + v₀ t + g t²/2 [m], shape (n,)."""
+    t, x = motion.t[:, None], motion.position
+    return np.asarray(np.linalg.norm(x - (x[0] + motion.velocity[0] * t + 0.5 * scene.acceleration * t**2), axis=1))
+
+
+def _mean_square_energy_error(scene: Scenario, motion: Trajectory) -> Any:
+    """The mean (ΔE)² of the states before each step, of all balls [J²]."""
+    found = BALLS * _energy(scene, motion)
+    return np.mean((found[:-1] - found[0]) ** 2)
+
+
+def _rebound_height(scene: Scenario, motion: Trajectory) -> float:
     """The largest height of a ball's lowest point after its first lowest position [m]."""
-    height = run.motion.position[:, 1] - run.scene.body.rounding
+    height = motion.position[:, 1] - scene.body.rounding
     turns = np.flatnonzero((height[1:-1] < height[:-2]) & (height[1:-1] <= height[2:]))
     return float(height[turns[0] + 1 :].max()) if len(turns) else math.nan
 
 
-def _last_rotation(run: _Run) -> float:
+def _last_rotation(scene: Scenario, motion: Trajectory) -> float:
     """The angle between the first and the last orientation [rad]."""
-    cosine = abs(float(run.motion.orientation[0] @ run.motion.orientation[-1]))
-    return 2.0 * math.acos(min(cosine, 1.0))
+    return 2.0 * math.acos(min(abs(float(motion.orientation[0] @ motion.orientation[-1])), 1.0))
 
 
-QUANTITIES: Mapping[str, Callable[[_Run], Any]] = {
-    "distance along z [m]": lambda run: run.motion.position[-1, 2] - run.motion.position[0, 2],
-    "max |ΔL|/|L₀|": lambda run: run.momentum_errors.max() / np.linalg.norm(run.momentum[0]),
-    "max |ΔE|/E₀": lambda run: np.abs(run.energy - run.energy[0]).max() / run.energy[0],
-    "max |Δx| [m]": lambda run: np.linalg.norm(run.from_parabola, axis=1).max(),
-    "|ΔL|/|L₀| at the end": lambda run: run.momentum_errors[-1] / np.linalg.norm(run.momentum[0]),
-    "|ΔL| at the end [kg m²/s]": lambda run: run.momentum_errors[-1],
-    "E/E₀ at the end": lambda run: run.kinetic_ratios[-1],
-    "max E/E₀": lambda run: run.kinetic_ratios[1:].max(),  # after any step
-    "mean (ΔE)² [J²]": lambda run: np.mean((BALLS * run.energy[:-1] - BALLS * run.energy[0]) ** 2),  # of the states before each step
+QUANTITIES: Mapping[str, Callable[[Scenario, Trajectory], Any]] = {
+    "distance along z [m]": lambda _, motion: motion.position[-1, 2] - motion.position[0, 2],
+    "max |ΔL|/|L₀|": lambda *run: _momentum_errors(*run).max() / _momentum(*run),
+    "max |ΔE|/E₀": lambda *run: np.abs(_energy(*run) - _energy(*run)[0]).max() / _energy(*run)[0],
+    "max |Δx| [m]": lambda *run: _from_parabola(*run).max(),
+    "|ΔL|/|L₀| at the end": lambda *run: _momentum_errors(*run)[-1] / _momentum(*run),
+    "|ΔL| at the end [kg m²/s]": lambda *run: _momentum_errors(*run)[-1],
+    "E/E₀ at the end": lambda *run: _kinetic_ratios(*run)[-1],
+    "max E/E₀": lambda *run: _kinetic_ratios(*run)[1:].max(),  # after any step
+    "mean (ΔE)² [J²]": _mean_square_energy_error,
     "rebound height [m]": _rebound_height,
     "rotation [rad]": _last_rotation,
 }

@@ -7,14 +7,13 @@ from typing import cast
 
 from dropspin.comparisons.conformance import protocol, symmetries, timing
 from dropspin.comparisons.conformance.motions import check_motion
-from dropspin.comparisons.conformance.outcomes import CheckOutcome, CheckResult, NotPassed, described, whole_traceback
+from dropspin.comparisons.conformance.outcomes import OUTCOMES, CheckOutcome, CheckResult, described, whole_traceback
 from dropspin.comparisons.conformance.probes import PROBES
 from dropspin.comparisons.engines.base import Diverged, Engine
 from dropspin.comparisons.running.entries import present_entry
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.comparisons.running.verification import BuildMismatch
 from dropspin.scenarios.errors import verify_known
 
 CHECKS: dict[str, Callable[[Engine], str]] = {
@@ -34,7 +33,7 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
     "files": protocol.check_files,
     **{probe.name: partial(check_motion, probe=probe) for probe in PROBES},
 }
-"""By name; each returns what it found, and raises `NotPassed` otherwise."""
+"""By name; each returns what it found, and raises one of `OUTCOMES` otherwise."""
 
 
 def conform(
@@ -77,9 +76,8 @@ def run_check(entry: EngineEntry, check: str, folder: str | None = None) -> Chec
     tempfile.tempdir = folder
     try:
         return CheckResult(check, "passed", CHECKS[check](entry.adapter))
-    except (NotPassed, BuildMismatch) as ended:
-        outcome = ended.outcome if isinstance(ended, NotPassed) else "failed"
-        return CheckResult(check, outcome, str(ended), whole_traceback(ended) if ended.__cause__ else "")
+    except tuple(OUTCOMES) as ended:
+        return CheckResult(check, OUTCOMES[type(ended)], str(ended), whole_traceback(ended) if ended.__cause__ else "")
     except Diverged as diverged:
         return CheckResult(check, "failed", f"the engine diverged: {diverged}")
     except Exception as error:  # an adapter is somebody else's code

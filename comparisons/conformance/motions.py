@@ -9,7 +9,7 @@ what differs from the exact solution, and by how much; what is right is left out
 import math
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,12 +78,9 @@ def _own_law(engine: Engine, probe: Probe, found: Array) -> Law | None:
 
 def _explains(limitation: KnownLimitation, found: Array, exact: Array, probe: Probe) -> bool:
     """Whether a known limitation explains the errors of position and attitude, and with them those of the velocities."""
-    position, attitude, _, _ = differences(found, exact)
-    allowed = [
-        max(limitation.explained_errors.get(f"{name}_error", 0.0), own)
-        for name, own in zip(("position", "orientation"), probe.allowed, strict=False)
-    ]
-    return bool(limitation.explained_errors) and bool(position <= allowed[0] and attitude <= allowed[1])
+    explained, (position, attitude, _, _) = limitation.explained_errors, differences(found, exact)
+    errors = zip(("position_error", "orientation_error"), (position, attitude), probe.allowed, strict=False)
+    return bool(explained) and all(error <= max(explained.get(name, 0.0), own) for name, error, own in errors)
 
 
 def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Array | None]) -> FaultModel | None:
@@ -143,12 +140,12 @@ def _motions(probe: Probe, faults: Iterable[FaultModel]) -> dict[FaultModel, Arr
 
 def explain_start(scene: Scenario, state: Array, allowed: float) -> FaultModel | None:
     """The fault, or the two, that give a state at the start, shape (13,), within `allowed` times its largest number, if any."""
-    for candidates in (FAULT_MODELS, _pairs()):
-        for fault in candidates:
-            start, close = fault.start(scene), allowed * np.abs(scene.initial_state).max()
-            # A fault made both when setting and when reading a state cancels at the start, which then is no evidence of it.
-            if np.abs(start - state).max() <= close < np.abs(start - scene.initial_state).max():
-                return fault
+    close = allowed * np.abs(scene.initial_state).max()
+    for fault in chain(FAULT_MODELS, _pairs()):
+        start = fault.start(scene)
+        # A fault made both when setting and when reading a state cancels at the start, which then is no evidence of it.
+        if np.abs(start - state).max() <= close < np.abs(start - scene.initial_state).max():
+            return fault
     return None
 
 
@@ -156,25 +153,22 @@ def _pairs() -> Iterable[FaultModel]:
     return (first.and_also(second) for first, second in combinations(FAULT_MODELS, 2) if first.about != second.about)
 
 
-def symptoms(probe: Probe, motion: Trajectory) -> list[str]:
+def symptoms(probe: Probe, motion: Trajectory) -> Iterator[str]:
     """What is wrong in an engine's motion of a probe, the most specific first; at least one sentence."""
-    rows = motion.states
+    rows, exact = motion.states, probe.exact
     if not np.isfinite(rows).all():
-        return ["the state is not finite"]
-    exact = probe.exact
+        yield "the state is not finite"
+        return
     if probe.scene.floor is not None:
-        found = [*_of_first_contact(probe, Comparison.with_truth(probe.scene, motion, exact_solution(probe.scene)))]
+        yield from _of_first_contact(probe, Comparison.with_truth(probe.scene, motion, exact_solution(probe.scene)))
     elif not np.any(rows[-1, RATES]) and np.any(exact[-1, RATES]):
-        return ["the body stops: the engine puts it to sleep"]
-    else:
-        found = [*_of_flight(probe.scene, rows[-1], exact[-1])] if probe.scene.gravity is None else []
-    errors = differences(rows[probe.rows], exact)
-    beyond = [
-        f"{name} is off by {error:.{min(_digits(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
-        for (name, unit), error, allowed in zip(QUANTITIES, errors, probe.allowed, strict=True)
-        if not error <= allowed
-    ]
-    return [*found, *beyond]
+        yield "the body stops: the engine puts it to sleep"
+        return
+    elif probe.scene.gravity is None:
+        yield from _of_flight(probe.scene, rows[-1], exact[-1])
+    for (name, unit), error, allowed in zip(QUANTITIES, differences(rows[probe.rows], exact), probe.allowed, strict=True):
+        if not error <= allowed:
+            yield f"{name} is off by {error:.{min(_digits(error, allowed), 4)}g} {unit} (allowed: {allowed:g} {unit})"
 
 
 def _of_flight(scene: Scenario, end: Array, exact: Array) -> Iterator[str]:

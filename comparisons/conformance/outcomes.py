@@ -3,10 +3,11 @@
 import os
 import sys
 import traceback
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from dropspin.comparisons.engines import exceptions
 from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.running.verification import BuildMismatch
 
 CheckOutcome = Literal["passed", "failed", "noted", "declined", "crashed", "timed_out"]
 """`noted` is a peculiarity of the engine: the adapter is right."""
@@ -28,28 +29,20 @@ class CheckResult(NamedTuple):
     traceback: str = ""
 
 
-class NotPassed(Exception):
-    """A check ends; the text says why. A check that passes returns what was found."""
-
-    outcome: ClassVar[CheckOutcome]
+class CheckFailed(Exception):
+    """A check ends, because the adapter is wrong; the text says what is wrong, and what is expected."""
 
 
-class CheckFailed(NotPassed):
-    """The adapter is wrong; the text says what is wrong, and what is expected."""
-
-    outcome = "failed"
+class Noted(Exception):
+    """A check ends, because the engine has a peculiarity, which the text states; the adapter is right."""
 
 
-class Noted(NotPassed):
-    """The engine has a peculiarity, which the text states; the adapter is right."""
-
-    outcome = "noted"
+class Declined(Exception):
+    """A check ends, because the engine declines all scenes that it needs."""
 
 
-class Declined(NotPassed):
-    """The engine declines all scenes that a check needs."""
-
-    outcome = "declined"
+OUTCOMES: dict[type[Exception], CheckOutcome] = {CheckFailed: "failed", BuildMismatch: "failed", Noted: "noted", Declined: "declined"}
+"""By the exception that ends a check; a check that passes returns what was found."""
 
 
 def described(error: Exception, engine: Engine) -> str:

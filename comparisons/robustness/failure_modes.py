@@ -80,9 +80,10 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
         whole = Comparison.with_truth(motion.scene, motion.whole, motion.truth)
         exact = None if whole.reference is None else whole.reference[: len(motion.own)]
         own = Comparison.with_truth(motion.scene, motion.own, motion.truth, exact)
-        stability = [*_energy_gain(whole), *_tunnels(motion), *_sinks(motion)]
-        accuracy = [*_errors(motion, own, within), *_position_off(own), *_never_rests(motion, whole)]
-    return worst(stability + accuracy)
+        found = [*_energy_gain(whole), *_errors(motion, own, within), *_position_off(own)]
+        if motion.scene.floor is not None:
+            found += [*_tunnels(motion), *_sinks(motion), *_never_rests(motion, whole)]
+    return worst(found)
 
 
 def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
@@ -106,8 +107,6 @@ def _may_gain(scene: Scenario) -> bool:
 
 def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:
     """The whole body below the floor, at the end or in between."""
-    if motion.scene.floor is None:
-        return
     whole, body = motion.whole, motion.scene.body
     highest = whole.position[:, 1] + body.rounding
     highest += np.max([offset_of(tuple(whole.orientation.T), vertex) for vertex in body.hull.tolist()], axis=0)
@@ -121,8 +120,6 @@ def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:
 
 def _sinks(motion: ExtendedMotion) -> Iterator[Diagnosis]:
     """Below the floor during the tenth of the motion after its middle, and deeper throughout the last tenth."""
-    if motion.scene.floor is None:
-        return
     heights, share = lowest_height(motion.scene, motion.whole), motion.whole.t / motion.whole.t[-1]
     middle, end = (float(-heights[(share >= since) & (share <= since + 0.1)].max(initial=-math.inf)) for since in (0.5, 0.9))
     deeper = DEEPER * motion.scene.body.size
@@ -178,7 +175,7 @@ def _position_off(own: Comparison) -> Iterator[Diagnosis]:
 def _never_rests(motion: ExtendedMotion, whole: Comparison) -> Iterator[Diagnosis]:
     """Moving in the last tenth of the motion, during which the body rests in the exact solution."""
     exact, late = whole.reference, motion.whole.t >= 0.9 * motion.whole.t[-1]
-    if exact is None or motion.scene.floor is None or len(exact) < len(motion.whole) or exact.velocity[late].any():
+    if exact is None or len(exact) < len(motion.whole) or exact.velocity[late].any():
         return
     fastest = float(np.linalg.norm(motion.whole.velocity[late], axis=1).max())
     allowed = motion.dt * float(np.linalg.norm(motion.scene.acceleration))

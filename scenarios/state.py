@@ -19,3 +19,5 @@ UP = np.array([0.0, 1.0, 0.0])
 """The upward direction in the world frame, which is the normal of the floor."""
 
 PARTS = {"position": POSITION, "orientation": ORIENTATION, "velocity": VELOCITY, "angular_velocity": SPIN}
+STATE_COLUMNS = tuple(f"{name}_{axis}" for name, part in PARTS.items() for axis in "xyzw"[: part.stop - part.start])
+"""The name of each number of a state in a table, such as `position_y`."""

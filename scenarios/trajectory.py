@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, STATE_COLUMNS, VELOCITY, Array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,9 +64,7 @@ class Trajectory:
         """
         import pandas as pd
 
-        parts = {"position": "xyz", "orientation": "xyzw", "velocity": "xyz", "angular_velocity": "xyz"}
-        columns = [f"{part}_{axis}" for part, axes in parts.items() for axis in axes]
-        return pd.DataFrame(self.states, index=pd.Index(self.t, name="t"), columns=columns)
+        return pd.DataFrame(self.states, index=pd.Index(self.t, name="t"), columns=list(STATE_COLUMNS))
 
     def __repr__(self) -> str:
         if len(self) == 0:

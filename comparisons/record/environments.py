@@ -17,27 +17,15 @@ from threading import Event
 from typing import Any
 
 from dropspin.comparisons.engines.packages import is_npm
-from dropspin.comparisons.judging.verdicts import Verdict
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.running.processes import Closed
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 
 POLL = 0.5  # s
 LONGEST_REASON = 300
 HOME = Path(__file__).parents[3]
-
-
-class NotMeasured(Exception):
-    """A release that has no results; the text says why."""
-
-    verdict: Verdict = "broken"
-
-
-class NotInstallable(NotMeasured):
-    """A release that cannot be installed here, but may be another day."""
-
-    verdict = "missing"
 
 
 def releases(package: str, oldest: str) -> list[str]:
@@ -89,7 +77,7 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
         `rows` and `versions`, as `release.py` writes them.
 
     Raises:
-        NotMeasured: It cannot be installed or run.
+        Breakdown: It cannot be run, or cannot be installed here, which may be possible another day (`missing`).
         Closed: `stopping` was set.
     """
     own = plan.engines[engine]
@@ -101,13 +89,13 @@ def measured(plan: Plan, engine: str, release: str, time_limit: float, stopping:
             install = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-input", "--only-binary", ":all:"]
         code, output = run([*install, *own.requirements(release)], stopping)
         if code:
-            raise NotInstallable(f"not installable: {without_paths(last_line(output))}")
+            raise Breakdown("missing", f"not installable: {without_paths(last_line(output))}")
         request, answer = Path(folder, "request.json"), Path(folder, "answer.json")
         asked = {"package": own.package, "release": release, "labels": own.labels, "time_limit": time_limit}
         request.write_text(json.dumps(asked | {"scenes": plan.scenes_of(engine), "dts": plan.dts}), encoding="utf-8")
         code, output = run([python, "-P", "-m", "dropspin.comparisons.record.release", str(request), str(answer)], stopping)
         if code:
-            raise NotMeasured(f"not runnable: exit code {code}: {without_paths(last_line(output))}")
+            raise Breakdown("broken", f"not runnable: exit code {code}: {without_paths(last_line(output))}")
         found: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
     for row in found["rows"]:
         row["reason"] = without_paths(row["reason"])

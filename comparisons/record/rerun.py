@@ -6,10 +6,11 @@ from threading import Event
 from typing import NamedTuple
 
 from dropspin.comparisons.engines.registry import parsed
-from dropspin.comparisons.record.environments import NotMeasured, measured
+from dropspin.comparisons.record.environments import measured
 from dropspin.comparisons.record.findings import Case, Release, read, release_of
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import BLANK, MACHINE, machine
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.errors import verify_known
 
@@ -51,7 +52,7 @@ def rerun(folder: str | Path, plan: Plan, label: str, release: str, scene: str, 
     recorded = _recorded(folder, engine, label, release, scene)
     try:
         found = measured(plan.only(engine, label, scene), engine, release, time_limit, Event())
-    except NotMeasured as failure:
+    except Breakdown as failure:
         raise DropspinError(f"{engine} {release}: {failure}.") from None
     common = {"engine": engine, "release": release, "versions": found["versions"]} | machine()
     now = release_of([{**BLANK, **row, **common} for row in found["rows"]])

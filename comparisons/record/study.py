@@ -12,11 +12,12 @@ from typing import Any
 
 from dropspin.comparisons.engines.adapter_code import built_in_code
 from dropspin.comparisons.engines.registry import BUILT_IN
-from dropspin.comparisons.record.environments import NotMeasured, measured, releases
+from dropspin.comparisons.record.environments import measured, releases
 from dropspin.comparisons.record.plan import Plan
 from dropspin.comparisons.record.store import Record, machine
 from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.parallel import as_done
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios.errors import verify_known
 
 
@@ -88,7 +89,7 @@ def _measured(plan: Plan, time_limit: float, stopping: Event | None, asked: tupl
     """Measure a release, on a worker: its rows, or one with the reason why it has no results; the machine, and the versions of packages."""
     try:
         found = measured(plan, *asked, time_limit, stopping or Event())
-    except NotMeasured as failure:
+    except Breakdown as failure:
         return [{"verdict": failure.verdict, "reason": str(failure)}], machine()
     return found["rows"], machine() | {"versions": found["versions"]}
 

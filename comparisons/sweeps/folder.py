@@ -20,8 +20,9 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
 
 from dropspin.comparisons.results.folder import is_unfinished, written_whole
 from dropspin.comparisons.results.table import schema_of, stored_table
-from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS
 from dropspin.scenarios import DropspinError
+from dropspin.scenarios.state import STATE_COLUMNS
 
 DESCRIPTION = "sweep.json"
 PARTS_PER_FOLDER = 1000
@@ -49,15 +50,16 @@ class SweepFolder:
     Args:
         where: The path or URL.
         identity: A hash of the sweep and of the versions it is run with, which is part of the file names; any by default.
+        part_size: The number of jobs of a part that is written, or of all but the last.
     """
 
-    def __init__(self, where: str, identity: str = "") -> None:
+    def __init__(self, where: str, identity: str = "", part_size: int = 1) -> None:
         self.where = where
         try:
             self._files, self._root = fsspec.core.url_to_fs(where)
         except (ImportError, ValueError) as error:
             raise DropspinError(f"-o {where}: {error}; give a folder, or a URL of a file system that fsspec supports here.") from None
-        self._identity = identity
+        self._identity, self._part_size = identity, part_size
 
     @property
     def address(self) -> str:
@@ -92,15 +94,15 @@ class SweepFolder:
         """Write `sweep.json`."""
         self._put(DESCRIPTION, json.dumps({"identity": self._identity, **description}, indent=1, default=str).encode())
 
-    def write(self, number: int, first: int, last: int, table: pa.Table) -> None:
-        """Write a part: the jobs from number `first` up to, not including, `last`."""
+    def write(self, jobs: range, table: pa.Table) -> None:
+        """Write a part: the table of the jobs with these numbers."""
         content = io.BytesIO()
         pq.write_table(table, content, compression="zstd", write_page_checksum=True)
-        self._put(self._name(number, first, last), content.getvalue())
+        self._put(self._name(jobs), content.getvalue())
 
-    def has(self, number: int, first: int, last: int) -> bool:
+    def has(self, jobs: range) -> bool:
         """Whether the folder has a part."""
-        return bool(self._files.exists(f"{self._root}/{self._name(number, first, last)}"))
+        return bool(self._files.exists(f"{self._root}/{self._name(jobs)}"))
 
     def parts(self) -> dict[range, str]:
         """The paths of the parts, by the numbers of their jobs, in order."""
@@ -127,8 +129,9 @@ class SweepFolder:
         except Exception:  # whatever pyarrow raises for a file that is none
             raise DropspinError(f"{path}: is damaged; delete it, and run its jobs again with --resume.") from None
 
-    def _name(self, number: int, first: int, last: int) -> str:
-        return f"parts/{number // PARTS_PER_FOLDER:06d}/{first:016d}-{last:016d}-{self._identity}.parquet"
+    def _name(self, jobs: range) -> str:
+        folder = jobs.start // (PARTS_PER_FOLDER * self._part_size)
+        return f"parts/{folder:06d}/{jobs.start:016d}-{jobs.stop:016d}-{self._identity}.parquet"
 
     def _put(self, name: str, content: bytes) -> None:
         path, remedy = f"{self._root}/{name}", "the parts written so far are complete: --resume continues the sweep"

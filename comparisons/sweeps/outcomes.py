@@ -16,14 +16,8 @@ from dropspin.comparisons.running.recording import Breakdown, Recording, diverge
 from dropspin.comparisons.running.verification import verified_refusal
 from dropspin.comparisons.sweeps.jobs import Jobs, scene_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
+from dropspin.scenarios.state import STATE_COLUMNS
 
-STATE_COLUMNS = (
-    *(f"position_{axis}" for axis in "xyz"),
-    *(f"orientation_{axis}" for axis in "xyzw"),
-    *(f"velocity_{axis}" for axis in "xyz"),
-    *(f"angular_velocity_{axis}" for axis in "xyz"),
-)
-"""The columns of the final state."""
 STANDARD_METRICS = ("energy_drift", "energy_gain", "penetration", "rebound", "rest_time")
 """Measured in every sweep; none needs a reference solution."""
 

@@ -15,7 +15,7 @@ from dropspin.comparisons.running.parallel import as_done, started_crews, work_i
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.sweeps.folder import Description, SweepFolder
 from dropspin.comparisons.sweeps.jobs import Sweep
-from dropspin.comparisons.sweeps.work import Part, Work, installed_versions
+from dropspin.comparisons.sweeps.work import Work, installed_versions
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import DropspinError
 
@@ -47,7 +47,7 @@ def run_sweep(
         DropspinError: The folder holds something else, or is not writable.
     """
     work = Work.of(sweep, resources)
-    folder = SweepFolder(where, work.identity)
+    folder = SweepFolder(where, work.identity, work.part_size)
     earlier, present = folder.description(), folder.parts()
     kept = sum(map(len, present))
     if earlier is not None and SweepFolder(where).parts():  # without a part, the sweep may be given again
@@ -58,8 +58,7 @@ def run_sweep(
             )
     report = on_progress or ignore
     report(kept)
-    starts = {jobs.start for jobs in present}
-    missing = (part for part in work.parts if part.first not in starts)
+    missing = (part for part in work.parts if part not in present)
     if scheduler is None:
         folder.begin(work.description)
         _run_here(work, missing, folder, report)
@@ -79,15 +78,15 @@ def _verify_same_sweep(where: str, earlier: Description, work: Work) -> None:
     raise DropspinError(f"{where}: holds {difference}; choose another folder with -o.")
 
 
-def _run_here(work: Work, parts: Iterator[Part], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
-    def run_part(part: Part, processes: EngineProcesses, raise_if_stopping: Callable[[], None]) -> None:
-        folder.write(*part, work.table(part, processes, raise_if_stopping))
+def _run_here(work: Work, parts: Iterator[range], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
+    def run_part(part: range, processes: EngineProcesses, raise_if_stopping: Callable[[], None]) -> None:
+        folder.write(part, work.table(part, processes, raise_if_stopping))
 
     with started_crews(None, usable_cores(), [], work.resources) as crews:
-        work_in_parallel(parts, run_part, crews, lambda part, _: on_progress(part.last - part.first), lambda: on_progress(0))
+        work_in_parallel(parts, run_part, crews, lambda part, _: on_progress(len(part)), lambda: on_progress(0))
 
 
-def _run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
+def _run_on_cluster(client: Any, work: Work, parts: Iterator[range], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:
     """Run parts on the workers of a client's scheduler, and end the engine processes of the workers.
 
     Raises:
@@ -101,8 +100,8 @@ def _run_on_cluster(client: Any, work: Work, parts: Iterator[Part], folder: Swee
                 on_progress(0)
                 continue
             part, _ = done
-            on_progress(part.last - part.first)
-            if not folder.has(*part):
+            on_progress(len(part))
+            if not folder.has(part):
                 raise DropspinError(
                     f"{folder.where}: a part that a worker wrote is not visible from here; give a folder that all machines share."
                 )
@@ -115,10 +114,10 @@ _idle: dict[_Owner, list[EngineProcesses]] = {}
 """On a worker: the engine processes that are not in use, by the sweep they belong to; at most one set for each thread of the worker."""
 
 
-def _run_on_worker(work: Work, where: str, part: Part) -> None:
+def _run_on_worker(work: Work, where: str, part: range) -> None:
     """On a worker: run a part, unless another worker has written it."""
-    folder = SweepFolder(where, work.identity)
-    if folder.has(*part):
+    folder = SweepFolder(where, work.identity, work.part_size)
+    if folder.has(part):
         return
     if multiprocessing.current_process().daemon:
         raise DropspinError(
@@ -133,7 +132,7 @@ def _run_on_worker(work: Work, where: str, part: Part) -> None:
     idle = _idle.setdefault(owner, [])
     processes = idle.pop() if idle else EngineProcesses(work.resources, start_method="spawn")
     try:
-        folder.write(*part, work.table(part, processes, _reschedule_if_closing))
+        folder.write(part, work.table(part, processes, _reschedule_if_closing))
     finally:
         idle.append(processes)
         if _idle.get(owner) is not idle:  # the sweep has been left in the meantime, and nothing else will close them

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -19,8 +19,9 @@ from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimi
 from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.sweeps.arrays import run_side_by_side
 from dropspin.comparisons.sweeps.jobs import Jobs, Sweep
-from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, STATE_COLUMNS, Outcomes, concatenated, not_run, run_scenes, set_breakdown
+from dropspin.comparisons.sweeps.outcomes import STANDARD_METRICS, Outcomes, concatenated, not_run, run_scenes, set_breakdown
 from dropspin.reference_impl import sources
+from dropspin.scenarios.state import STATE_COLUMNS
 
 LARGEST_PART = 4000  # jobs
 PART_TIME = 2.0
@@ -28,14 +29,6 @@ PART_TIME = 2.0
 STEP_TIME, JOB_TIME = (1e-7, 5e-5), (1e-5, 5e-3)
 """Rough costs of a step and of a job [s]: of the reference implementation, of any other engine."""
 MEASURING = Path(__file__).parents[1] / "measuring"
-
-
-class Part(NamedTuple):
-    """The jobs from number `first` up to, not including, `last`."""
-
-    number: int
-    first: int
-    last: int
 
 
 @dataclass(frozen=True)
@@ -96,20 +89,19 @@ class Work:
         return int(min(max(PART_TIME / (JOB_TIME[slow] + STEP_TIME[slow] * steps), 1), LARGEST_PART))
 
     @property
-    def parts(self) -> Iterator[Part]:
-        """All parts, in order."""
-        size = self.part_size
-        return (Part(number, first, min(first + size, self.sweep.size)) for number, first in enumerate(range(0, self.sweep.size, size)))
+    def parts(self) -> Iterator[range]:
+        """The numbers of the jobs of each part, in order."""
+        return (range(first, min(first + self.part_size, self.sweep.size)) for first in range(0, self.sweep.size, self.part_size))
 
-    def table(self, part: Part, processes: EngineProcesses, verify_running: Callable[[], None] = lambda: None) -> pa.Table:
+    def table(self, part: range, processes: EngineProcesses, verify_running: Callable[[], None] = lambda: None) -> pa.Table:
         """Run a part.
 
         Args:
-            part: The part.
+            part: The numbers of its jobs.
             processes: The engines' processes.
             verify_running: Called before each job or group of jobs, and after one that failed; raises if the sweep has ended.
         """
-        groups = self.sweep.jobs(part.first, part.last)
+        groups = self.sweep.jobs(part.start, part.stop)
         return pa.concat_tables([_as_table(self.sweep, jobs, self._outcomes(jobs, processes, verify_running)) for jobs in groups])
 
     def _outcomes(self, jobs: Jobs, processes: EngineProcesses, verify_running: Callable[[], None]) -> Outcomes:

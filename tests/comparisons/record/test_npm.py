@@ -6,8 +6,9 @@ from threading import Event
 import pytest
 
 from dropspin.comparisons.record import environments
-from dropspin.comparisons.record.environments import NotMeasured, measured
+from dropspin.comparisons.record.environments import measured
 from dropspin.comparisons.record.plan import Plan
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.scenarios import DropspinError
 
 NPM = Plan.model_validate(
@@ -54,14 +55,14 @@ def test_a_release_of_npm_is_installed_into_its_environment(monkeypatch):
     assert {row["verdict"] for row in found["rows"]} == {"measured"}
     assert found["versions"].endswith(", @scope/engine 9.9")
     monkeypatch.setattr(environments, "run", npm_writes("9.8"))
-    with pytest.raises(NotMeasured, match=r"^not runnable: exit code 1: version 9\.8 is imported instead of 9\.9$"):
+    with pytest.raises(Breakdown, match=r"^not runnable: exit code 1: version 9\.8 is imported instead of 9\.9$"):
         measured(NPM, "wang", "9.9", 60.0, Event())
 
 
 def test_npm_that_fails_or_is_absent_is_named(monkeypatch):
     monkeypatch.setattr(environments, "which", lambda name: name)
     monkeypatch.setattr(environments, "run", lambda command, stopping: (1, NO_VERSION))
-    with pytest.raises(NotMeasured, match=r"^not installable: No matching version found for @scope/engine@9\.9\.$"):
+    with pytest.raises(Breakdown, match=r"^not installable: No matching version found for @scope/engine@9\.9\.$"):
         measured(NPM, "wang", "9.9", 60.0, Event())
     with pytest.raises(DropspinError, match="npm cannot list the releases of @scope/engine: No matching version"):
         environments.releases("@scope/engine", "1.0")

@@ -18,10 +18,11 @@ from support.cli import assert_refused, dropspin
 import dropspin as ds
 from dropspin.comparisons.engines.registry import BUILT_IN
 from dropspin.comparisons.record import environments, release, study
-from dropspin.comparisons.record.environments import NotInstallable, NotMeasured, measured, without_paths
+from dropspin.comparisons.record.environments import measured, without_paths
 from dropspin.comparisons.record.plan import Plan, load_plan
 from dropspin.comparisons.record.store import HASH, OTHERS, OWN, SCHEMA, Record, machine, stored
 from dropspin.comparisons.results.folder import sha256
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.comparisons.running.timing import TimedSteps
 from dropspin.scenarios import DropspinError, load
 
@@ -105,7 +106,7 @@ def test_an_interrupt_keeps_whole_files_and_the_next_call_continues(stub, tmp_pa
 
 
 def test_a_release_that_fails_costs_its_own_row(stub, tmp_path):
-    stub.failures = {"1.0": NotInstallable("not installable: no wheel"), "1.1": NotMeasured("not runnable: exit code -11")}
+    stub.failures = {"1.0": Breakdown("missing", "not installable: no wheel"), "1.1": Breakdown("broken", "not runnable: exit code -11")}
     record(tmp_path)
     rows = table(tmp_path)
     assert rows["verdict"].tolist() == ["missing", "broken", "measured"]
@@ -240,7 +241,7 @@ def test_a_release_is_measured_in_an_environment_in_which_it_hides_the_running_o
     assert {row["trajectory"] for row in rows} == {sha256(motion.states.tobytes())}
     assert found["versions"].startswith("dropspin 9.9, numpy ")
     monkeypatch.setattr(environments, "run", pip_writes("another"))
-    with pytest.raises(NotMeasured, match=r"^not runnable: exit code 1: version .* is imported instead of 9\.9$"):
+    with pytest.raises(Breakdown, match=r"^not runnable: exit code 1: version .* is imported instead of 9\.9$"):
         measured(PLAN, "wang", "9.9", 60.0, Event())
 
 
@@ -270,7 +271,7 @@ def test_cost_is_the_least_of_five_timings_and_relative_to_document_timed_in_tur
 
 def test_pip_that_fails_is_named_with_its_error(monkeypatch, tmp_path):
     monkeypatch.setattr(environments, "run", lambda command, stopping: (1, "ERROR: first\nERROR: No matching distribution\nsome advice\n"))
-    with pytest.raises(NotMeasured, match=r"^not installable: No matching distribution$"):
+    with pytest.raises(Breakdown, match=r"^not installable: No matching distribution$"):
         measured(PLAN, "wang", "1.0", 60.0, Event())
     with pytest.raises(DropspinError, match="pip cannot list the releases of dropspin: No matching distribution"):
         environments.releases("dropspin", "1.0")

@@ -7,8 +7,8 @@ from click.testing import CliRunner
 from support.small_record import HOSTILE, rows, write_record
 
 from dropspin.comparisons.record import rerun
-from dropspin.comparisons.record.environments import NotInstallable
 from dropspin.comparisons.record.store import machine
+from dropspin.comparisons.running.recording import Breakdown
 from dropspin.reports.commands.rerun import rerun_command
 from dropspin.scenarios import DropspinError
 
@@ -89,7 +89,7 @@ def test_release_that_can_no_longer_be_installed(tmp_path, monkeypatch):
     write_record(tmp_path)
 
     def measured(*_):
-        raise NotInstallable("not installable: no wheel")
+        raise Breakdown("missing", "not installable: no wheel")
 
     monkeypatch.setattr(rerun, "measured", measured)
     with pytest.raises(DropspinError, match=r"^mujoco 3\.10\.0: not installable: no wheel\.$"):

@@ -24,7 +24,7 @@ from dropspin.comparisons.results.provenance import STAMPED
 from dropspin.comparisons.running.entries import engine_entry
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.running.recording import Breakdown, Recording, divergence, record, record_batch, verify_accepted
+from dropspin.comparisons.running.recording import Breakdown, divergence, record, record_batch, verify_accepted
 from dropspin.comparisons.running.run import measure
 from dropspin.comparisons.running.start_phases import StartPhase, start_phases
 from dropspin.comparisons.running.timing import time_steps
@@ -61,34 +61,26 @@ def _rows(entry: EngineEntry, scenes: list[Scenario], dts: list[float], processe
     code = code_of(entry.engine)
     for scene, dt in product(scenes, dts):
         case = {"label": entry.label, "adapter": code, "scene": scene.name, "scene_digest": scene.digest, "dt": dt}
-        yield from (case | row for row in _measured(entry, scene, dt, processes))
+        found = processes.call(entry, _measured, scene, dt)
+        rows = [{"verdict": found.verdict, "reason": found.reason}] if isinstance(found, Breakdown) else found
+        yield from (case | row for row in rows)
 
 
-def _measured(entry: EngineEntry, scene: Scenario, dt: float, processes: EngineProcesses) -> Iterator[Row]:
-    """A row for each metric of one simulation; one row alone, with the reason, if there is no motion."""
-    found = processes.call(entry, _simulated, scene, dt)
-    if isinstance(found, Breakdown):
-        yield {"verdict": found.verdict, "reason": found.reason}
-        return
-    (recording, band, timed), motion = found, found[0].motion
-    hashed = {"trajectory": sha256(motion.states.astype("<f8").tobytes())} | timed
-    if (broken := divergence(motion)) is not None:
-        yield hashed | {"verdict": broken.verdict, "reason": broken.reason}
-        return
-    met = "; ".join(limitation.message for limitation in recording.limitations if not limitation.is_minor)
-    for metric, value in measure(scene, motion).items():
-        of_metric = {"metric": metric, "unit": METRICS[metric].unit, "value": value, "verdict": "measured", "reason": met}
-        yield hashed | (band if metric == leading_metric(scene) else {}) | of_metric
-
-
-def _simulated(entry: EngineEntry, scene: Scenario, dt: float) -> tuple[Recording, Row, Row]:
-    """A motion, the range of the leading error over start phases, and the cost of the steps; runs in the engine's process."""
+def _measured(entry: EngineEntry, scene: Scenario, dt: float) -> list[Row]:
+    """A row for each metric of one simulation; one row alone if its motion diverges; runs in the engine's process."""
     engine = entry.adapter
     verify_accepted(engine, scene)
     recording = record(engine, scene, dt)
-    if divergence(recording.motion) is not None:
-        return recording, {}, {}
-    return recording, range_over_phases(engine, scene, dt), costs(engine, scene, dt)
+    hashed: Row = {"trajectory": sha256(recording.motion.states.astype("<f8").tobytes())}
+    if (broken := divergence(recording.motion)) is not None:
+        return [hashed | {"verdict": broken.verdict, "reason": broken.reason}]
+    band, leading = range_over_phases(engine, scene, dt), leading_metric(scene)
+    met = "; ".join(limitation.message for limitation in recording.limitations if not limitation.is_minor)
+    hashed |= costs(engine, scene, dt) | {"verdict": "measured", "reason": met}
+    return [
+        hashed | (band if metric == leading else {}) | {"metric": metric, "unit": METRICS[metric].unit, "value": value}
+        for metric, value in measure(scene, recording.motion).items()
+    ]
 
 
 def range_over_phases(engine: Engine, scene: Scenario, dt: float) -> Row:

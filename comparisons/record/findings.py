@@ -100,7 +100,12 @@ def read(folder: str | Path) -> dict[str, list[Release]]:
         tables.setdefault(rows[0]["engine"], []).append(rows)
     if not tables:
         raise DropspinError(f"{folder}: has no release that was measured here; give a folder that dropspin record wrote.")
-    found = {engine: _of_one_machine(own) for engine, own in tables.items()}
+    found: dict[str, list[Release]] = {}
+    for engine, own in tables.items():
+        machines = [tuple(rows[0][name] for name in MACHINE) for rows in own]
+        [(most, _)] = Counter(machines).most_common(1)
+        of_one_machine = [release_of(rows) for rows, machine in zip(own, machines, strict=True) if machine == most]
+        found[engine] = sorted(of_one_machine, key=lambda release: numbers_of(release.name))
     if not any(release.cases for releases in found.values() for release in releases):
         raise DropspinError(f"{folder}: has no result of a scene as the catalogue defines it today; dropspin record measures them again.")
     return found
@@ -137,13 +142,6 @@ def others(folder: str | Path, own: Mapping[str, Sequence[Release]]) -> dict[str
         same = sum((case.verdict, case.trajectory) == (mine.verdict, mine.trajectory) for case, mine in pairs)
         found.setdefault(engine, []).append(Other(sent.name, sent.first, len(pairs), same))
     return {engine: sorted(sent, key=lambda other: numbers_of(other.name)) for engine, sent in found.items()}
-
-
-def _of_one_machine(tables: Sequence[list[dict[str, Any]]]) -> list[Release]:
-    machines = [tuple(rows[0][name] for name in MACHINE) for rows in tables]
-    [(most, _)] = Counter(machines).most_common(1)
-    found = [release_of(rows) for rows, machine in zip(tables, machines, strict=True) if machine == most]
-    return sorted(found, key=lambda one: numbers_of(one.name))
 
 
 def release_of(rows: Sequence[Row]) -> Release:

@@ -116,7 +116,8 @@ class Runner:
         motions = self._record(scenes, dt, extend)
         if isinstance(motions, Breakdown):
             return _without_motion(motions)
-        return self._of_motions([_extended(start, dt, motion) for start, motion in zip(scenes, motions, strict=True)])
+        both = zip(scenes, motions, strict=True)
+        return self._of_motions([ExtendedMotion(own, dt, whole[: 1 + own.steps(dt)], whole, truth_for(own)) for own, whole in both])
 
     def _record(self, scenes: Sequence[Scenario], dt: float, extend: bool = True) -> list[Trajectory] | Breakdown:
         """The engine's motions of scenes, or the reason why there are none."""
@@ -162,11 +163,6 @@ def _recorded(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend:
         extra = max(0, FEWEST_STEPS_WITHOUT_GRAVITY - steps) if extend and scene.gravity is None else 0
         found.append(record(entry.adapter, scene, dt, max(1, -(-steps // MOST_ROWS)), extra_steps=extra).motion)
     return found
-
-
-def _extended(scene: Scenario, dt: float, motion: Trajectory) -> ExtendedMotion:
-    """A recorded motion: for the duration of the scene, and as a whole."""
-    return ExtendedMotion(scene, dt, motion[: 1 + scene.steps(dt)], motion, truth_for(scene))
 
 
 def _without_motion(breakdown: Breakdown) -> Diagnosis:

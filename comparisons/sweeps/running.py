@@ -13,7 +13,7 @@ from dropspin.comparisons.running.cluster import connected
 from dropspin.comparisons.running.inputs import ignore
 from dropspin.comparisons.running.parallel import as_done, started_crews, work_in_parallel
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
-from dropspin.comparisons.sweeps.folder import Description, SweepFolder
+from dropspin.comparisons.sweeps.folder import SweepFolder
 from dropspin.comparisons.sweeps.jobs import Sweep
 from dropspin.comparisons.sweeps.work import Work, installed_versions
 from dropspin.reference_impl.threads import usable_cores
@@ -51,11 +51,14 @@ def run_sweep(
     earlier, present = folder.description(), folder.parts()
     kept = sum(map(len, present))
     if earlier is not None and SweepFolder(where).parts():  # without a part, the sweep may be given again
-        _verify_same_sweep(where, earlier, work)
+        another = "choose another folder with -o"
+        if earlier.identity != work.identity:
+            then, now = earlier.versions, work.versions
+            changed = [f"{name} {then.get(name)}, now {now[name]}" for name in now if then.get(name) != now[name]]
+            difference = f"a sweep that was run with {', '.join(changed)}" if changed else "another sweep: the specs differ"
+            raise DropspinError(f"{where}: holds {difference}; {another}.")
         if not resume:
-            raise DropspinError(
-                f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; resume it with --resume, or choose another folder with -o."
-            )
+            raise DropspinError(f"{where}: holds {kept:,} of {sweep.size:,} jobs of this sweep; resume it with --resume, or {another}.")
     report = on_progress or ignore
     report(kept)
     missing = (part for part in work.parts if part not in present)
@@ -66,16 +69,6 @@ def run_sweep(
     with connected(scheduler) as client:
         folder.begin(work.description)
         _run_on_cluster(client, work, missing, folder, report)
-
-
-def _verify_same_sweep(where: str, earlier: Description, work: Work) -> None:
-    """Raise `DropspinError` unless a folder holds this sweep, run with the installed versions."""
-    if earlier.identity == work.identity:
-        return
-    then, now = earlier.versions, work.versions
-    changed = [f"{name} {then.get(name)}, now {now[name]}" for name in now if then.get(name) != now[name]]
-    difference = f"a sweep that was run with {', '.join(changed)}" if changed else "another sweep: the specs differ"
-    raise DropspinError(f"{where}: holds {difference}; choose another folder with -o.")
 
 
 def _run_here(work: Work, parts: Iterator[range], folder: SweepFolder, on_progress: Callable[[int], None]) -> None:

@@ -81,8 +81,7 @@ class Work:
     @cached_property
     def part_size(self) -> int:
         """The number of jobs of a part: as many as take about `PART_TIME`, by the estimated cost of the most expensive job."""
-        axes = [axis for axis in self.sweep.axes if axis.name in ("dt", "duration")]
-        swept = {axis.name: [float(value) for value in axis.values] for axis in axes}
+        swept = {axis.name: axis.values for axis in self.sweep.axes}
         longest = max(swept.get("duration", [scene.duration for scene in self.sweep.scenes]))
         steps = longest / min([*self.sweep.dts, *swept.get("dt", [])])
         slow = any(not isinstance(engine, Wang) for engine in self.sweep.engines) or bool(self.sweep.metrics)

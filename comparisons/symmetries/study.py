@@ -150,16 +150,12 @@ def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str
         return _halves(entry, scene, dt, own)
     if name == BATCH:
         # A compiler vectorises a batch otherwise than a single simulation, and rounding depends on that.
-        return _batched(entry, scene, dt, own), effects if entry.adapter.compiles else None
+        others = [batch_member(entry.adapter, scene, share) for share in FASTER]
+        together = [finite(recording).states for recording in record_batch(entry.adapter, [scene, *others], dt)]
+        alone = [own, *(states_of(entry, other, dt) for other in others)]
+        return list(zip(alone, together, strict=True)), effects if entry.adapter.compiles else None
     other = replace(entry, engine=entry.adapter.represented_otherwise()[name])
     return [(own, states_of(other, scene, dt))], effects
-
-
-def _batched(entry: EngineEntry, scene: Scenario, dt: float, own: Array) -> Pairs:
-    """Of a scene and two others: the motions of single runs, and those of a batch."""
-    others = [batch_member(entry.adapter, scene, share) for share in FASTER]
-    together = [finite(recording).states for recording in record_batch(entry.adapter, [scene, *others], dt)]
-    return list(zip([own, *(states_of(entry, other, dt) for other in others)], together, strict=True))
 
 
 def batch_member(engine: Engine, scene: Scenario, share: float) -> Scenario:

@@ -21,7 +21,7 @@ from dropspin.comparisons.running.inputs import EngineEntry, SceneLike, as_scene
 from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
 from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
 from dropspin.comparisons.running.recording import Breakdown
-from dropspin.comparisons.symmetries.findings import Effects, Finding, Status, judged
+from dropspin.comparisons.symmetries.findings import Finding, Status, judged
 from dropspin.comparisons.symmetries.study import DT, RESOURCES, effects_of_rounding, states_of
 from dropspin.scenarios import DropspinError, Scenario, Trajectory
 
@@ -125,27 +125,21 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
             found.append(replace(none, reason="; ".join(f"{label}: {one.reason.removesuffix('.')}" for label, one in broken)))
             continue
         coarser = max(entry.adapter.precision, twin.adapter.precision, key=lambda precision: float(np.finfo(precision).eps))
-        found.append(_compared(none, scene, dt, (own, other), partial(effects_of, (entry, own), (twin, other)), coarser))
+        of_rounding = partial(effects_of, (entry, own), (twin, other))
+        judgement = judged(Finding(scene.name, entry.label, twin.label, "not run"), scene, dt, [(own, other)], of_rounding, coarser)
+        difference, times = differences(scene, own, other), dt * np.arange(len(own), dtype=float)
+        until = 1 + min(int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end) for states in (own, other))
+        compared = replace(
+            none,
+            status=judgement.status,
+            first=_first((own != other).any(axis=1)),
+            before_contact=float(difference[:until].max()),
+            after_contact=float(difference[until:].max(initial=-np.inf)) if until < len(difference) else float("nan"),
+            beyond={level: _first(difference > level) for level in LEVELS},
+            unexplained=judgement.step,
+        )
+        found.append(compared)
     return found
-
-
-def _compared(
-    none: TwinFinding, scene: Scenario, dt: float, motions: tuple[Array, Array], effects: Effects, precision: type
-) -> TwinFinding:
-    """The finding for two motions of a scene; `none` is that of engines without motions."""
-    difference, unequal = differences(scene, *motions), (motions[0] != motions[1]).any(axis=1)
-    times = dt * np.arange(len(difference), dtype=float)
-    until = 1 + min(int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end) for states in motions)
-    judgement = judged(Finding(scene.name, none.engine, none.twin, "not run"), scene, dt, [motions], effects, precision)
-    return replace(
-        none,
-        status=judgement.status,
-        first=_first(unequal),
-        before_contact=float(difference[:until].max()),
-        after_contact=float(difference[until:].max(initial=-np.inf)) if until < len(difference) else float("nan"),
-        beyond={level: _first(difference > level) for level in LEVELS},
-        unexplained=judgement.step,
-    )
 
 
 def _first(rows: NDArray[np.bool_]) -> int | None:

@@ -1,5 +1,7 @@
 """Faults of conventions: frames, orders, signs and units of states, and parts of the start that are not set."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,8 +12,6 @@ from dropspin.comparisons.faults.fault_model import (
     Simulated,
     changed_part,
     changed_start,
-    unchanged_scene,
-    unchanged_states,
 )
 from dropspin.scenarios.rotations import about as rotation_about
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
@@ -20,7 +20,7 @@ from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, RATES, SPIN, 
 Array = NDArray[np.float64]
 
 
-def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Change) -> list[FaultModel]:
+def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Change) -> Iterator[FaultModel]:
     """Three faults of one convention: in what is read, in what is set at the start, and in both; of the orientation, six.
 
     An adapter may also convert the angular velocity from the body frame by the wrong orientation.
@@ -32,16 +32,14 @@ def _convention(part: slice, fault: str, expected: str, wrong: Change, right: Ch
         wrong: Function from the part in the correct convention to the part in the faulty one.
         right: The inverse function.
     """
-    messages = f"{fault}; {expected}", f"{fault} where it is set at the start; {expected}", f"{fault}, both set and read; {expected}"
     changes = [(changed_part(part, wrong), changed_part(part, right))]
     if part == ORIENTATION:
         changes.append((_with_spin(wrong), _with_spin(right)))
-    faults = []
     for reported, inverse in changes:
-        simulated: Simulated = changed_start(inverse)
-        both = (unchanged_scene, reported), (simulated, unchanged_states), (simulated, reported)
-        faults += [FaultModel(message, *change, about=str(part)) for message, change in zip(messages, both, strict=True)]
-    return faults
+        simulated, about = changed_start(inverse), str(part)
+        yield FaultModel(f"{fault}; {expected}", reported=reported, about=about)
+        yield FaultModel(f"{fault} where it is set at the start; {expected}", simulated, about=about)
+        yield FaultModel(f"{fault}, both set and read; {expected}", simulated, reported, about=about)
 
 
 def _with_spin(change: Change) -> Reported:

@@ -9,6 +9,7 @@ import re
 import sys
 import venv
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from shutil import which
 from subprocess import PIPE, STDOUT, Popen, TimeoutExpired
@@ -120,17 +121,15 @@ def run(command: Sequence[str], stopping: Event) -> tuple[int, str]:
         Closed: `stopping` was set; the command is ended.
     """
     with Popen(command, stdout=PIPE, stderr=STDOUT, text=True, errors="replace") as process:
-        while True:
-            try:
-                output, _ = process.communicate(timeout=POLL)
-                return process.returncode, output
-            except TimeoutExpired:
-                if stopping.is_set():
-                    process.kill()
-                    raise Closed from None
-            except BaseException:
-                process.kill()
-                raise
+        try:
+            while not stopping.is_set():
+                with suppress(TimeoutExpired):
+                    output, _ = process.communicate(timeout=POLL)
+                    return process.returncode, output
+            raise Closed
+        except BaseException:
+            process.kill()
+            raise
 
 
 def last_line(output: str) -> str:

@@ -5,7 +5,7 @@ for symmetries, a difference is attributed to rounding as long as perturbations 
 in one of the two engines.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, combinations
@@ -97,13 +97,13 @@ def twins(
 
     def of_scene(scene: Scenario, processes: EngineProcesses, report: Callable[[str], None]) -> list[TwinFinding]:
         report(scene.name)
-        return _of_scene(processes, entries, scene, dt)
+        return list(_of_scene(processes, entries, scene, dt))
 
     with started_crews(jobs, len(chosen), entries, resources) as crews:
         return list(chain.from_iterable(results_in_parallel(chosen, of_scene, crews, on_progress or ignore)))
 
 
-def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene: Scenario, dt: float) -> list[TwinFinding]:
+def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene: Scenario, dt: float) -> Iterator[TwinFinding]:
     """The findings for all pairs of engines in one scene."""
     motions = {entry.label: processes.call(entry, states_of, scene, dt) for entry in entries}
     effects: dict[str, list[Array]] = {}
@@ -116,20 +116,19 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
                 effects[entry.label] = [] if isinstance(found, Breakdown) else found
         return [effect for entry, _ in both for effect in effects[entry.label]]
 
-    found = []
     for entry, twin in combinations(entries, 2):
         none = TwinFinding(scene.name, entry.label, twin.label, "not run")
         own, other = motions[entry.label], motions[twin.label]
         if isinstance(own, Breakdown) or isinstance(other, Breakdown):
             broken = [(one.label, motion) for one, motion in ((entry, own), (twin, other)) if isinstance(motion, Breakdown)]
-            found.append(replace(none, reason="; ".join(f"{label}: {one.reason.removesuffix('.')}" for label, one in broken)))
+            yield replace(none, reason="; ".join(f"{label}: {one.reason.removesuffix('.')}" for label, one in broken))
             continue
         coarser = max(entry.adapter.precision, twin.adapter.precision, key=lambda precision: float(np.finfo(precision).eps))
         of_rounding = partial(effects_of, (entry, own), (twin, other))
         judgement = judged(Finding(scene.name, entry.label, twin.label, "not run"), scene, dt, [(own, other)], of_rounding, coarser)
         difference, times = differences(scene, own, other), dt * np.arange(len(own), dtype=float)
         until = 1 + min(int(Motions.of(scene, Trajectory.from_states(times, states)).first_flight_end) for states in (own, other))
-        compared = replace(
+        yield replace(
             none,
             status=judgement.status,
             first=_first((own != other).any(axis=1)),
@@ -138,8 +137,6 @@ def _of_scene(processes: EngineProcesses, entries: Sequence[EngineEntry], scene:
             beyond={level: _first(difference > level) for level in LEVELS},
             unexplained=judgement.step,
         )
-        found.append(compared)
-    return found
 
 
 def _first(rows: NDArray[np.bool_]) -> int | None:

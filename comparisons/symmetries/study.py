@@ -110,8 +110,7 @@ def _in_new_process(entry: EngineEntry, scene: Scenario, dt: float, own: Array, 
             raise Breakdown("declined", "the process cannot be restricted to fewer processors")
         for thread in os.listdir("/proc/self/task"):
             os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
-    [found] = findings_of(entry, scene, dt, own, [IN_NEW_PROCESSES[name]])
-    return replace(found, symmetry=name)
+    return replace(_finding(entry, scene, dt, own, IN_NEW_PROCESSES[name]), symmetry=name)
 
 
 def findings_of(entry: EngineEntry, scene: Scenario, dt: float, own: Array, names: Iterable[str]) -> list[Finding]:
@@ -124,19 +123,19 @@ def findings_of(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name
         own: The states of the engine's motion at each time step, shape (n, 13).
         names: Names of symmetries, and of ways to repeat the run.
     """
-    found = []
-    for name in names:
-        if name in SYMMETRIES and not SYMMETRIES[name].applies(scene):
-            continue
-        none = Finding(scene.name, entry.label, name, "not run")
-        try:
-            pairs, effects = _pairs(entry, scene, dt, own, name)
-            found.append(judged(none, scene, dt, pairs, effects, entry.adapter.precision))
-        except DropspinError as error:  # the transformed scene is no valid scene
-            found.append(not_run(none, Breakdown("declined", str(error))))
-        except Exception as error:  # an engine is somebody else's code
-            found.append(not_run(none, classify(error)))
-    return found
+    applicable = [name for name in names if name not in SYMMETRIES or SYMMETRIES[name].applies(scene)]
+    return [_finding(entry, scene, dt, own, name) for name in applicable]
+
+
+def _finding(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> Finding:
+    none = Finding(scene.name, entry.label, name, "not run")
+    try:
+        pairs, effects = _pairs(entry, scene, dt, own, name)
+        return judged(none, scene, dt, pairs, effects, entry.adapter.precision)
+    except DropspinError as error:  # the transformed scene is no valid scene
+        return not_run(none, Breakdown("declined", str(error)))
+    except Exception as error:  # an engine is somebody else's code
+        return not_run(none, classify(error))
 
 
 def _pairs(entry: EngineEntry, scene: Scenario, dt: float, own: Array, name: str) -> tuple[Pairs, Effects | None]:

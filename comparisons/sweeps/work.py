@@ -108,23 +108,24 @@ class Work:
         entry = EngineEntry(jobs.engine.label, jobs.engine)
         first, last = int(jobs.numbers[0]), int(jobs.numbers[-1]) + 1
 
-        def run(first: int, last: int) -> Outcomes:
+        def outcome(number: int) -> Outcomes:
             verify_running()
-            found = processes.call(entry, _run_in_process, self.sweep, first, last)
+            found = processes.call(entry, _run_in_process, self.sweep, number, number + 1)
             if not isinstance(found, Breakdown):
                 return found
             verify_running()  # a process that ended with the sweep has not failed
-            if last > first + 1:
-                return concatenated([run(number, number + 1) for number in range(first, last)])
             broken = not_run(1, self.sweep.metrics)
             set_breakdown(broken[0], found)
             return broken
 
-        found = run(first, last)
+        verify_running()
+        found = processes.call(entry, _run_in_process, self.sweep, first, last)
+        if isinstance(found, Breakdown):
+            return concatenated([outcome(number) for number in range(first, last)])
         # An exception may be due to earlier jobs, for example to a leak. It counts if the job raises it in a new process as well.
         for index in np.flatnonzero(found.verdict == "crashed").tolist():
             processes.renew(entry)
-            found[index] = run(first + index, first + index + 1)[0]
+            found[index] = outcome(first + index)[0]
         return found
 
 

@@ -137,9 +137,7 @@ class TradeOff:
     def dominated(self) -> dict[CostPoint, CostPoint]:
         """For each engine that is not on the Pareto front, its most accurate configuration and the cheapest one that is as accurate."""
         front = self.pareto_front
-        best: dict[str, CostPoint] = {}
-        for point in sorted(self.points, key=lambda one: one.error, reverse=True):
-            best[point.engine] = point
+        best = {point.engine: point for point in sorted(self.points, key=lambda one: one.error, reverse=True)}
         on_front = {point.engine for point in front}
         inside = [best[ladder.engine] for ladder in self.ladders if ladder.engine in best.keys() - on_front]
         return {point: next(one for one in front if one.error <= point.error) for point in inside}
@@ -153,9 +151,7 @@ class TradeOff:
         A time step counts only if all finer ones of the engine are within the tolerance too; at a coarser one the error may be small by
         chance, where it crosses 0.
         """
-        cheapest: dict[str, CostPoint] = {}
-        for point in sorted(self._within(within), key=lambda one: one.typical_cost, reverse=True):
-            cheapest[point.engine] = point
+        cheapest = {point.engine: point for point in sorted(self._within(within), key=lambda one: one.typical_cost, reverse=True)}
         if not cheapest:
             return None
         best, *others = sorted(cheapest.values(), key=lambda one: one.typical_cost)

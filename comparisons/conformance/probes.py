@@ -1,9 +1,8 @@
 """Probes: scenes built to distinguish the faults of adapters, which `probes.toml` defines, and short runs of them."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +22,7 @@ DT = 2.5e-4
 """The time step [s]; so short that the discretisation error of any engine is small beside the error of a fault."""
 
 
-@dataclass(frozen=True)
-class Probe:
+class Probe(NamedTuple):
     """A scene, and the errors that an engine may have.
 
     Attributes:

@@ -1,9 +1,8 @@
 """A fault that an adapter may have: the scene that it simulates instead, the states that it reports instead, and the message."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +30,7 @@ def unchanged_states(states: Array) -> Array:
     return states
 
 
-@dataclass(frozen=True)
-class FaultModel:
+class FaultModel(NamedTuple):
     """One fault.
 
     Attributes:

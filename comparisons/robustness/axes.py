@@ -5,7 +5,7 @@ First come the values of axes: the initial ones of a scan, and the midpoint of t
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -73,8 +73,7 @@ def whole_power_between(base: float) -> Between:
     return between
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(NamedTuple):
     """A quantity that is varied.
 
     Attributes:

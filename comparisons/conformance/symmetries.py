@@ -117,15 +117,11 @@ def _verify_batches(engine: Engine, members: Sequence[Scenario], size: Size, fir
     for number in sorted({0, count // 2, count - 1}):
         _verify_single(engine, members[number], size.dt, rows[number], first.velocity_lag, number)
     before = rows.copy()
-    first.advance(size.long)
-    end = _states(first, count)
+    end = _advanced(first, size.long, count)
     more = verified_batch(first.record(A_FEW_STEPS), count, 1 + A_FEW_STEPS)
     if not np.array_equal(rows, before):
         raise CheckFailed("record returns memory that later steps overwrite; return a copy")
-    calls = np.empty((count, (A_FEW_STEPS + size.long) // PIECE, 13))
-    for number in range(calls.shape[1]):
-        second.advance(PIECE)
-        calls[:, number] = _states(second, count)
+    calls = np.stack([_advanced(second, PIECE, count) for _ in range((A_FEW_STEPS + size.long) // PIECE)], axis=1)
     recorded = rows[:, PIECE::PIECE]
     _verify_calls(
         engine, calls[:, : recorded.shape[1]], recorded, f"calls of advance({PIECE}) give other states than record({A_FEW_STEPS})"
@@ -141,7 +137,9 @@ def _verify_calls(engine: Engine, found: Array, expected: Array, message: str) -
         raise CheckFailed(f"{message}, by {difference:.2g} of the largest number")
 
 
-def _states(batch: BatchSimulation, count: int) -> Array:
+def _advanced(batch: BatchSimulation, steps: int, count: int) -> Array:
+    """The states after some more steps, shape (count, 13)."""
+    batch.advance(steps)
     return verified_batch(numpy_array(batch.states())[:, np.newaxis], count, 1)[:, 0].copy()
 
 

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 ORDERS = {order: ", ".join("xyz"[axis] for axis in order) for order in permutations(range(3)) if order != (0, 1, 2)}
 """Other orders of the axes, and their names."""
+DOWN, BACK = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, -1.0])
 SLOW = 0.2  # m/s; Bullet drops restitution below it
 MULTIPLIES = "an engine that multiplies the values of two bodies needs 1 for the floor"
 AVERAGES = "an engine that averages the values of two bodies needs the scene's value on both"
@@ -84,12 +85,10 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
     "gravity": {
         "gravity is omitted": _gravity(lambda g, _: 0.0 * g),
         "gravity has the opposite sign; the scene gives an acceleration, y up": _gravity(lambda g, _: -g),
-        "gravity is 9.81 m/s² along -y for every scene": _gravity(lambda g, _: 9.81 * np.array([0.0, -1.0, 0.0])),
-        "gravity is 9.81 m/s² along -z for every scene; y is up": _gravity(lambda g, _: 9.81 * np.array([0.0, 0.0, -1.0])),
-        "gravity acts along -z; y is up": _gravity(lambda g, _: np.linalg.norm(g) * np.array([0.0, 0.0, -1.0])),
-        "gravity acts along -y with the scene's magnitude; it is a vector": _gravity(
-            lambda g, _: np.linalg.norm(g) * np.array([0.0, -1.0, 0.0])
-        ),
+        "gravity is 9.81 m/s² along -y for every scene": _gravity(lambda g, _: 9.81 * DOWN),
+        "gravity is 9.81 m/s² along -z for every scene; y is up": _gravity(lambda g, _: 9.81 * BACK),
+        "gravity acts along -z; y is up": _gravity(lambda g, _: np.linalg.norm(g) * BACK),
+        "gravity acts along -y with the scene's magnitude; it is a vector": _gravity(lambda g, _: np.linalg.norm(g) * DOWN),
         "gravity's y and z appear to be swapped; y is up": _gravity(lambda g, _: g[[0, 2, 1]]),
         "gravity appears to be given in a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, 1, -1]),
         "gravity appears to be rotated into a frame with z up; y is up": _gravity(lambda g, _: g[[0, 2, 1]] * [1, -1, 1]),

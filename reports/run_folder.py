@@ -14,9 +14,8 @@ from dropspin.reports.document import Document
 from dropspin.reports.html.report import html_report
 from dropspin.reports.junit import junit_xml
 from dropspin.reports.markdown import markdown
-from dropspin.reports.plots.chart import figure_of
+from dropspin.reports.plots.chart import figure_of, save_figure
 from dropspin.reports.plots.figures import CHARTS, report_charts
-from dropspin.reports.plots.svg import save_png, save_svg
 from dropspin.reports.stories.run import document, overview
 
 OURS = frozenset(
@@ -57,7 +56,7 @@ def fill(results: Results, folder: Path, sections: Sequence[Document] = (), plot
     for kind in plots:
         for number, scene in enumerate(results.scenes):
             for name, charts in charts_of.get(scene, {}).items():
-                {"svg": save_svg, "png": save_png}[kind](figure_of(charts), folder / "plots" / f"{number:02d}-{name}.{kind}")
+                save_figure(figure_of(charts), folder / "plots" / f"{number:02d}-{name}.{kind}")
 
 
 def run_folder(folder: str | Path) -> AbstractContextManager[Path]:

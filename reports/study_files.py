@@ -11,9 +11,8 @@ from dropspin.comparisons.results.folder import SECTION, file_name, read_stored
 from dropspin.reports.document import Charts, Document
 from dropspin.reports.markdown import markdown
 from dropspin.reports.output import write_table
-from dropspin.reports.plots.chart import figure_of
+from dropspin.reports.plots.chart import figure_of, save_figure
 from dropspin.reports.plots.chart_data import chart_data
-from dropspin.reports.plots.svg import save_svg
 from dropspin.reports.stories.history import document as history_document
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios import DropspinError
@@ -41,7 +40,7 @@ def write_page(document: Document, folder: Path, stem: str) -> None:
     """Write a Markdown page and its pictures."""
     for part in document.parts:
         if isinstance(part, Charts):
-            save_svg(figure_of([*part.charts, *part.drawings]), folder / f"{file_name(part.name)}.svg")
+            save_figure(figure_of([*part.charts, *part.drawings]), folder / f"{file_name(part.name)}.svg")
     (folder / f"{stem}.md").write_text(markdown(document), encoding="utf-8")
 
 

@@ -10,6 +10,8 @@ from dropspin.comparisons.engines.options import parts_of
 from dropspin.reports.plots.style import REPORT, ROUNDING, Array, ink, label_powers, load_matplotlib
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -179,3 +181,12 @@ def figure_of(panels: Sequence[Chart | Drawing]) -> "Figure":
                 named.setdefault(label, handle)
         figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=min(len(named), 5), fontsize=9)
     return figure
+
+
+def save_figure(figure: "Figure", file: "Path") -> None:
+    """Save a figure on white, as SVG with text as text or as PNG; equal figures give equal files."""
+    from matplotlib import rc_context
+
+    stamps = ["Software"] if file.suffix == ".png" else ["Date", "Creator"]
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": file.stem}):
+        figure.savefig(file, dpi=200, facecolor="white", metadata=dict.fromkeys(stamps))

@@ -5,6 +5,7 @@ from typing import Any
 
 from dropspin.comparisons.calibration import Calibration, Measured
 from dropspin.reports.document import Document, Table
+from dropspin.reports.stories.numbers import with_unit
 from dropspin.scenarios import DropspinError
 
 
@@ -24,15 +25,13 @@ def friction(text: str) -> str | float:
 
 def document(found: Calibration) -> Document:
     """The values that were measured with the calibrated settings; the settings and the reasons for them."""
-    measured = [{"measured": result.name, "value": _with_unit(result), "how": result.how} for result in found.measured]
+    measured = [{"measured": result.name, "value": _value(result), "how": result.how} for result in found.measured]
     settings = [{"set": name, "to": str(value), "why": found.reasons.get(name, "")} for name, value in found.settings.items()]
     return Document(found.engine, [Table(measured), Table(settings)])
 
 
-def _with_unit(result: Measured) -> str:
-    if math.isnan(result.value):
-        return "–"
-    return f"{result.value:.4g}" if result.unit == "1" else f"{result.value:.4g} {result.unit}"
+def _value(result: Measured) -> str:
+    return "–" if math.isnan(result.value) else with_unit(f"{result.value:.4g}", result.unit)
 
 
 def as_data(found: Calibration) -> dict[str, Any]:

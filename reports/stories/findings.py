@@ -15,7 +15,7 @@ from dropspin.comparisons.judging.error_budget import is_determined, is_sufficie
 from dropspin.comparisons.judging.verdicts import BREAKDOWNS, FAILURES, VERDICTS
 from dropspin.comparisons.results.results import SMALLEST_STATED, UNDECIDED, Results, Status, is_undecided, relative_sizes
 from dropspin.reports.stories.matrix import step_times
-from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, quantity
+from dropspin.reports.stories.numbers import duration, failing, formatted, in_ms, quantity, with_unit
 from dropspin.scenarios.text import counted
 
 if TYPE_CHECKING:
@@ -227,9 +227,9 @@ def _largest(results: Results, errors: "pd.DataFrame") -> str:
     first = errors.to_dict("records")[int(np.argmax(sizes))]
     similar = errors["value"].abs().between(SAME_SIZE * abs(first["value"]), abs(first["value"]) / SAME_SIZE)
     equal = errors[(errors["metric"] == first["metric"]) & (sizes >= SAME_SIZE * sizes.max()) & similar]
-    of = "" if first["unit"] == "1" else f" {first['unit']}"
+    size = with_unit(formatted(abs(first["value"])), first["unit"])
     names = _named(list(equal["scene"].unique()), "scene")
-    return f"; largest error {quantity(first['metric'])} {formatted(abs(first['value']))}{of} at dt = {in_ms(first['dt'])} in {names}"
+    return f"; largest error {quantity(first['metric'])} {size} at dt = {in_ms(first['dt'])} in {names}"
 
 
 def _named(names: Collection[str], kind: str) -> str:

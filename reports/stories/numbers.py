@@ -91,6 +91,11 @@ def unit(of: str) -> str:
     return "" if of == "1" else f" [{of}]"
 
 
+def with_unit(value: str, of: str) -> str:
+    """A formatted value with its unit, unless it is a ratio."""
+    return value if of == "1" else f"{value} {of}"
+
+
 def subject(metric: str, kind: str, truth: str = "") -> str:
     """The subject of a row in words, such as `order of orientation error`; for a row of kind `baseline`, that of the accepted result."""
     words = metric.replace("_", " ")

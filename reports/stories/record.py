@@ -12,7 +12,7 @@ from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import scale
 from dropspin.comparisons.record.findings import Case, Change, Release, digits, leading, problem, relative_error
 from dropspin.reports.stories.matrix import level
-from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, word
+from dropspin.reports.stories.numbers import duration, formatted, grouped, in_ms, with_unit, word
 
 GROUPS = {"at least 5 digits": 5.0, "at least 2, less than 5 digits": 2.0, "less than 2 digits": 0.0}
 """What an engine gets right and wrong: errors below 1e-5 of the scale do not matter to any use of an engine."""
@@ -37,7 +37,7 @@ def cell(release: Release, label: str, scene: str, dt: float) -> Cell:
     if math.isnan(error):  # a motion without this error: the time step is too coarse
         status = "too coarse" if case.verdict == "measured" else word(case.verdict)
         return Cell(MARKS[case.verdict], None, status, remark + again)
-    parts = [f"{metric.replace('_', ' ')} {formatted(case.values[metric])}{_unit(metric)}"]
+    parts = [f"{metric.replace('_', ' ')} {with_unit(formatted(case.values[metric]), METRICS[metric].unit)}"]
     parts += [f"over starts {sizes(case)}"] if sizes(case) else []
     parts += [f"{cost(case)} per simulated second, {case.relative_cost:.3g} times that of Wang's method"] if cost(case) != "–" else []
     shown = ", ".join(parts) + ", "
@@ -116,11 +116,7 @@ def _words(change: Change) -> str:
     if old == new:  # as many digits as are needed to see the difference
         old, new = next(pair for n in range(4, 18) if len(set(pair := (f"{change.old:.{n}g}", f"{change.new:.{n}g}"))) == 2)
     step = f"dt = {in_ms(change.dt)}".replace(" ", "\xa0")  # in one line
-    return f"{change.metric.replace('_', ' ')} {old} → {new}{_unit(change.metric)} at {step}"
-
-
-def _unit(metric: str) -> str:
-    return "" if METRICS[metric].unit == "1" else f" {METRICS[metric].unit}"
+    return f"{change.metric.replace('_', ' ')} {old} → {with_unit(new, METRICS[change.metric].unit)} at {step}"
 
 
 def summary(release: Release, label: str, dt: float) -> list[str]:

@@ -13,7 +13,7 @@ from dropspin.comparisons.results.ensembles import QUICK_MEMBERS
 from dropspin.comparisons.results.results import Results
 from dropspin.reports.stories.findings import orders
 from dropspin.reports.stories.impact_laws import law_rows
-from dropspin.reports.stories.numbers import formatted, trend, unit, word
+from dropspin.reports.stories.numbers import formatted, trend, unit, with_unit, word
 from dropspin.reports.terminal.safe import styled
 from dropspin.reports.terminal.summary import print_summary
 
@@ -92,8 +92,8 @@ def _ensemble(results: Results, name: str) -> Iterator[str]:
     frame = results.table[(results.table["scene"] == name) & (results.table["kind"] == "ensemble")]
     finest = frame[frame["dt"] == frame["dt"].min()]
     for metric, rows in finest.groupby("metric", sort=False):
-        of = "" if rows["unit"].iloc[0] == "1" else f" {rows['unit'].iloc[0]}"
-        means = [f"{row.engine} {row.value:.3g} ± {row.upper - row.value:.1g}{of}" for row in rows.itertuples()]
+        values = [with_unit(f"{row['value']:.3g} ± {row['upper'] - row['value']:.1g}", row["unit"]) for row in rows.to_dict("records")]
+        means = map(" ".join, zip(rows["engine"], values, strict=True))
         spread = results.scenes[name].ensemble
         assert spread is not None
         starts = min(spread.size, QUICK_MEMBERS) if results.is_quick else spread.size

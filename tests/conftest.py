@@ -1,5 +1,6 @@
 """Settings and fixtures that all tests share."""
 
+import gc
 import importlib.util
 import os
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from hypothesis import settings
 settings.register_profile("default", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
+gc.set_threshold(50_000, 20, 20)  # a full collection visits a million objects of numba and pandas
 WITH_PYBULLET = {"core_run", "repository", "engine_coverage"}
 """Fixtures, and a module of tests/support, that use PyBullet."""
 
@@ -33,10 +35,15 @@ def uses_pybullet(item: pytest.Item) -> bool:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _timed_once():
-    """Time the steps of engines once, not three times: no test asserts on a clock. Their processes are forked, and inherit it."""
+def _timed_briefly():
+    """Time a few steps of an engine once, not a whole scene three times: no test asserts on a clock. Processes, forked, inherit it."""
+    from support.brief_runs import time_briefly
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("dropspin.comparisons.running.timing.TIMING_REPEATS", 1)
+        patch.setattr("dropspin.comparisons.running.run.time_engine", time_briefly)
+        patch.setattr("dropspin.comparisons.tradeoff.costs.BATCH_SECONDS", 1e-4)
+        patch.setattr("dropspin.comparisons.tradeoff.costs.LONG_ENOUGH", 2e-4)
         yield
 
 
@@ -72,6 +79,12 @@ def few_start_phases(monkeypatch):
     monkeypatch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 4)
 
 
+@pytest.fixture
+def two_rounds(monkeypatch):
+    """Two rounds of a trade-off's timings instead of nine, for tests that assert on no cost."""
+    monkeypatch.setattr("dropspin.comparisons.tradeoff.study.ROUNDS", 2)
+
+
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], None]], Path]:
     """Call it with a name and a function that fills a folder: the folder is filled once a session, for all workers of pytest-xdist."""
@@ -98,12 +111,15 @@ def core_run(shared) -> Path:
     """The folder of a run of the quick catalogue with the three engines at the default time steps, data only; `load_results` reads it."""
 
     def make(folder: Path) -> None:
+        from support.brief_runs import few_starts, whole_timings
         from support.engines import QUICK
         from support.scenes import with_few_members
 
         from dropspin.comparisons.results.store import save
         from dropspin.comparisons.running.run import run
 
-        save(run(map(with_few_members, QUICK), ["wang", "mujoco", "pybullet"]), folder)
+        with few_starts(), whole_timings():
+            results = run(map(with_few_members, QUICK), ["wang", "mujoco", "pybullet"])
+        save(results, folder, compress=False)
 
     return shared("core-run", make)

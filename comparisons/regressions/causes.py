@@ -5,9 +5,9 @@ of the scenes in which asymptotic errors fail, and none in the scenes in which t
 known to the end, or leaves a metric undefined, neither holds.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,13 +15,15 @@ import pandas as pd
 from dropspin.comparisons.faults.fault_model import FaultModel
 from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.judging.convergence import JUMPING
-from dropspin.comparisons.measuring.comparison import exactly
-from dropspin.comparisons.measuring.metrics import METRICS, values_of
+from dropspin.comparisons.measuring.comparison import Comparison, exactly
+from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.measuring.tolerances import negligible
 from dropspin.comparisons.regressions.parameters import PARAMETERS, Parameter
 from dropspin.comparisons.results.results import Results
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 
+Errors = Callable[[str], float]
+"""The error in a metric, by its name."""
 FIRST_SIZE = 1e-3
 LARGEST_SIZE = 0.3
 MOST_STEPS = 20_000
@@ -65,8 +67,8 @@ def causes(results: Results, engine: str) -> Causes:
     if failed.empty:
         return Causes([], [])
     dt = min(map(float, results.provenance["asked"]["dts"]))
-    scenes = [(results.scenes[str(name)], rows) for name, rows in judged.groupby("scene")]
-    scenes.sort(key=lambda scene: not (scene[1]["verdict"] == "failed").any())  # those that fail exclude most causes
+    scenes = [(results.scenes[str(name)], rows.to_dict("records")) for name, rows in judged.groupby("scene")]
+    scenes.sort(key=lambda scene: all(row["verdict"] != "failed" for row in scene[1]))  # those that fail exclude most causes
     widths = (failed["upper"] - failed["lower"]) / failed["value"].abs()
     narrowest = failed["scene"].iloc[int(widths.argmin())]
     leading = failed[failed["scene"] == narrowest]
@@ -99,7 +101,7 @@ def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: floa
     for sign in (1.0, -1.0):
         size, lead = sign * FIRST_SIZE, None
         for _ in range(ITERATIONS):
-            caused = pd.Series(_caused(scene, _with(parameter, size), dt).errors, dtype=float).reindex(rows.index)
+            caused = rows.index.to_series().map(_caused(scene, _with(parameter, size), dt).error)
             factors = (rows["value"] / caused).abs().replace([0.0, np.inf], np.nan).dropna()
             if lead is None and len(factors):
                 near = factors[(factors / factors.median()).between(1.0 / NEAR, NEAR)]
@@ -111,16 +113,16 @@ def _sizes(scene: Scenario, parameter: Parameter, failed: pd.DataFrame, dt: floa
             yield size
 
 
-def _explained(scene: Scenario, fault: FaultModel, rows: pd.DataFrame, dt: float) -> int | None:
+def _explained(scene: Scenario, fault: FaultModel, rows: list[dict[Hashable, Any]], dt: float) -> int | None:
     """How many of the failed asymptotic errors of a scene a cause has; None if it has another error than one of those that it defines."""
     coarse, fine = (_caused(scene, fault, step) for step in (dt, 0.5 * dt))
     count = 0
-    for row in rows.to_dict("records"):
+    for row in rows:
         metric = row["metric"]
-        caused = fine.errors.get(metric, np.nan)
+        caused = fine.error(metric)
         if np.isnan(caused):
             continue
-        sampling = abs(caused - coarse.errors.get(metric, np.nan)) + abs(fine.sampled[metric]) + negligible(scene, row["unit"])
+        sampling = abs(caused - coarse.error(metric)) + abs(fine.sampled(metric)) + negligible(scene, row["unit"])
         lower = row["lower"] - sampling
         if not fine.is_whole:  # the largest error so far is a lower bound of the whole one
             lower, caused = (-np.inf, -np.inf if METRICS[metric].signed else caused)
@@ -144,13 +146,13 @@ def _exact(scene: Scenario, step: float, count: int) -> Trajectory | None:
 class _Caused(NamedTuple):
     """The errors that a cause has, by metric, those of sampling the exact solution, and whether the exact solution with it is as long."""
 
-    errors: Mapping[str, float] = {}
-    sampled: Mapping[str, float] = {}
+    error: Errors = lambda metric: np.nan
+    sampled: Errors = lambda metric: np.nan
     is_whole: bool = False
 
 
 def _caused(scene: Scenario, fault: FaultModel, dt: float) -> _Caused:
-    """The errors that a cause has; none without an exact solution."""
+    """The errors that a cause has; NaN without an exact solution."""
     step = max(dt, scene.duration / MOST_STEPS)
     count = 1 + scene.steps(step)
     try:
@@ -159,17 +161,25 @@ def _caused(scene: Scenario, fault: FaultModel, dt: float) -> _Caused:
         return _Caused()
     if reference is None or motion is None:
         return _Caused()
-    exact, sampled = reference
-    truth, common = truth_for(scene), min(len(motion), len(exact))
-    if common < len(exact):
-        sampled = values_of(scene, truth, exact[:common], exact[:common])
-    reported = Trajectory.from_states(motion.t, fault.reported(motion.states))[:common]
-    errors = {name: value - sampled[name] for name, value in values_of(scene, truth, reported, exact[:common]).items()}
-    return _Caused(errors, sampled, common == len(exact))
+    exact, errors = reference
+    common = min(len(motion), len(exact))
+    sampled = errors.__getitem__ if common == len(exact) else _measured(scene, exact[:common], exact[:common])
+    measured = _measured(scene, Trajectory.from_states(motion.t, fault.reported(motion.states))[:common], exact[:common])
+    return _Caused(lambda metric: measured(metric) - sampled(metric), sampled, common == len(exact))
 
 
 @lru_cache(maxsize=256)  # of each scene it is needed for every cause
 def _sampled(scene: Scenario, step: float, count: int) -> tuple[Trajectory, Mapping[str, float]] | None:
     """The exact solution of a scene at each time step, and the errors that its sampling has."""
     exact = _exact(scene, step, count)
-    return None if exact is None else (exact, values_of(scene, truth_for(scene), exact, exact))
+    if exact is None:
+        return None
+    measured = _measured(scene, exact, exact)
+    return exact, {metric: measured(metric) for metric in METRICS}
+
+
+def _measured(scene: Scenario, motion: Trajectory, exact: Trajectory) -> Errors:
+    """Measures the errors that are asked for, NaN where a metric does not apply: most causes are excluded by the first ones."""
+    truth = truth_for(scene)
+    case = Comparison.with_truth(scene, motion, truth, exact)
+    return lambda metric: METRICS[metric].value_or_nan([case]) if METRICS[metric].applies(scene, truth) else np.nan

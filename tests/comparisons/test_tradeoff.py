@@ -102,10 +102,9 @@ def test_leading_metric_depends_on_the_scene():
 
 @pytest.fixture(scope="module", autouse=True)
 def short_timings():
-    """Two rounds instead of nine, short batches, 400 steps with a floor: no assertion depends on the machine's speed."""
+    """Two rounds instead of nine, 400 steps with a floor: no assertion depends on the machine's speed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "ROUNDS", 2)
-        patch.setattr(costs, "BATCH_SECONDS", 1e-4)
         patch.setattr(errors, "MOST_RECORDED", 400)
         yield
 

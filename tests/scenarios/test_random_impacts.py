@@ -92,8 +92,9 @@ def verify_solutions(seeds):
 
 
 def test_solutions_match_an_event_driven_integration_up_to_their_horizon():
-    total, lacking = verify_solutions(range(50))
-    assert total > 40
+    """Of 30 bodies; the slow test has ten thousand."""
+    total, lacking = verify_solutions(range(30))
+    assert total > 25
     assert lacking == 0
 
 

@@ -59,7 +59,7 @@ def by_angles(lean, spin, precession, nutation, times):
         torque = MASS * mpmath.mpf(G) * LENGTH * sine
         return [speed, turning**2 * sine * cosine + (torque - q * turning * sine) / ACROSS, turning, spin - turning * cosine]
 
-    with mpmath.workdps(25):
+    with mpmath.workdps(18):
         solution = mpmath.odefun(rates, 0, [mpmath.mpf(lean), mpmath.mpf(nutation), 0, 0])
         return [np.array(solution(time), dtype=float) for time in times]
 

@@ -1,9 +1,10 @@
-"""Predicted errors compared with measured ones: in flight to six digits, in a flat bounce to the resolution of 32 start phases."""
+"""Predicted errors compared with measured ones: in flight to six digits, in a flat bounce to the resolution of the start phases."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from mpmath import mp, mpf
+from support.brief_runs import phases_of
 from support.engines import QUICK
 
 import dropspin as ds
@@ -46,17 +47,17 @@ def test_errors_in_flight_are_the_predicted_ones(rows):
 
 @pytest.mark.parametrize("dt", [2e-3, 1e-3])
 def test_errors_of_flat_bounces_are_the_predicted_ones(rows, flat, dt):
-    """To what 32 phases leave of the speed at detection, g dt/64, and of the depth there, (1 - e²) u dt/64; and to the next order."""
+    """To what n phases leave of the speed at detection, g dt/(2n), and of the depth there, (1 - e²) u dt/(2n); and to the next order."""
     measured, predicted = measured_and_predicted(rows, flat, [dt])
     assert len(flat) >= 5
     for key, value in predicted.items():
-        scene = load(key[0])
+        scene, share = load(key[0]), 1 / (2 * phases_of(key[0]))
         u, e = np.sqrt(2 * 9.8 * scene.clearance), scene.floor.restitution
         if key[3] == "restitution_error":
             change = 9.8 * dt / u
-            assert measured[key] == pytest.approx(value, rel=change * (1 / 64 + change), abs=1e-10), key
+            assert measured[key] == pytest.approx(value, rel=change * (share + change), abs=1e-10), key
         else:
-            allowed = (1 - e**2) * u * dt / 64 / scene.clearance + 4 * dt**2 * u**2
+            allowed = (1 - e**2) * u * dt * share / scene.clearance + 4 * dt**2 * u**2
             assert measured[key] == pytest.approx(value, abs=allowed), key
 
 

@@ -56,6 +56,7 @@ FAULTS = {
 }  # fmt: skip
 
 
+@pytest.mark.usefixtures("few_start_phases")
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_caught(fault):
     """Each fault, planted in an exact engine, fails the metric that measures it."""
@@ -130,6 +131,7 @@ def test_malformed_record_is_refused(engine, reason):
     assert re.search(reason, row["reason"])
 
 
+@pytest.mark.usefixtures("few_start_phases")
 @pytest.mark.parametrize("dt", [4e-3, 2e-3, 1e-3])
 @pytest.mark.parametrize("scene", ["drop-ball", "drop-ball-lively", "drop-box-flat", "drop-box-corner", "drop-box-sticking"])
 def test_falling_through_the_floor_fails_at_every_step(scene, dt):

@@ -3,7 +3,7 @@
 import os
 
 import pytest
-from support.cli import dropspin, spawn
+from support.cli import dropspin, forked
 
 import dropspin as ds
 
@@ -88,7 +88,7 @@ def test_input_that_nobody_means_is_refused_in_one_message(arguments, message, t
         (tmp_path / name).write_text(text)
     os.mkfifo(tmp_path / "pipe")
     before = sorted(tmp_path.rglob("*"))
-    done = spawn(*arguments, cwd=tmp_path, timeout=60.0) if message == NOT_A_FILE else dropspin(*arguments, cwd=tmp_path)
+    done = (forked if message == NOT_A_FILE else dropspin)(*arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert message in done.stderr
     assert "Traceback" not in done.stderr

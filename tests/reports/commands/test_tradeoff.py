@@ -9,6 +9,7 @@ from dropspin.comparisons.tradeoff.errors import BUDGET
 from dropspin.reports.commands.tradeoff import tradeoff_command
 from dropspin.reports.study_files import read_study
 
+pytestmark = pytest.mark.usefixtures("two_rounds")
 SCENE = """
 duration = 0.5
 [body]

@@ -1,0 +1,53 @@
+"""Runs that cost less: from few start phases, with few steps timed.
+
+Of most scenes, tests need the results, not that their means are the exact ones to a 64th of a step; and no test asserts on a clock.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from unittest import mock
+
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.running import start_phases, timing
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.scenarios import Scenario
+
+FEW = 8
+TIMED_STEPS = 20
+MEANS_ARE_TESTED = ("drop-ball", "drop-ball-brisk", "drop-ball-dull", "drop-ball-lively", "drop-box-edge", "drop-box-flat")
+"""Scenes whose means over start phases are compared with formulas, or with bounds that few starts miss."""
+
+
+def phases_of(scene_name: str) -> int:
+    """The number of start phases of a scene in `core_run`."""
+    return start_phases.START_PHASES if scene_name in MEANS_ARE_TESTED else FEW
+
+
+@contextmanager
+def few_starts() -> Iterator[None]:
+    """Run scenes from few start phases, but for those whose means are tested."""
+    count = start_phases.number_of_phases
+
+    def few(own: start_phases.StartPhase, dt: float) -> int:
+        return min(count(own, dt), phases_of(own.scene.name))
+
+    with mock.patch.object(start_phases, "number_of_phases", few):
+        yield
+
+
+def time_briefly(entry: EngineEntry, scene: Scenario, dt: float) -> timing.Timing:
+    """As `time_engine`, by the first steps of a scene."""
+    whole = timing.time_steps
+
+    def first_steps(engine: Engine, scene: Scenario, dt: float, steps: int) -> timing.TimedSteps:
+        return whole(engine, scene, dt, min(steps, TIMED_STEPS))
+
+    with mock.patch.object(timing, "time_steps", first_steps):
+        return timing.time_engine(entry, scene, dt)
+
+
+@contextmanager
+def whole_timings() -> Iterator[None]:
+    """Time all steps of a scene, beside which the call is short."""
+    with mock.patch("dropspin.comparisons.running.run.time_engine", timing.time_engine):
+        yield

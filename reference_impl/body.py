@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dropspin.reference_impl.vectors import Mat3, Quat, Vec3
 
@@ -21,14 +21,14 @@ class Body:
         mass: M [kg], or shape (B,).
         inertia: I_body about the centre of mass, in the body frame [kg m²], shape (3, 3) or (B, 3, 3).
         points: Vertices relative to the centre of mass, in the body frame [m], shape (n, 3) or (B, n, 3).
-        radius: Rounding radius of the vertices [m], or shape (B,): 0 in the lecture note; a ball is one vertex at its centre with the
-            rounding radius R.
+        semi_axes: Of the ellipsoid about each vertex, along the axes of the body frame [m], shape (3,) or (B, 3); 0 in the lecture note. A
+            ball of radius R is one vertex at its centre with (R, R, R), a cylinder two vertices on its axis, y, with (R, 0, R).
     """
 
     mass: float | Array
     inertia: Array
     points: Array
-    radius: float | Array = 0.0
+    semi_axes: ArrayLike = (0.0, 0.0, 0.0)
 
 
 class Floor(NamedTuple):
@@ -70,8 +70,13 @@ class KernelBody(NamedTuple):
     """Rotation from the principal frame to the body frame."""
     points: Array
     radius: float
+    """Of the ball about each vertex [m], if it is one."""
     reach: float
     """Radius of a sphere about the centre that contains the body [m]."""
+    semi_axes: Vec3 | None
+    """Of the ellipsoid about each vertex [m]; None if it is a ball."""
+    has_rims: bool
+    """Whether this ellipsoid is a disc across y, so that a rim is about each vertex."""
 
 
 class KernelDamping(NamedTuple):

@@ -1,9 +1,14 @@
 """The geometry of the floor y = 0: its normal, components along it, and the points at which a body can touch it."""
 
-from dropspin.reference_impl.vectors import Vec3, compiled, row
+import math
+
+from dropspin.reference_impl.vectors import Vec3, compiled, dot, row, select
 
 N = Vec3(0.0, 1.0, 0.0)
 """The floor's unit normal, upwards."""
+RIM_POINTS = 3
+PLACES = ((1.0, 0.0), (-0.5, math.sqrt(0.75)), (-0.5, -math.sqrt(0.75)))
+"""Cosine and sine of the angles around a rim from its lowest point."""
 
 
 @compiled
@@ -16,7 +21,34 @@ def along_normal(a):
 
 
 @compiled
-def vertex(R, body, i):
-    """Offset from the centre of mass to vertex i. A rounded vertex touches at its lowest point (for balls; not in the lecture note)."""
-    r = R @ row(body.points, i)
-    return Vec3(r.x, r.y - body.radius, r.z)
+def contact_count(body):
+    """The number of points at which the body can touch the floor."""
+    return body.points.shape[0] * (RIM_POINTS if body.has_rims else 1)
+
+
+@compiled
+def contact_offset(R, body, i):
+    """Offset from the centre of mass to point i at which the body can touch the floor: a vertex.
+
+    Not in the lecture note: a vertex with an ellipsoid about it touches at the lowest point of this ellipsoid; with a disc, at the lowest
+    point of the rim, and, so that the rim can carry the body, at the two points that divide it into three equal parts with the lowest.
+    """
+    if body.has_rims:
+        return _surface(R @ row(body.points, i // RIM_POINTS), R, body.semi_axes, body.radius, i % RIM_POINTS)
+    return _surface(R @ row(body.points, i), R, body.semi_axes, body.radius, 0)
+
+
+@compiled
+def _surface(r, R, semi_axes, radius, place):
+    """The point of the surface near the vertex at r."""
+    ball = Vec3(r.x, r.y - radius, r.z)
+    if semi_axes is None:
+        return ball
+    # With S the semi-axes and n = Rᵀ N, the lowest point is at -R S e, e = S n / |S n|; where a disc is level, every e in it is one.
+    stretched = Vec3(semi_axes.x * R.row2.x, semi_axes.y * R.row2.y, semi_axes.z * R.row2.z)
+    length = math.sqrt(dot(stretched, stretched))
+    e = select(length > 0.0, stretched / select(length > 0.0, length, 1.0), Vec3(1.0, 0.0, 0.0))
+    cosine, sine = PLACES[place]
+    offset = R @ Vec3(semi_axes.x * (cosine * e.x + sine * e.z), semi_axes.y * e.y, semi_axes.z * (cosine * e.z - sine * e.x))
+    is_ball = (semi_axes.x == semi_axes.y) & (semi_axes.y == semi_axes.z)
+    return select(is_ball, ball, r - offset)

@@ -32,6 +32,7 @@ from dropspin.reference_impl.parameters import (
     read_gravity,
     read_nothing,
     read_quaternion,
+    read_semi_axes,
     read_vector,
 )
 from dropspin.reference_impl.step import advance
@@ -52,6 +53,8 @@ class Parts:
     damping: bool
     floor: bool
     turning: bool
+    ellipsoids: bool
+    rims: bool
 
 
 @cache
@@ -70,12 +73,13 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
     correct = None if correction is None else correction.correct
     load, rows_of, record = (_load, _rows_of, _record) if width == 1 else (lanes.load, lanes.rows_of, lanes.record)
     forces_of = rows_of if parts.forces else _no_forces
+    semi_axes_of, has_rims = read_semi_axes if parts.ellipsoids else read_nothing, parts.rims
 
     def fill(recorded, states, columns, points, forces, every, first, last):
         unsolved = 0
         for block in range(first, last):
             own = min(block, columns.shape[0] - 1)
-            body = read_body(load, columns, rows_of(points, block), own)
+            body = read_body(load, columns, rows_of(points, block), own, semi_axes_of, has_rims)
             dt = load(columns, own, STEP_SIZE)
             gravity = gravity_of(load, columns, own)
             damping = damping_of(load, columns, own)

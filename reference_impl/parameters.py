@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Test = Callable[[Array], NDArray[np.bool_]]
 
 # The first column of each quantity: `pack` writes them in this order, the functions at the end of this file read them.
-STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, RADIUS, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 36
+STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, SEMI_AXES, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 38
 FRICTION = FLOOR + 1
 
 
@@ -23,7 +23,7 @@ class Parameters(NamedTuple):
     """Bodies in their worlds with their time steps: one row for all, or one for each."""
 
     columns: Array
-    """Shape (1, 37) or (B, 37)."""
+    """Shape (1, 39) or (B, 39)."""
     points: Array
     """Vertices [m], shape (1, n, 3) or (B, n, 3)."""
     is_ensemble: bool
@@ -42,7 +42,7 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
     size = ensemble_size(given)
     points = given.pop("points")
     # The margin covers the rounding of R: no vertex may reach the floor before the bounding sphere does.
-    reach = (np.sqrt(np.max(np.sum(points**2, axis=2), axis=1)) + given["radius"]) * (1.0 + 1e-12)
+    reach = (np.sqrt(np.max(np.sum(points**2, axis=2), axis=1)) + given["semi_axes"].max(axis=1)) * (1.0 + 1e-12)
     inertia = given["inertia"]
     moments, axes = _principal(inertia)
     in_order = [
@@ -58,7 +58,7 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
         np.linalg.inv(inertia),
         moments,
         axes,
-        given["radius"],
+        given["semi_axes"],
         reach,
     ]
     columns = np.concatenate([np.broadcast_to(part.reshape(len(part), -1), (size, part[0].size)) for part in in_order], axis=1)
@@ -85,7 +85,7 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
         "mass": (body.mass, (), "a number above 0, in kg", _is_above_zero),
         "inertia": (body.inertia, (3, 3), "a symmetric, positive definite 3 x 3 matrix, in kg m²", _is_inertia),
         "points": (points, (vertices, 3), "finite numbers, in m, for at least one vertex", is_finite),
-        "radius": (body.radius, (), "0 or more, in m", _is_not_negative),
+        "semi_axes": (body.semi_axes, (3,), "0 or more, in m, of a disc 0 along y", _is_ellipsoid),
     }
 
 
@@ -100,6 +100,12 @@ def _is_above_zero(values: Array) -> NDArray[np.bool_]:
 
 def _is_not_negative(values: Array) -> NDArray[np.bool_]:
     return is_finite(values) & (values >= 0.0)
+
+
+def _is_ellipsoid(values: Array) -> NDArray[np.bool_]:
+    """Whether semi-axes are those of a point, a disc across y, or an ellipsoid."""
+    across, is_point = np.all(values[:, [0, 2]] > 0.0, axis=1), ~np.any(values, axis=1)
+    return is_finite(values) & np.all(values >= 0.0, axis=1) & (across | is_point)
 
 
 MIN_MOMENT_RATIO = 1e-13
@@ -186,7 +192,7 @@ def _principal_of_one(inertia: Array) -> tuple[Array, Quat]:
 
 
 @compiled
-def read_body(load, columns, points, block):
+def read_body(load, columns, points, block, semi_axes_of, has_rims):
     """The body, or the bodies, of a block."""
     return KernelBody(
         load(columns, block, MASS),
@@ -195,9 +201,17 @@ def read_body(load, columns, points, block):
         read_vector(load, columns, block, MOMENTS),
         read_quaternion(load, columns, block, AXES),
         points,
-        load(columns, block, RADIUS),
+        load(columns, block, SEMI_AXES),
         load(columns, block, REACH),
+        semi_axes_of(load, columns, block),
+        has_rims,
     )
+
+
+@compiled
+def read_semi_axes(load, columns, block):
+    """The semi-axes about each vertex [m]."""
+    return read_vector(load, columns, block, SEMI_AXES)
 
 
 @compiled

@@ -36,6 +36,7 @@ Source of the exact solutions: `dropspin.scenarios.truths`.
 
 import numpy as np
 
+from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.errors import DropspinError, SceneError
 from dropspin.scenarios.families import FAMILIES, Draws
 from dropspin.scenarios.model import Scenario
@@ -119,7 +120,7 @@ def _is_resolved(scene: Scenario) -> bool:
 def _strikes_alone(scene: Scenario, impact: Impact) -> bool:
     """Whether, at every impact, all other corners are so far from the floor that no time step contains two contacts."""
     points = rotate(impact.before[ORIENTATION], scene.body.vertices)
-    heights = impact.before[POSITION][1] + points[:, 1] - scene.body.rounding
+    heights = impact.before[POSITION][1] + points[:, 1] - float(depth_below_centre(impact.before[ORIENTATION], scene.body.semi_axes))
     speeds = impact.before[VELOCITY][1] + np.cross(impact.before[SPIN], points)[:, 1]
     apart = heights > heights.min() + 1e-9 * scene.body.size
     return bool((heights - heights.min() > -COARSEST_STEP * np.minimum(speeds, 0.0))[apart].all())

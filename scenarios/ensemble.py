@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.model import Ensemble, Scenario, unit
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, RATES, Array
@@ -52,13 +53,16 @@ def spread_start(scene: Scenario, number: int) -> Array:
         raise ValueError(f"scene {scene.name!r} has no [ensemble]")
     body = scene.body
     return spread_starts(
-        scene.initial_state[np.newaxis], scene.ensemble, np.array([number]), body.vertices, body.rounding, scene.floor is not None
+        scene.initial_state[np.newaxis],
+        scene.ensemble,
+        np.array([number]),
+        body.vertices,
+        body.semi_axes,
+        scene.floor is not None,
     )[0]
 
 
-def spread_starts(
-    states: Array, spread: Ensemble, numbers: NDArray[np.int64], vertices: Array, rounding: float | Array, floor: bool
-) -> Array:
+def spread_starts(states: Array, spread: Ensemble, numbers: NDArray[np.int64], vertices: Array, semi_axes: Array, floor: bool) -> Array:
     """The initial states that `spread_start` returns, for many scenes that share an ensemble.
 
     Args:
@@ -66,7 +70,7 @@ def spread_starts(
         spread: The ensemble.
         numbers: The number of each initial state, shape (B,).
         vertices: Vertices of one body, shape (n, 3), or of each, shape (B, n, 3) [m].
-        rounding: Rounding radius of the vertices [m], or of each body's, shape (B,).
+        semi_axes: Semi-axes about the vertices of one body, shape (3,), or of each, shape (B, 3) [m].
         floor: Whether there is a floor; if so, each initial state has the clearance of its scene.
     """
     height, around, share, *sideways = (uniform(spread.seed, name, numbers) for name in ("axis height", "axis angle", "share", *RATE_DRAWS))
@@ -78,7 +82,7 @@ def spread_starts(
         turns = np.array([_turn(*draw) for draw in draws])
         found[:, ORIENTATION] = [unit(tuple(q)) for q in multiply(turns, states[:, ORIENTATION]).tolist()]
     if floor:
-        found[:, 1] += clearances(states, vertices, rounding) - clearances(found, vertices, rounding)
+        found[:, 1] += clearances(states, vertices, semi_axes) - clearances(found, vertices, semi_axes)
     return found
 
 
@@ -90,10 +94,10 @@ def _turn(height: float, around: float, angle: float) -> list[float]:
     return [*(math.sin(half) * component for component in axis), math.cos(half)]
 
 
-def clearances(states: Array, vertices: Array, rounding: float | Array) -> Array:
+def clearances(states: Array, vertices: Array, semi_axes: Array) -> Array:
     """Heights of the bodies' lowest points [m], shape (B,); arguments as in `spread_starts`."""
     heights = rotate(states[:, np.newaxis, ORIENTATION], vertices)[..., 1]
-    return states[:, 1] + heights.min(axis=1) - rounding
+    return states[:, 1] + heights.min(axis=1) - depth_below_centre(states[:, ORIENTATION], semi_axes)
 
 
 def _angles(shares: Array, largest: float) -> Array:

@@ -237,4 +237,4 @@ def _height(body: Table, attitude: Array) -> float:
     from dropspin.scenarios.bodies import Body
 
     made: Any = TypeAdapter(Body).validate_python(body)
-    return made.rounding - float(rotate(attitude, made.vertices)[:, 1].min())
+    return -float(made.lowest(attitude, 0.0)[0, 1])

@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from dropspin.scenarios.bodies.mesh_files import read_mesh
 from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
 from dropspin.scenarios.files import read_file
 from dropspin.scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
 from dropspin.scenarios.problems import scene_name
+from dropspin.scenarios.tables import LARGEST
 from dropspin.scenarios.validation import Alternatives, first_problem, shown
 
 CATALOGUE = Path(__file__).parent / "catalogue"
@@ -37,7 +39,7 @@ FEATURES: dict[str, type[BaseModel]] = {
 ALTERNATIVES: Alternatives = {
     ("floor.friction", "literal_error"): ", or a Coulomb coefficient of 0 or more",
     ("floor.friction", "*"): ", or be 'none' or 'infinite'",
-    ("body.inertia", "*"): ", or three positive moments [Ixx, Iyy, Izz]",
+    ("body.inertia", "*"): ", or three positive moments [Ixx, Iyy, Izz], or a tensor of three such rows",
 }
 
 
@@ -64,7 +66,7 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         SceneError: The scene is not valid. The message gives the file or mapping, the key, the value and the allowed values.
     """
     if isinstance(scene, Mapping):
-        return _plausible(from_mapping(scene), "scene")
+        return _plausible(from_mapping(_with_mesh(dict(scene), Path())), "scene")
     if not isinstance(scene, str | Path):
         raise SceneError(f"scene: got {shown(scene)} ({type(scene).__name__}); give a catalogue name, a path or a mapping.")
     if isinstance(scene, str) and (drawn := re.fullmatch(DRAWN, scene)):
@@ -78,8 +80,28 @@ def load(scene: str | Path | Mapping[str, Any]) -> Scenario:
         str(path).encode()
     except UnicodeEncodeError:
         raise SceneError(f"{str(path)!a}: the file's name is not UTF-8 text; rename it.") from None
-    loaded = from_table(path.stem, str(scene), read_toml(path, str(scene)))
+    loaded = from_table(path.stem, str(scene), _with_mesh(read_toml(path, str(scene)), path.parent))
     return loaded if path.parent == CATALOGUE else _plausible(loaded, str(scene))
+
+
+def _with_mesh(content: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The content of a scene's file with the mesh that `body.file` names, relative to the folder of the file, times `body.scale`."""
+    body = content.get("body")
+    if not isinstance(body, Mapping) or body.get("shape") != "mesh" or "file" not in body:
+        return content
+    keys = {key: value for key, value in body.items() if key not in ("file", "scale")}
+    file, scale = body["file"], body.get("scale", 1.0)
+    if not isinstance(file, str | Path):
+        raise SceneError(f"body.file: got {shown(file)}; must be the path of a file .obj or .stl.")
+    if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0.0 < scale <= LARGEST:
+        raise SceneError(f"body.scale: got {shown(scale)}; must be a number above 0.")
+    if given := {"points", "faces"} & set(keys):
+        raise SceneError(f"body.{min(given)}: the file of a mesh gives points and faces; give either these or file.")
+    try:
+        points, faces = read_mesh(folder / file, str(folder / file))
+    except DropspinError as error:
+        raise SceneError(f"body.file: {error}") from None
+    return {**content, "body": {**keys, "points": scale * points, "faces": faces}}
 
 
 def _plausible(scene: Scenario, where: str) -> Scenario:

@@ -86,7 +86,7 @@ def lowest_height(scene: Scenario, motion: Trajectory) -> Array:
     orientation, lowest = _components(motion.orientation), np.full(len(motion), np.inf)
     for vertex in scene.body.hull.tolist():
         np.minimum(lowest, offset_of(orientation, vertex), out=lowest)
-    return motion.position[:, 1] + lowest - scene.body.rounding
+    return motion.position[:, 1] + lowest - depth_of(orientation, tuple(scene.body.semi_axes.tolist()))
 
 
 def offset_of(orientation: Components, vertex: Components) -> Any:
@@ -95,6 +95,17 @@ def offset_of(orientation: Components, vertex: Components) -> Any:
     a, b, c = vertex
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
     return b + w * ty + (z * tx - x * tz)
+
+
+def depth_of(orientation: Components, semi_axes: Components) -> Any:
+    """Depth of the lowest point of an ellipsoid below its centre, |S n|: see `dropspin.scenarios.bodies.surface`."""
+    a, b, c = semi_axes
+    if a == b == c:
+        return a
+    x, y, z, w = orientation
+    up = rotated((-x, -y, -z, w), (0.0, 1.0, 0.0))
+    stretched = (a * up[0], b * up[1], c * up[2])
+    return np.sqrt(scalar_product(stretched, stretched))
 
 
 def rotated(orientation: Components, vector: Components) -> Components:
@@ -110,7 +121,7 @@ def scalar_product(a: Components, b: Components) -> Any:
     return a[0] * b[0] + a[2] * b[2] + a[1] * b[1]
 
 
-FORMULAS = (angular_momentum_of, kinetic_energy_of, energy_of, offset_of, rotated, scalar_product)
+FORMULAS = (angular_momentum_of, kinetic_energy_of, energy_of, offset_of, rotated, scalar_product, depth_of)
 """The functions that can be compiled."""
 
 

@@ -3,12 +3,13 @@
 import hashlib
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from dropspin.scenarios.bodies import Body
+from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import PARTS, Array
 from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector
@@ -204,8 +205,9 @@ class Scenario(Table):
     @property
     def clearance(self) -> float:
         """Height of the body's lowest point at the start [m]."""
-        heights = rotate(np.array(self.start.orientation), self.body.vertices)[:, 1]
-        return self.start.position[1] + float(heights.min()) - self.body.rounding
+        orientation = np.array(self.start.orientation)
+        heights, depth = rotate(orientation, self.body.vertices)[:, 1], depth_below_centre(orientation, self.body.semi_axes)
+        return self.start.position[1] + float(heights.min()) - float(depth)
 
     @property
     def starts_above_floor(self) -> bool:
@@ -231,8 +233,12 @@ class Scenario(Table):
     @property
     def digest(self) -> str:
         """A short hash of everything that affects the motion: without texts, expectations and values that are the default."""
-        physics = self.model_dump_json(exclude={"name", "summary", "source", "tags", "expect"}, exclude_defaults=True)
-        return hashlib.sha256(physics.encode()).hexdigest()[:12]
+        texts: dict[str, Any] = dict.fromkeys(("name", "summary", "source", "tags", "expect"), True)
+        physics = self.model_dump_json(exclude=texts | {"body": set(self.body.arrays)}, exclude_defaults=True)
+        found = hashlib.sha256(physics.encode())
+        for name in self.body.arrays:
+            found.update(getattr(self.body, name).tobytes())
+        return found.hexdigest()[:12]
 
     @property
     def structure(self) -> tuple[str | int | bool, ...]:

@@ -82,6 +82,8 @@ class Engine(Configured, ABC):
 
     shapes: ClassVar[tuple[str, ...]] = ("sphere", "box", "vertices")
     """The shapes of bodies that it builds on a floor; scenes with others are declined."""
+    takes_offsets: ClassVar[bool] = False
+    """Whether it builds a body on a floor whose centre of mass is not at the centre of its shape."""
     order: ClassVar[float | None] = None
     """Claimed order of accuracy in free flight; inf for exact, None for no claim."""
     precision: ClassVar[type] = np.float64
@@ -135,6 +137,8 @@ class Engine(Configured, ABC):
         """Why a scene is not simulated, by the shape of its body or as `declines` says; None if it is."""
         if scene.floor is not None and scene.body.shape not in self.shapes:
             return f"the adapter maps the shapes {', '.join(self.shapes)} onto a floor, not {scene.body.shape}"
+        if scene.floor is not None and not self.takes_offsets and scene.body.shape != "vertices" and scene.body.centre.any():
+            return "the adapter builds bodies with the centre of mass at the centre of their shape"
         return self.declines(scene)
 
 

@@ -120,7 +120,7 @@ class DartSimulation(Simulation):
             before, fall = rows[:-1, None], dt * self._world.getGravity()[1]
             arms = rotate(before[..., ORIENTATION], body.vertices)
             approach = -(before[..., 8] + cross(before[..., SPIN], arms)[..., 1] + fall)
-            rebounds = floor.restitution * approach[(before[..., 1] + arms[..., 1] < body.rounding) & (approach > 0.0)]
+            rebounds = floor.restitution * approach[(before[..., 1] + arms[..., 1] < body.semi_axes[0]) & (approach > 0.0)]
             lost = {"restitution_error": 1.0, "bounce_height_error": 1.0, "position_error": 0.1**2 / 2.0 * dt / abs(fall) if fall else 0.0}
             if not np.all((rebounds == 0.0) | (rebounds >= 0.1) & (rebounds <= 100.0)):
                 self.known_limitations = [KnownLimitation("DART sets rebounds below 0.1 m/s to 0 and clamps those above 100 m/s", lost)]

@@ -103,7 +103,7 @@ class DrakeSimulation(Simulation):
         plant.RegisterCollisionGeometry(plant.world_body(), *_floor(kind), "floor", surfaces[0])
         # One shape would have one point contact with the floor; balls of radius 0 give each corner its own.
         for (number, corner), one in product(enumerate(body.vertices), bodies):
-            plant.RegisterCollisionGeometry(one, RigidTransform(corner), Sphere(body.rounding), f"corner {number}", surfaces[1])
+            plant.RegisterCollisionGeometry(one, RigidTransform(corner), Sphere(body.semi_axes[0]), f"corner {number}", surfaces[1])
         return {"discrete_contact_approximation": approximation, "stiffness": stiffness} | chosen
 
     def advance(self, steps: int) -> None:

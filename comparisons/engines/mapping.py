@@ -42,7 +42,7 @@ def refusal_of_hull(scene: Scenario, name: str) -> str | None:
     """Why a scene's body is not represented by its corners, which an engine calls `name`; None if it can be."""
     if scene.floor is None:
         return f"there is no shape without a floor, and no {name}"
-    return f"a {name} would only approximate a ball" if scene.body.is_ball else None
+    return f"a {name} would only approximate a {scene.body.shape}" if scene.body.semi_axes.any() else None
 
 
 def refusal_of_axes(scene: Scenario, does: str) -> str | None:

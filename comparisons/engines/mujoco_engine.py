@@ -33,7 +33,7 @@ from dropspin.comparisons.engines.packages import Version, formatted, numbers_of
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.bodies import Sphere, Vertices
+from dropspin.scenarios.bodies import SHAPES, Mesh, Sphere, Vertices
 from dropspin.scenarios.model import Floor, differ_in_start_alone
 
 VERSION = numbers_of(mujoco.__version__)
@@ -112,7 +112,7 @@ def flight_of(integrator: str, version: Version) -> str:
 class MuJoCo(Engine):
     """MuJoCo with exact restitution: one free body and one explicit contact pair with the floor; or its defaults (profile=default)."""
 
-    name, mixes_scenes = "mujoco", True
+    name, mixes_scenes, shapes, takes_offsets = "mujoco", True, SHAPES, True
     choices: ClassVar = {
         "integrator": tuple(INTEGRATORS),
         "profile": PROFILES,
@@ -184,7 +184,7 @@ class MuJoCo(Engine):
         unfit = unfit or refusal_of_floor(scene, self.option("floor"))
         if unfit is not None or floor is None:
             return unfit
-        if isinstance(body, Vertices) and body.resting_height == 0.0:
+        if isinstance(body, Vertices | Mesh) and body.resting_height == 0.0:
             return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo has no convex hull of a flat mesh"
         return None if self.is_default else self._refusal_of_contacts(scene, floor)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.engines.base import Array, KnownLimitation
 from dropspin.comparisons.engines.mujoco_model import IMPEDANCE
 from dropspin.scenarios import Scenario
+from dropspin.scenarios.bodies.surface import rise_of_centre
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
 from dropspin.scenarios.rotations import cross, length, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
@@ -29,9 +30,9 @@ def limitations_met(scene: Scenario, states: Array, dt: float, *, estimated: boo
     if scene.floor is None:
         return
     before, after = states[:-1], states[1:]
-    arms = rotate(before[:, None, ORIENTATION], scene.body.vertices) - [0.0, scene.body.rounding, 0.0]
+    arms = rotate(before[:, None, ORIENTATION], scene.body.vertices) - rise_of_centre(before[:, None, ORIENTATION], scene.body.semi_axes)
     touching = before[:, None, 1] + arms[..., 1] <= 0.0
-    box = int(estimated and not scene.body.rounding)
+    box = int(estimated and not scene.body.is_ball)
     if float(-states[:, 8].min()) > AT_REST and (scene.floor.friction != "none" or (touching.sum(axis=1) > 1 - box).any()):
         yield _of_impedance(scene, before, arms, touching)
     if isinstance(scene.floor.friction, float):
@@ -82,7 +83,7 @@ def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: flo
     hop = 2.0 * (e * fastest + added) / g if g > 0.0 else 0.0
     body = scene.body
     # The normal force of a ball has no torque, and its friction turns it; other bodies stay flat.
-    turning = body.mass * body.rounding * late / np.min(np.diag(body.inertia_tensor)) if body.rounding else (late + added) / body.size
+    turning = body.mass * body.size * late / np.min(np.diag(body.inertia_tensor)) if body.is_ball else (late + added) / body.size
     lifted = body.mass * (e * fastest * added + 0.5 * added**2)
     motion = Trajectory.from_states(dt * np.arange(len(states), dtype=float), states)
     height = scene.clearance if scene.starts_above_floor else body.size
@@ -95,7 +96,7 @@ def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: flo
     }
     spin = float(length(angular_momentum(scene, motion)).max())
     if spin > 0.0:
-        turned = body.mass * body.size * (late + (0.0 if body.rounding else added)) / spin
+        turned = body.mass * body.size * (late + (0.0 if body.is_ball else added)) / spin
         sizes |= {"angular_momentum_error": turned, "angular_momentum_direction_error": 0.5 * np.pi * turned}
     if approach > 0.0:
         sizes["restitution_error"] = added / approach

@@ -23,7 +23,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, bodies_in, friction_of, principal_frame
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.bodies import Sphere, Vertices
+from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.model import Floor
 
@@ -169,16 +169,22 @@ def _free_bodies(scene: Scenario, dt: float, integrator: str, form: Mapping[str,
 
 
 def _is_mesh(scene: Scenario, form: Mapping[str, str]) -> bool:
-    return form["body"] == "mesh" or isinstance(scene.body, Vertices)
+    return form["body"] == "mesh" or isinstance(scene.body, Vertices | Mesh)
 
 
 def _shape(scene: Scenario, form: Mapping[str, str]) -> dict[str, Any]:
     """The geom of the body."""
     if _is_mesh(scene, form):
         return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "hull"}
-    if isinstance(scene.body, Sphere):
-        return {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": [scene.body.radius, 0.0, 0.0]}
-    return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": scene.body.vertices.max(axis=0)}
+    body, kinds = scene.body, mujoco.mjtGeom
+    at = {"pos": -body.centre} if body.centre.any() else {}
+    if isinstance(body, Sphere):
+        return {"type": kinds.mjGEOM_SPHERE, "size": [body.radius, 0.0, 0.0], **at}
+    if isinstance(body, Capsule | Cylinder):  # along z
+        kind = kinds.mjGEOM_CAPSULE if isinstance(body, Capsule) else kinds.mjGEOM_CYLINDER
+        return {"type": kind, "size": [body.radius, body.half_length, 0.0], "quat": UPWARD, **at}
+    assert isinstance(body, Box | Ellipsoid)
+    return {"type": kinds.mjGEOM_BOX if isinstance(body, Box) else kinds.mjGEOM_ELLIPSOID, "size": body.half_extents, **at}
 
 
 def _floor(form: Mapping[str, str]) -> dict[str, Any]:

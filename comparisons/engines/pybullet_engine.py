@@ -20,7 +20,6 @@ from dropspin.comparisons.engines.mapping import (
     SEMI_IMPLICIT_EULER,
     friction_of,
     may_tumble,
-    refusal_of_axes,
     refusal_of_floor,
     refusal_of_hull,
 )
@@ -28,7 +27,7 @@ from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION, PyBulletSimulation
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.bodies import Box, Vertices
+from dropspin.scenarios.bodies import SHAPES, Box, Capsule, Cylinder, Vertices
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
 FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision, and the body stops
@@ -81,7 +80,7 @@ REASONS = {name: why for name, (_, why) in WORLD.items()} | {
 class PyBullet(Engine):
     """Bullet's rigid body on a plane, or on a large box (boxes); or with its defaults (profile=default)."""
 
-    name, order, reasons = "pybullet", 1.0, REASONS
+    name, order, reasons, shapes, takes_offsets = "pybullet", 1.0, REASONS, SHAPES, True
     choices: ClassVar = {
         "coordinates": ("maximal", "multibody"),
         "profile": PROFILES,
@@ -122,8 +121,6 @@ class PyBullet(Engine):
     def declines(self, scene: Scenario) -> str | None:
         """Why calibration cannot reproduce the scene."""
         floor, damping, is_hull = scene.floor, scene.damping, self.option("body") == "hull"
-        if (askew := refusal_of_axes(scene, "passes inertia")) is not None:
-            return askew
         if not self.is_multibody and may_tumble(scene) and np.prod(np.diag(scene.body.inertia_tensor)) < SMALLEST_INERTIA:
             return f"Bullet omits the gyroscopic term if the product of the moments is below {SMALLEST_INERTIA:g}; scale the scene's units"
         if damping is not None and not self.is_default and max(damping.linear, damping.angular) > FASTEST_DECAY:
@@ -141,9 +138,9 @@ class PyBullet(Engine):
         return unfit
 
     def _floor_in(self, scene: Scenario) -> str:
-        """The floor of a scene: `plane`, `box` or `mesh`; `fitting` is with calibrated settings a box for boxes, else a plane."""
+        """The floor of a scene: `plane`, `box` or `mesh`; `fitting` is a plane, or, calibrated, a box for what can lie."""
         if self.option("floor") == "fitting":
-            return "plane" if self.is_default or not isinstance(scene.body, Box) else "box"
+            return "box" if isinstance(scene.body, Box | Capsule | Cylinder) and not self.is_default else "plane"
         return self.option("floor")
 
     def _parameters(self, scene: Scenario, dt: float) -> dict[str, float]:

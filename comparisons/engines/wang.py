@@ -13,7 +13,7 @@ from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.bodies import Body, Box, Sphere, Vertices
+from dropspin.scenarios.bodies import SHAPES, Body, Box, Sphere, Vertices
 from dropspin.scenarios.model import differ_in_start_alone, initial_states
 
 
@@ -21,6 +21,7 @@ class Wang(Engine):
     """Algorithms 1 and 2 of Wang's lecture note; each option replaces one of their parts by another method."""
 
     name = "wang"
+    shapes, takes_offsets = SHAPES, True
     mixes_scenes = True
     choices: ClassVar = {
         "rotation": tuple(ROTATIONS),
@@ -128,7 +129,7 @@ class WangBatch(BatchSimulation):
 
 def reference_body(body: Body) -> reference_impl.Body:
     """A scene's body in the form that the reference implementation takes."""
-    return reference_impl.Body(body.mass, _inertia(body), body.vertices, body.rounding)
+    return reference_impl.Body(body.mass, _inertia(body), body.vertices, body.semi_axes)
 
 
 def reference_bodies(bodies: Sequence[Body]) -> reference_impl.Body:
@@ -139,14 +140,14 @@ def reference_bodies(bodies: Sequence[Body]) -> reference_impl.Body:
 
 def _inertia(body: Body) -> Array:
     """The inertia tensor by the formulas of the lecture note; `Body.inertia_tensor` computes the same independently."""
-    if isinstance(body.inertia, tuple):
-        return np.diag(body.inertia)
     if body.inertia == "note":
         return reference_impl.vertex_inertia(body.vertices, np.ones(len(body.vertices)))
-    if isinstance(body, Sphere):
+    if isinstance(body, Sphere) and body.inertia == "solid":
         return reference_impl.solid_sphere_inertia(body.mass, body.radius)
     if isinstance(body, Box) and body.inertia == "solid":
         return reference_impl.solid_box_inertia(body.mass, np.array(body.half_extents))
+    if body.inertia != "vertices":
+        return body.inertia_tensor
     masses = body.masses if isinstance(body, Vertices) else None
     share = np.full(len(body.vertices), body.mass / len(body.vertices)) if masses is None else np.array(masses)
     return reference_impl.vertex_inertia(body.vertices, share)

@@ -17,7 +17,7 @@ from dropspin.comparisons.measuring.motions import Motions, RowNumbers, Setup
 from dropspin.comparisons.measuring.requirements import obeys_contact_laws
 from dropspin.comparisons.measuring.states import Array, Mask, States, StatesOfMany, is_touching
 from dropspin.scenarios import Scenario, Trajectory, mechanics
-from dropspin.scenarios.mechanics import energy_of, kinetic_energy_of, offset_of
+from dropspin.scenarios.mechanics import depth_of, energy_of, kinetic_energy_of, offset_of
 
 BATCH_BYTES = 8 * 2**20
 """States that are held in memory at a time; more would not be faster."""
@@ -46,7 +46,7 @@ def motions_side_by_side(
     height, kinetic, energy, lowest = (np.empty(shape) for _ in range(4))
     touching, valid = np.zeros((shape[0], shape[1] - 1), dtype=bool), np.ones(shape[0], dtype=bool)
     found = StatesOfMany(height, states[..., 8], kinetic, energy, lowest, touching)
-    shared = (setup.mass, setup.inertia, setup.vertices, setup.rounding, setup.size, setup.origin, setup.gravity, setup.gravity_strength)
+    shared = (setup.mass, setup.inertia, setup.vertices, setup.semi_axes, setup.size, setup.origin, setup.gravity, setup.gravity_strength)
     given = tuple(_for_each(values, shape[0]) for values in (*shared, setup.damping_share(dt), dt, velocity_lag))
     rows, last = np.ascontiguousarray(states), np.ascontiguousarray(last_row, dtype=np.int64)
     _kernel()((height, kinetic, energy, lowest, touching, valid), rows, unit_tolerance, last, given)
@@ -114,7 +114,7 @@ def _kernel() -> Callable[..., None]:
 
 def _fill(found: Any, states: Any, unit_tolerance: float, last_row: Any, given: Any) -> None:
     height, kinetic, energy, lowest, touching, valid = found
-    mass, inertia, vertices, rounding, size, origin, gravity, strength, damping_share, dt, lag = given
+    mass, inertia, vertices, semi_axes, size, origin, gravity, strength, damping_share, dt, lag = given
     for body in range(states.shape[0]):
         i, o, g, last = inertia[body], (origin[body, 0], origin[body, 1], origin[body, 2]), gravity[body], last_row[body]
         tensor = ((i[0, 0], i[0, 1], i[0, 2]), (i[1, 0], i[1, 1], i[1, 2]), (i[2, 0], i[2, 1], i[2, 2]))
@@ -142,6 +142,6 @@ def _fill(found: Any, states: Any, unit_tolerance: float, last_row: Any, given: 
                 q = (s[3], s[4], s[5], s[6])
                 for k in range(vertices.shape[1]):
                     offset = min(offset, offset_of(q, (vertices[body, k, 0], vertices[body, k, 1], vertices[body, k, 2])))
-                lowest[body, row] = s[1] + offset - rounding[body]
+                lowest[body, row] = s[1] + offset - depth_of(q, (semi_axes[body, 0], semi_axes[body, 1], semi_axes[body, 2]))
         for quantity in (height, kinetic, energy, lowest):
             quantity[body, last + 1 :] = quantity[body, last]

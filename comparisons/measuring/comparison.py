@@ -21,7 +21,7 @@ from dropspin.comparisons.measuring.states import States
 from dropspin.scenarios import Scenario, Trajectory, Truth
 from dropspin.scenarios.mechanics import apex
 from dropspin.scenarios.model import TOUCHING
-from dropspin.scenarios.rotations import cross, rotate
+from dropspin.scenarios.rotations import cross
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -233,9 +233,7 @@ class Comparison:
 
     def contact_point(self, row: int) -> Array:
         """The vector from the centre of mass to the lowest point at a row [m], shape (3,); the mean if several points are equally low."""
-        offsets = rotate(self.motion.orientation[row], self.scene.body.vertices)
-        lowest = offsets[:, 1] <= offsets[:, 1].min() + 1e-6 * self.scene.body.size
-        point: Array = offsets[lowest].mean(axis=0) - np.array([0.0, self.scene.body.rounding, 0.0])
+        point: Array = self.scene.body.lowest(self.motion.orientation[row], 1e-6).mean(axis=0)
         return point
 
     def normal_velocity_of_contact(self, row: int, contact_row: int) -> float:

@@ -30,7 +30,7 @@ class Setup:
         mass: Mass [kg], shape (...).
         inertia: Inertia tensor in the body frame [kg m²], shape (..., 3, 3).
         vertices: Vertices relative to the centre of mass, in the body frame [m], shape (..., m, 3).
-        rounding: Radius of the vertices [m], shape (...).
+        semi_axes: Of the ellipsoids about the vertices [m], shape (..., 3).
         size: Distance of the farthest point of the body from the centre of mass [m], shape (...).
         origin: Position of zero potential energy [m], shape (..., 3).
         clearance: Height of the lowest point above the floor at the start [m], shape (...).
@@ -42,7 +42,7 @@ class Setup:
     mass: Array
     inertia: Array
     vertices: Array
-    rounding: Array
+    semi_axes: Array
     size: Array
     origin: Array
     clearance: Array
@@ -58,7 +58,7 @@ class Setup:
             mass=np.asarray(body.mass),
             inertia=body.inertia_tensor,
             vertices=body.hull,
-            rounding=np.asarray(body.rounding),
+            semi_axes=body.semi_axes,
             size=np.asarray(body.size),
             origin=energy_origin(scene),
             clearance=np.asarray(scene.clearance),
@@ -72,7 +72,10 @@ class Setup:
         """The setups of scenes that differ in their starts alone."""
         body, starts = scenes[0].body, initial_states(scenes)
         shared = cls.of(scenes[0])._with_arrays(lambda values: values[np.newaxis])
-        origin, clearance = np.array([energy_origin(scene) for scene in scenes]), clearances(starts, body.vertices, body.rounding)
+        origin, clearance = (
+            np.array([energy_origin(scene) for scene in scenes]),
+            clearances(starts, body.vertices, body.semi_axes),
+        )
         return replace(shared, origin=origin, clearance=clearance)
 
     def __getitem__(self, motions: RowNumbers | Mask) -> "Setup":

@@ -75,7 +75,9 @@ SYMMETRIES = {
         _turned_by("turned by 90°", 0.5 * math.pi),
         _turned_by("turned by 1 rad", 1.0),
         Symmetry("mirrored", mirrored, lambda t, states: REFLECTED * states),
-        Symmetry("other body axes", with_next_axes, lambda t, states: with_previous_axes(states)),
+        Symmetry(
+            "other body axes", with_next_axes, lambda t, states: with_previous_axes(states), lambda scene: not scene.body.has_own_axis
+        ),
         _seen_from("10 m away", 10.0),
         _seen_from("1 km away", 1e3),
         _seen_from("1000 km away", 1e6),

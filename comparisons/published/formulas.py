@@ -192,7 +192,7 @@ def bouncing_ball(source: Source) -> Iterator[Result]:
     scene = source.scene("bounces")
     truth = truth_of(scene)
     for time, text in source.parameters["heights"].items():
-        exact = float(truth.states(np.array([float(time)]))[0, POSITION][1]) - scene.body.rounding
+        exact = float(truth.states(np.array([float(time)]))[0, POSITION][1]) - scene.body.resting_height
         error = Agreement(f"{exact:.{DECIMALS}f}", float(text) - exact, agrees=False)
         yield _beside_exact(source, "FMU", f"height at {time} s [m]", text, error, is_claimed=False)
     text, exact = source.parameters["rests_from"], truth.events[-1].time

@@ -78,7 +78,7 @@ def _mean_square_energy_error(scene: Scenario, motion: Trajectory) -> Any:
 
 def _rebound_height(scene: Scenario, motion: Trajectory) -> float:
     """The largest height of a ball's lowest point after its first lowest position [m]."""
-    height = motion.position[:, 1] - scene.body.rounding
+    height = motion.position[:, 1] - scene.body.resting_height
     turns = np.flatnonzero((height[1:-1] < height[:-2]) & (height[1:-1] <= height[2:]))
     return float(height[turns[0] + 1 :].max()) if len(turns) else math.nan
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dropspin.comparisons.measuring.comparison import Comparison, Unresolved
 from dropspin.comparisons.measuring.metrics import metrics_for
 from dropspin.scenarios import Scenario, Trajectory, Truth
-from dropspin.scenarios.mechanics import lowest_height, offset_of
+from dropspin.scenarios.mechanics import depth_of, lowest_height, offset_of
 from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
 
@@ -108,7 +108,7 @@ def _may_gain(scene: Scenario) -> bool:
 def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:
     """The whole body below the floor, at the end or in between."""
     whole, body = motion.whole, motion.scene.body
-    highest = whole.position[:, 1] + body.rounding
+    highest = whole.position[:, 1] + depth_of(tuple(whole.orientation.T), tuple(body.semi_axes.tolist()))
     highest += np.max([offset_of(tuple(whole.orientation.T), vertex) for vertex in body.hull.tolist()], axis=0)
     row = int(np.argmin(highest))
     if highest[row] < -TOUCHING * body.size:

@@ -128,13 +128,13 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
         return np.stack([column(*path, axis, otherwise=value) for axis, value in enumerate(otherwise)], axis=1)
 
     bodies, is_ordinary = _bodies(scene, {path: values for path, values in columns.items() if path[0] == "body"})
-    radius, vertices = (np.array([getattr(body, name) for body in bodies]) for name in ("rounding", "vertices"))
+    semi_axes, vertices = (np.array([getattr(body, name) for body in bodies]) for name in ("semi_axes", "vertices"))
     starts = np.hstack([vectors("start", kind, otherwise=scene.initial_state[part]) for kind, part in PARTS.items()])
     if any(path[:2] == ("start", "orientation") for path in columns):
         starts[:, ORIENTATION] = [unit(tuple(q)) if any(q) else q for q in starts[:, ORIENTATION].tolist()]
     if jobs.seeds is not None:
         assert scene.ensemble is not None
-        starts = spread_starts(starts, scene.ensemble, jobs.seeds, vertices, radius, scene.floor is not None)
+        starts = spread_starts(starts, scene.ensemble, jobs.seeds, vertices, semi_axes, scene.floor is not None)
     world = reference_world(scene)
     if world.gravity is not None:
         world = replace(world, gravity=vectors("gravity", "acceleration", otherwise=world.gravity))
@@ -148,10 +148,10 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
         mass=np.array([body.mass for body in bodies]),
         inertia=np.array([body.inertia_tensor for body in bodies]),
         vertices=vertices,
-        rounding=radius,
+        semi_axes=semi_axes,
         size=np.array([body.size for body in bodies]),
         origin=starts[:, POSITION] if scene.floor is None else np.outer([body.resting_height for body in bodies], UP),
-        clearance=clearances(starts, vertices, radius),
+        clearance=clearances(starts, vertices, semi_axes),
         gravity=np.zeros((1, 3)) if world.gravity is None else world.gravity,
         damping=None if world.damping is None else np.asarray(world.damping[0]),
         floor=scene.floor is not None,

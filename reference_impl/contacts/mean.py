@@ -8,7 +8,7 @@ Source: H. Wang, Rigid Body Dynamics, Algorithm 2, eq 10, 12 and section 3.2.
 """
 
 from dropspin.reference_impl.contacts.response import impulse_response
-from dropspin.reference_impl.floor_plane import along_normal, vertex
+from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import Vec3, any_, compiled, cross, select, transpose
 
@@ -32,10 +32,10 @@ def contact_point(R, v, w, height, body):
     """Eq 10 and section 3.2: the mean offset r of the vertices that are below the floor and descending, and whether there are any."""
     total = Vec3(0.0, 0.0, 0.0)
     count = 0.0
-    for i in range(body.points.shape[0]):
-        below = height + along_normal(vertex(R, body, i)) < 0.0
+    for i in range(contact_count(body)):
+        below = height + along_normal(contact_offset(R, body, i)) < 0.0
         if any_(below):
-            r = vertex(R, body, i)
+            r = contact_offset(R, body, i)
             descends = along_normal(v + cross(w, r)) < 0.0
             total = select(below & descends, total + r, total)
             count = select(below & descends, count + 1.0, count)

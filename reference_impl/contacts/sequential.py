@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from dropspin.reference_impl.contacts.response import impulse_response
-from dropspin.reference_impl.floor_plane import along_normal, vertex
+from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import Vec3, compiled, cross, transpose
 
@@ -45,12 +45,12 @@ def collide_coulomb(x, q, v, w, body, floor, law):
 def _sweep(x, q, v, w, body, floor, friction):
     R = rotation_matrix(q)
     I_inverse = R @ body.inverse_inertia @ transpose(R)
-    impulses = np.zeros((body.points.shape[0], 3))
+    impulses = np.zeros((contact_count(body), 3))
     v0, w0 = v, w
     for _ in range(MAX_SWEEPS):
         largest = 0.0
-        for i in range(body.points.shape[0]):
-            r = vertex(R, body, i)
+        for i in range(contact_count(body)):
+            r = contact_offset(R, body, i)
             if x.y + along_normal(r) < 0.0:
                 approach = along_normal(v0 + cross(w0, r))
                 mu = 0.0 if abs(approach) < floor.rest_speed else floor.restitution

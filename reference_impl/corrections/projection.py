@@ -9,7 +9,7 @@ Cost: one pass over the vertices of a body that is near the floor.
 Source: the simplest stabilisation of J. Baumgarte, CMAME 1 (1972), and E. Catto, Iterative Dynamics (GDC 2005).
 """
 
-from dropspin.reference_impl.floor_plane import N, along_normal, vertex
+from dropspin.reference_impl.floor_plane import N, along_normal, contact_count, contact_offset
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import any_, compiled, select
 
@@ -27,6 +27,6 @@ def correct(x, q, body):
         return x
     R = rotation_matrix(q)
     lowest = 0.0
-    for i in range(body.points.shape[0]):
-        lowest = min(lowest, x.y + along_normal(vertex(R, body, i)))
+    for i in range(contact_count(body)):
+        lowest = min(lowest, x.y + along_normal(contact_offset(R, body, i)))
     return select(near, x + max(-lowest - PENETRATION_LEFT, 0.0) * N, x)

@@ -11,12 +11,19 @@ from dropspin.reports.commands.options import as_json, step_option
 @step_option(" for which the settings are computed")
 @as_json
 def show_command(scene: str, engine_name: str | None, dt: float, json_output: bool) -> None:
-    """Show a scene: what it models, its exact solution and its expectations; or the settings of an engine for the scene."""
+    """Show a scene: what it models, its exact solution and its expectations; or the settings of an engine for the scene.
+
+    Of a mesh (.obj, .stl): its volume, mass properties, hull and defects.
+    """
     from dropspin.reports.document import Document, Table
     from dropspin.reports.stories import show
+    from dropspin.reports.stories.mesh import mesh_rows
     from dropspin.reports.terminal.rows import print_json_or
     from dropspin.scenarios import load
 
-    loaded = load(scene)
-    rows = show.scene_rows(loaded) if engine_name is None else show.built_rows(loaded, engine_name, dt)
-    print_json_or(json_output, rows, Document(loaded.name, [Table(rows, ["why"])]))
+    if scene.lower().endswith((".obj", ".stl")):
+        name, rows = scene, mesh_rows(scene)
+    else:
+        loaded = load(scene)
+        name, rows = loaded.name, show.scene_rows(loaded) if engine_name is None else show.built_rows(loaded, engine_name, dt)
+    print_json_or(json_output, rows, Document(name, [Table(rows, ["why"])]))

@@ -1,14 +1,21 @@
 """Bodies: what is known of a shape in general (`shape.py`), and one shape a file, which together are the `[body]` table of a scene."""
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 from pydantic import Field
 
 from dropspin.scenarios.bodies.box import Box
+from dropspin.scenarios.bodies.capsule import Capsule
+from dropspin.scenarios.bodies.cylinder import Cylinder
+from dropspin.scenarios.bodies.ellipsoid import Ellipsoid
+from dropspin.scenarios.bodies.mesh import Mesh
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.bodies.sphere import Sphere
 from dropspin.scenarios.bodies.vertices import Vertices
 
-__all__ = ["Body", "Box", "Shape", "Sphere", "Vertices"]
+__all__ = ["SHAPES", "Body", "Box", "Capsule", "Cylinder", "Ellipsoid", "Mesh", "Shape", "Sphere", "Vertices"]
 
-Body = Annotated[Sphere | Box | Vertices, Field(discriminator="shape")]
+Shapes = Sphere | Box | Capsule | Cylinder | Ellipsoid | Vertices | Mesh
+SHAPES: tuple[str, ...] = tuple(shape for kind in get_args(Shapes) for shape in get_args(kind.model_fields["shape"].annotation))
+"""The names of all shapes."""
+Body = Annotated[Shapes, Field(discriminator="shape")]

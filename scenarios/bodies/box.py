@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from dropspin.scenarios.bodies.inertia import PrincipalMoments
+from dropspin.scenarios.bodies.inertia import Moments
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import PositiveVector
@@ -19,18 +19,22 @@ class Box(Shape):
 
     shape: Literal["box"]
     half_extents: PositiveVector
-    inertia: Literal["solid", "vertices", "note"] | PrincipalMoments = "solid"
+    inertia: Literal["solid", "surface", "vertices", "note"] | Moments = "solid"
 
     @cached_property
-    def vertices(self) -> Array:
+    def corners(self) -> Array:
         return np.array(list(product((-1.0, 1.0), repeat=3))) * self.half_extents
 
     @property
     def resting_height(self) -> float:
-        return min(self.half_extents)
+        return float(np.min(np.array(self.half_extents) - np.abs(self.centre)))
 
     def tensor_of(self, distribution: str) -> Array:
         a, b, c = np.square(self.half_extents)
         about_axes = np.diag([b + c, c + a, a + b])
+        if distribution == "surface":
+            areas = 1.0 / np.array(self.half_extents)  # of the faces across each axis, relative to one another
+            x, y, z = self.mass * np.square(self.half_extents) * (areas.sum() + 2.0 * areas) / (3.0 * areas.sum())
+            return np.diag([y + z, z + x, x + y])
         # A uniform box, eight equal corner masses, and eight corner masses of 1 (eq 8 as printed).
         return about_axes * {"solid": self.mass / 3, "vertices": self.mass, "note": 8.0}[distribution]

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.state import UP, Array
 
 FLAT = 1e-14
 """Largest thickness of a set of points, relative to its size, that is attributed to rounding."""
+MERIDIANS = 24
+"""Of the surface of a round body, as it is drawn."""
 IN_ONE_PLANE = 1e-9
 """Largest allowed distance of the points of a face from its plane, relative to the size of the body."""
 
@@ -43,10 +45,8 @@ class Outline:
         return [grid[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]] for i in range(0, len(down) - 1, 2) for j in range(0, len(around) - 1, 4)]
 
 
-def outline(points: Array, rounding: float, size: float) -> Outline:
-    """The surface of a body: the faces of the convex hull of its vertices, shape (n, 3), or a sphere if it has a rounding [m]."""
-    if rounding:
-        return Outline(points, [], rounding)
+def outline(points: Array, size: float) -> Outline:
+    """The surface of a body: the faces of the convex hull of its vertices, shape (n, 3)."""
     centre = points.mean(axis=0)
     _, spread, axes = np.linalg.svd(np.pad(points - centre, ((0, 1), (0, 0))), full_matrices=False)  # three, also of two points
     hull = convex_hull(points) if spread[2] >= IN_ONE_PLANE * size * np.sqrt(len(points)) else None
@@ -61,6 +61,14 @@ def outline(points: Array, rounding: float, size: float) -> Outline:
     used = {corner: number for number, corner in enumerate(sorted(set().union(*planes.values())))}
     faces = [[used[corner] for corner in _around(points, sorted(corners), np.array(plane[:3]))] for plane, corners in planes.items()]
     return Outline(points[list(used)], faces)
+
+
+def around_axis(radii: Array, heights: Array) -> Array:
+    """Points of a surface of revolution about the y axis, shape (n, 3): rings of given radii at given heights [m]."""
+    angles = np.linspace(0.0, 2.0 * np.pi, MERIDIANS, endpoint=False)
+    rings = np.multiply.outer(radii, np.stack([np.sin(angles), np.zeros(MERIDIANS), np.cos(angles)], axis=-1))
+    points: Array = (rings + np.multiply.outer(heights, UP)[:, np.newaxis]).reshape(-1, 3)
+    return points
 
 
 def _around(points: Array, corners: list[int], normal: Array) -> list[int]:

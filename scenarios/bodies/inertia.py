@@ -1,12 +1,16 @@
 """Moments and tensors of inertia, of any shape."""
 
-from typing import Annotated
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, WrapValidator
 
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import PositiveVector
+from dropspin.scenarios.tables import LARGEST, PositiveVector
+
+OF_URDF = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+ASYMMETRY = 1e-6  # of the largest entry; models are often written with few digits
 
 
 def _possible(moments: tuple[float, ...]) -> tuple[float, ...]:
@@ -16,7 +20,41 @@ def _possible(moments: tuple[float, ...]) -> tuple[float, ...]:
     return moments
 
 
+def _moments(given: Any, validate: Callable[[Any], Any]) -> Any:
+    """A tensor as its rows, given so, as six numbers or with the names of URDF; anything else as `validate` does.
+
+    Raises:
+        ValueError: No body has the tensor.
+    """
+    if isinstance(given, Mapping) and set(given) == set(OF_URDF):
+        given = [given[name] for name in OF_URDF]
+    if isinstance(given, list | tuple) and len(given) == 6:
+        xx, yy, zz, xy, xz, yz = given
+        given = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+    if not (isinstance(given, list | tuple) and len(given) == 3 and all(isinstance(row, list | tuple) for row in given)):
+        return validate(given)
+    if not all(len(row) == 3 and all(type(value) in (int, float) and abs(value) <= LARGEST for value in row) for row in given):
+        raise ValueError("a tensor must have three rows of three numbers")
+    matrix = np.array(given, dtype=float)
+    if np.abs(matrix - matrix.T).max() > ASYMMETRY * np.abs(matrix).max():
+        raise ValueError("a tensor must be symmetric")
+    matrix = 0.5 * (matrix + matrix.T)
+    moments = np.linalg.eigvalsh(matrix).tolist()
+    if moments[0] <= 0.0:
+        raise ValueError(f"must have positive principal moments, has {moments}")
+    _possible(tuple(moments))
+    return tuple(map(tuple, matrix.tolist()))
+
+
 PrincipalMoments = Annotated[PositiveVector, AfterValidator(_possible)]
+Moments = Annotated[PrincipalMoments | tuple[tuple[float, ...], ...], WrapValidator(_moments)]
+"""Three moments about the body's axes, or a tensor: 3 x 3, the six numbers of MJCF (xx, yy, zz, xy, xz, yz), or a table of URDF's names."""
+
+
+def tensor(moments: tuple[Any, ...]) -> Array:
+    """The tensor of moments as a table has them, shape (3, 3)."""
+    given = np.array(moments)
+    return np.diag(given) if given.ndim == 1 else given
 
 
 def is_diagonal(tensor: Array) -> bool:

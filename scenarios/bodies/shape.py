@@ -1,22 +1,27 @@
 """What is known of a shape: its vertices, which may touch a floor, its mass, inertia and surface, and the shape in other units.
 
-Each shape is the convex hull of its vertices and all points within its rounding of it. A new shape is a file of its own beside this one,
-which gives `vertices`, `rounding`, `resting_height` and `tensor_of`; the rest follows from these unless the shape overrides it.
+Each shape is the convex hull of ellipsoids about its vertices, which are all equal: points for a box, balls for a capsule, discs for a
+cylinder. A new shape is a file of its own beside this one, which gives `vertices`, `semi_axes`, `resting_height` and `tensor_of`; the rest
+follows from these unless the shape overrides it.
 """
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from dropspin.scenarios.bodies.hull import Outline, outline
-from dropspin.scenarios.bodies.inertia import is_diagonal
+from dropspin.scenarios.bodies.inertia import Moments, is_diagonal, tensor
+from dropspin.scenarios.bodies.surface import RIM, rise_of_centre
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import Positive, Table
+from dropspin.scenarios.tables import Positive, Table, Vector
 
 INERTIA_ROUNDING = 1.001  # moments are often given with four digits
+MIRRORED = np.array([[1.0, -1.0, -1.0], [-1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]])
+"""The signs of a tensor of inertia that is mirrored at the plane x = 0."""
 
 
 class Shape(Table):
@@ -24,13 +29,19 @@ class Shape(Table):
 
     lengths: ClassVar[tuple[str, ...]]
     """The keys whose values are lengths: numbers, or vectors along the body's axes, or tuples of such vectors."""
+    has_own_axis: ClassVar[bool] = False
+    """Whether the shape is about a given axis of the body frame, so that its axes cannot have another order."""
+    arrays: ClassVar[tuple[str, ...]] = ()
+    """The keys whose values are large arrays."""
     description: ClassVar[str] = ""
     """The shape in words, if not by the name of its table's key `shape`."""
 
     mass: Positive
+    center_of_mass: Vector | None = (0.0, 0.0, 0.0)
+    """Where it is in the frame in which the shape is given [m]."""
     if TYPE_CHECKING:  # in this order, which the digest of a scene depends on, they are fields of each shape
         shape: str
-        inertia: str | tuple[float, ...]
+        inertia: str | Moments
 
     # By the given values only; pydantic would compare cached arrays too.
     def __eq__(self, other: object) -> bool:
@@ -43,15 +54,39 @@ class Shape(Table):
     def _given(self) -> tuple[Any, ...]:
         return type(self), *(getattr(self, name) for name in type(self).model_fields)
 
-    @property
-    @abstractmethod
-    def vertices(self) -> Array:
-        """The points that may touch the floor, relative to the centre of mass [m], shape (n, 3)."""
+    @model_validator(mode="after")
+    def _inertia_is_about_the_centre_of_mass(self) -> Self:
+        if self._has_offset and isinstance(self.inertia, str):
+            raise ValueError("center_of_mass does not say where the mass is; give inertia as numbers, about the centre of mass")
+        return self
 
     @property
-    def rounding(self) -> float:
-        """Distance of the surface from the vertices [m]: the radius of a ball, which has one vertex; 0 for other bodies."""
-        return 0.0
+    def centre(self) -> Array:
+        """The centre of mass in the frame of the shape [m], shape (3,)."""
+        return np.array(self.center_of_mass)
+
+    @property
+    def _lengths(self) -> tuple[str, ...]:
+        return (*self.lengths, "center_of_mass") if self._has_offset else self.lengths
+
+    @property
+    def _has_offset(self) -> bool:
+        return any(self.center_of_mass or ())
+
+    @property
+    @abstractmethod
+    def corners(self) -> Array:
+        """The points whose convex hull the shape is, apart from the ellipsoids about them, in the frame of the shape [m], shape (n, 3)."""
+
+    @cached_property
+    def vertices(self) -> Array:
+        """The corners relative to the centre of mass [m], shape (n, 3)."""
+        return self.corners - self.centre
+
+    @property
+    def semi_axes(self) -> Array:
+        """Semi-axes of the ellipsoid about each vertex, along the axes of the body frame [m], shape (3,); (a, 0, c) is a disc."""
+        return np.zeros(3)
 
     @property
     @abstractmethod
@@ -68,32 +103,43 @@ class Shape(Table):
         return self.vertices
 
     @property
+    def has_rims(self) -> bool:
+        """Whether a disc is about each vertex."""
+        return bool(self.semi_axes.any()) and self.semi_axes[1] == 0.0
+
+    @property
     def is_ball(self) -> bool:
         """Whether the surface is a sphere about the centre of mass."""
-        return len(self.vertices) == 1
+        return len(self.vertices) == 1 and not self.vertices.any() and np.ptp(self.semi_axes) == 0.0
 
     @cached_property
     def size(self) -> float:
         """Largest distance of any part from the centre of mass [m]."""
-        return float(np.sqrt(np.max(np.sum(self.vertices**2, axis=1)))) + self.rounding
+        return float(np.sqrt(np.max(np.sum(self.vertices**2, axis=1)))) + float(self.semi_axes.max())
 
     @property
     def outline(self) -> Outline:
         """The surface, to be drawn."""
-        return outline(self.vertices, self.rounding, self.size)
+        return outline(self.vertices, self.size)
 
     def lowest(self, orientation: Array, tolerance: float) -> Array:
-        """Offsets of the lowest vertices from the centre of mass at an orientation, shape (4,), in the world frame [m], shape (n, 3).
+        """Offsets of the lowest points from the centre of mass at an orientation, shape (4,), in the world frame [m], shape (n, 3).
 
-        Vertices that are at most `tolerance` times the size of the body higher than the lowest one are among them.
+        Points that are at most `tolerance` times the size of the body higher than the lowest one are among them; of a disc that lies so
+        level, four points of its rim.
         """
         offsets = rotate(orientation, self.vertices)
-        return offsets[offsets[:, 1] <= offsets[:, 1].min() + tolerance * self.size]
+        lowest = offsets[offsets[:, 1] <= offsets[:, 1].min() + tolerance * self.size]
+        rises = rise_of_centre(orientation, self.semi_axes)
+        if self.has_rims and rises[1] <= 0.5 * tolerance * self.size:
+            rim = rotate(orientation, self.semi_axes * RIM)
+            return (lowest[:, np.newaxis] + rim).reshape(-1, 3)
+        return lowest - rises
 
     @cached_property
     def inertia_tensor(self) -> Array:
         """Inertia about the centre of mass, in the body frame [kg m²], shape (3, 3)."""
-        return np.diag(self.inertia) if isinstance(self.inertia, tuple) else self.tensor_of(self.inertia)
+        return self.tensor_of(self.inertia) if isinstance(self.inertia, str) else tensor(self.inertia)
 
     @property
     def moments(self) -> tuple[float, ...]:
@@ -108,7 +154,7 @@ class Shape(Table):
 
         Source: R. Bhatia & C. Davis, A better bound on the variance, Amer. Math. Monthly 107 (2000).
         """
-        squares: Array = (self.rounding + self.vertices.max(axis=0)) * (self.rounding - self.vertices.min(axis=0))
+        squares: Array = (self.semi_axes + self.vertices.max(axis=0)) * (self.semi_axes - self.vertices.min(axis=0))
         return squares
 
     @property
@@ -116,14 +162,15 @@ class Shape(Table):
         """Why the given moments of inertia are impossible for a body of this size; empty if they are possible."""
         if isinstance(self.inertia, str):
             return ""
-        spread, largest = (0.5 * sum(self.inertia) - np.array(self.inertia)) / self.mass, self.largest_spread  # mean squares of x, y and z
+        moments = np.array(self.moments)
+        spread, largest = (0.5 * moments.sum() - moments) / self.mass, self.largest_spread  # mean squares of x, y and z
         if not np.any(spread > INERTIA_ROUNDING * largest) and spread.sum() <= INERTIA_ROUNDING * self.size**2:
             return ""
-        moments = self.mass * np.minimum(largest.sum() - largest, self.size**2)
+        possible = self.mass * np.minimum(largest.sum() - largest, self.size**2)
         return (
-            f"got {list(self.inertia)} kg m², which needs mass outside of the body: a root mean square of x, y and z of "
+            f"got {np.array(self.inertia).tolist()} kg m², which needs mass outside of the body: a root mean square of x, y and z of "
             f"{_digits(np.sqrt(spread))} m, of which this shape allows {_digits(np.sqrt(largest))} m, and moments of inertia of up to "
-            f"{_digits(moments)} kg m² for {self.mass:g} kg. Correct the inertia, the mass or the size."
+            f"{_digits(possible)} kg m² for {self.mass:g} kg. Correct the inertia, the mass or the size."
         )
 
     @property
@@ -133,20 +180,26 @@ class Shape(Table):
 
     def scaled(self, length: float, mass: float) -> dict[str, Any]:
         """The keys of the body with lengths and masses multiplied by factors."""
-        keys: dict[str, Any] = {"mass": mass * self.mass, **{name: times(length, getattr(self, name)) for name in self.lengths}}
+        keys: dict[str, Any] = {"mass": mass * self.mass, **{name: times(length, getattr(self, name)) for name in self._lengths}}
         has_unit_masses = self.inertia == "note" and is_diagonal(self.inertia_tensor)  # for a body of any mass
         if has_unit_masses or not isinstance(self.inertia, str):
-            keys["inertia"] = times(mass * length**2, self.moments)
+            keys["inertia"] = times(mass * length**2, self.moments if isinstance(self.inertia, str) else self.inertia)
         return keys
 
     def mirrored(self) -> dict[str, Any]:
         """The keys of the body that differ in its mirror image at the plane x = 0."""
-        return {}
+        keys: dict[str, Any] = {"center_of_mass": tuple(self.centre * [-1.0, 1.0, 1.0])} if self._has_offset else {}
+        if not is_diagonal(self.inertia_tensor) and not isinstance(self.inertia, str):
+            keys["inertia"] = tuple(map(tuple, (self.inertia_tensor * MIRRORED).tolist()))
+        return keys
 
     def with_axes(self, order: tuple[int, ...]) -> dict[str, Any]:
         """The keys of the body with its axes in another order."""
-        by_axis = [*self.lengths, *([] if isinstance(self.inertia, str) else ["inertia"])]
-        return {name: _permuted(order, getattr(self, name)) for name in by_axis}
+        keys = {name: _permuted(order, getattr(self, name)) for name in self._lengths}
+        if not isinstance(self.inertia, str):
+            permuted = _permuted(order, self.inertia)
+            keys["inertia"] = tuple(permuted[axis] for axis in order) if isinstance(permuted[0], tuple) else permuted
+        return keys
 
 
 def times(factor: float, values: Any) -> Any:
@@ -156,6 +209,8 @@ def times(factor: float, values: Any) -> Any:
 
 def _permuted(order: tuple[int, ...], values: Any) -> Any:
     """The components of a vector, or of each vector of a tuple, in another order; a number unchanged."""
+    if isinstance(values, np.ndarray):
+        return values[:, list(order)]
     if not isinstance(values, tuple):
         return values
     return tuple(_permuted(order, value) for value in values) if isinstance(values[0], tuple) else tuple(values[axis] for axis in order)

@@ -1,11 +1,13 @@
 """A ball: one vertex at the centre of mass, rounded by the radius."""
 
+import math
 from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from dropspin.scenarios.bodies.inertia import PrincipalMoments
+from dropspin.scenarios.bodies.hull import Outline
+from dropspin.scenarios.bodies.inertia import Moments
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import Positive
@@ -18,19 +20,24 @@ class Sphere(Shape):
 
     shape: Literal["sphere"]
     radius: Positive
-    inertia: Literal["solid"] | PrincipalMoments = "solid"
+    inertia: Literal["solid", "surface"] | Moments = "solid"
 
     @cached_property
-    def vertices(self) -> Array:
+    def corners(self) -> Array:
         return np.zeros((1, 3))
 
     @property
-    def rounding(self) -> float:
-        return self.radius
+    def semi_axes(self) -> Array:
+        return np.full(3, self.radius)
+
+    @property
+    def outline(self) -> Outline:
+        return Outline(self.vertices, [], self.radius)
 
     @property
     def resting_height(self) -> float:
-        return self.radius
+        return self.radius - math.hypot(*self.centre)
 
     def tensor_of(self, distribution: str) -> Array:
-        return 0.4 * self.mass * self.radius**2 * np.eye(3)
+        share = 0.4 if distribution == "solid" else 2.0 / 3.0
+        return share * self.mass * self.radius**2 * np.eye(3)

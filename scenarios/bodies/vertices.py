@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dropspin.scenarios.bodies.hull import hull_corners, lowest_face
-from dropspin.scenarios.bodies.inertia import PrincipalMoments
+from dropspin.scenarios.bodies.inertia import Moments
 from dropspin.scenarios.bodies.shape import Shape, times
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import Positive, Vector
@@ -22,8 +22,9 @@ class Vertices(Shape):
 
     shape: Literal["vertices"]
     points: Annotated[tuple[Vector, ...], Field(min_length=2, max_length=10_000)]
+    center_of_mass: Vector | None = None  # by default that of the masses
     masses: Annotated[tuple[Positive, ...], Field(min_length=2)] | None = None
-    inertia: Literal["vertices", "note"] | PrincipalMoments = "vertices"
+    inertia: Literal["vertices", "note"] | Moments = "vertices"
 
     @model_validator(mode="before")
     @classmethod
@@ -51,9 +52,14 @@ class Vertices(Shape):
         return np.array(self.masses)
 
     @cached_property
-    def vertices(self) -> Array:
-        points = np.array(self.points)
-        return points - np.average(points, axis=0, weights=self._point_masses)
+    def corners(self) -> Array:
+        return np.array(self.points)
+
+    @cached_property
+    def centre(self) -> Array:
+        if self.center_of_mass is not None:
+            return np.array(self.center_of_mass)
+        return np.average(self.corners, axis=0, weights=self._point_masses)
 
     @cached_property
     def hull(self) -> Array:
@@ -83,4 +89,4 @@ class Vertices(Shape):
         return keys if self.masses is None else {**keys, "masses": times(mass, self.masses)}
 
     def mirrored(self) -> dict[str, Any]:
-        return {"points": tuple((-x, y, z) for x, y, z in self.points)}
+        return super().mirrored() | {"points": tuple((-x, y, z) for x, y, z in self.points)}

@@ -7,9 +7,10 @@
 For e < 1 the impacts accumulate at t₀ + (2 u₀ / g) e / (1 - e), Zeno's time; then the body rests.
 
 Source: Newton's law of restitution (Principia, 1687, scholium to the laws); geometric sums.
-Valid for: a ball on a frictionless floor, with any spin and any horizontal motion; a box that lands on a face on a frictionless floor, with
-any horizontal motion and with spin only about the vertical, up to rounding; both on any floor without spin and horizontal motion; gravity
-straight down, no damping. Valid until a difference of one eps in a spin about the intermediate axis can turn the body over.
+Valid for: a ball on a frictionless floor, with any spin and any horizontal motion; a body that lands on a face, or a round body that lands
+where it can lie, such as a capsule on its side, on a frictionless floor, with any horizontal motion and with spin only about the vertical,
+up to rounding; all on any floor without spin and horizontal motion; gravity straight down, no damping. Valid until a difference of one eps
+in a spin about the intermediate axis can turn the body over.
 """
 
 import math
@@ -17,7 +18,7 @@ import math
 import numpy as np
 
 from dropspin.scenarios.model import TOUCHING, Floor, Scenario
-from dropspin.scenarios.rotations import rotate, unrotate
+from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
 from dropspin.scenarios.truths.truth import Truth, impacts_of, piece
@@ -25,6 +26,9 @@ from dropspin.scenarios.truths.truth import Truth, impacts_of, piece
 MAX_BOUNCES = 100_000
 MIN_FLIGHT_SHARE = 1e-12
 """Flights shorter than this share of the first fall count as rest; the apexes of such flights are below 1e-24 of the drop height."""
+
+DIRECTIONS, SMALL_TURN = 16, 1e-3
+"""The turns by which it is tested whether a round body lies: about so many horizontal axes, by so much [rad]."""
 
 SPIN_ROUNDING = 1e-15
 """Largest horizontal part of an angular velocity about the vertical that counts as rounding, relative to the angular velocity."""
@@ -103,7 +107,16 @@ def _stays_flat(scene: Scenario, floor: Floor) -> bool:
         return scene.body.inertia == "solid" or not any(start.angular_velocity)
     lowest = scene.body.lowest(np.array(start.orientation), 1e-12)
     under_centre = np.abs(lowest[:, [0, 2]].mean(axis=0)).max() <= 1e-12 * scene.body.size
-    return len(lowest) >= 3 and bool(under_centre) and _turns_about_the_vertical(scene)
+    is_carried = len(lowest) >= 3 or (bool(scene.body.semi_axes.any()) and _lies(scene))
+    return is_carried and bool(under_centre) and _turns_about_the_vertical(scene)
+
+
+def _lies(scene: Scenario) -> bool:
+    """Whether a small turn about no horizontal axis lowers a round body on the floor, so that it does not fall over from there."""
+    body, own, angles = scene.body, np.array(scene.start.orientation), np.linspace(0.0, 2.0 * math.pi, DIRECTIONS, endpoint=False)
+    axes = np.stack([np.cos(angles), np.zeros(DIRECTIONS), np.sin(angles)], axis=1)
+    heights = [-float(body.lowest(turn, 0.0)[0, 1]) for turn in multiply(about(axes, np.full(DIRECTIONS, SMALL_TURN)), own)]
+    return min(heights) >= -float(body.lowest(own, 0.0)[0, 1]) - 1e-12 * body.size
 
 
 def _turns_about_the_vertical(scene: Scenario) -> bool:

@@ -8,6 +8,15 @@ that a body can have, because |(I_j - I_k)/I_i| <= 1. So from its height h and i
 and there is no contact before the first zero of the right-hand side. The zeros approach a contact quadratically from before. Without
 rotation c = 0, and the first zero is the contact.
 
+About a corner there may be an ellipsoid, with semi-axes S. Its lowest point is another one at each time; with n the upward direction in the
+body, n' = dn/dt, and c for the farthest of its points, all of them together are at
+
+    h(t + s) >= y + v_y s + (n + n' s) · r - |S (n + n' s)| + (g_y - c) s²/2
+             >= h + v s + (g_y - c - |S n'|²/|S n|) s²/2, and
+             >= h + (v_y + n'·r - |S n'|) s + (g_y - c) s²/2
+
+where v is the velocity of the point that is lowest now.
+
 The height of a corner that is on the floor at the start is the integral of its upward velocity, at first by Gauss–Legendre quadrature, so
 that it is as accurate as the velocity is, relative to the height: flights that last a millionth of those before lose no digits.
 
@@ -26,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.scenarios.model import TOUCHING
-from dropspin.scenarios.rotations import cross, rotate, unrotate
+from dropspin.scenarios.rotations import cross, dot, length, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.flight import Flight
 
@@ -42,6 +51,7 @@ LARGEST_CHUNK = 50_000  # heights of corners at a time
 HEIGHT_ROUNDING = 1e-15  # of all terms of a height
 ATTITUDE_ROUNDING = 1e-15  # rad, for each rad turned
 SPEED_ROUNDING = 1e-14  # of all terms of the upward velocity of a corner
+SHALLOWEST = 1e-12  # depth of a level disc, relative to the size of the body
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)  # exact to rounding for a turn of 2 `FIRST_ANGLE`
 
 
@@ -59,14 +69,16 @@ class ContactSearch:
     Args:
         flight: The flight.
         points: Corners of the body's convex hull, from the centre of mass in the body [m], shape (n, 3).
-        rounding: Rounding radius of the corners [m].
+        semi_axes: Semi-axes of the ellipsoid about each corner [m], shape (3,).
     """
 
-    def __init__(self, flight: Flight, points: Array, rounding: float) -> None:
-        self.flight, self.points, self.rounding = flight, points, rounding
+    def __init__(self, flight: Flight, points: Array, semi_axes: Array) -> None:
+        self.flight, self.points, self.semi_axes = flight, points, semi_axes
         self._gravity = float(flight.acceleration[1])
-        self._reach = float(np.linalg.norm(points, axis=1).max())
-        self._size = self._reach + rounding
+        self._is_ball = np.ptp(semi_axes) == 0.0  # or a point
+        self._arms = np.linalg.norm(points, axis=1) + (0.0 if self._is_ball else semi_axes.max())
+        self._reach = float(self._arms.max())
+        self._size = self._reach + (float(semi_axes[0]) if self._is_ball else 0.0)
 
     def next_contact(self, duration: float) -> Contact | None:
         """The next time at which a corner passes through the floor downwards; None if there is none within `duration` [s].
@@ -96,9 +108,10 @@ class ContactSearch:
         if rotor.is_steady:
             spin = self.flight.start[SPIN]
             moving = cross(np.broadcast_to(spin, self.points.shape), rotate(self.flight.start[ORIENTATION], self.points))
-            bound: Array = math.hypot(spin[0], spin[2]) * np.linalg.norm(moving, axis=1)
+            about = 0.0 if self._is_ball else np.linalg.norm(spin) * self.semi_axes.max()
+            bound: Array = math.hypot(spin[0], spin[2]) * (np.linalg.norm(moving, axis=1) + about)
             return bound
-        return (1.0 + ANGULAR_ACCELERATION) * rotor.largest_spin**2 * np.linalg.norm(self.points, axis=1)
+        return (1.0 + ANGULAR_ACCELERATION) * rotor.largest_spin**2 * self._arms
 
     def _within_reach(self, duration: float) -> list[tuple[float, float]]:
         """The intervals [s] in which the centre of mass is low enough for a corner to touch the floor."""
@@ -135,8 +148,9 @@ class ContactSearch:
     def _lowest(self, times: Array, later: Array) -> tuple[Array, Array]:
         """The lowest height at given times [s], and the lowest height `later` [s] if each corner keeps its velocity; shapes (m,)."""
         height, speed, vertical, turning = self._vertical_motion(times)
-        now = height + (vertical @ self.points.T).min(axis=1)
-        return now, height + later * speed + ((vertical + later[:, None] * turning) @ self.points.T).min(axis=1)
+        turned = vertical + later[:, None] * turning
+        now = height + (vertical @ self.points.T).min(axis=1) - self._depth(vertical)
+        return now, height + later * speed + (turned @ self.points.T).min(axis=1) - self._depth(turned)
 
     def _step_by_step(self, begin: float, end: float) -> Contact | None:
         """The first contact in an interval [s]."""
@@ -145,12 +159,16 @@ class ContactSearch:
             if now > end:
                 return None
             heights, speeds, tolerance = self._corners_at(now)
+            slowest, rolling = self._of_surface(now)
             lands = (heights <= tolerance if now > 0.0 else self._starts_on_floor) & (speeds <= 0.0)
             if now > 0.0 and lands.any():
                 return self._landing(now, lands)
-            if (lands & (self._curvature > self._gravity)).any():
+            if (lands & (self._curvature + rolling > self._gravity)).any():
                 return Contact(0.0, False)
-            steps = _safe_steps(np.maximum(heights - 0.5 * tolerance, 0.0), speeds, self._gravity - self._curvature)
+            above, acceleration = np.maximum(heights - 0.5 * tolerance, 0.0), self._gravity - self._curvature
+            steps = _safe_steps(above, speeds, acceleration - rolling)
+            if rolling:
+                steps = np.maximum(steps, _safe_steps(above, slowest, acceleration))
             step = np.where(lands, np.inf, steps).min()  # gravity pulls those that rest on the floor upwards
             now += float(max(step, 4.0 * math.ulp(now)))
         return Contact(now, False)
@@ -197,14 +215,30 @@ class ContactSearch:
     def _corners(self, times: Array) -> tuple[Array, Array]:
         """Heights above the floor [m] and upward velocities [m/s] of the corners, shapes (m, n), at times [s], shape (m,)."""
         height, speed, vertical, turning = self._vertical_motion(times)
-        return height[:, None] + vertical @ self.points.T, speed[:, None] + turning @ self.points.T
+        rolled = np.zeros(len(times)) if self._is_ball else -dot(self.semi_axes**2 * vertical, turning) / self._depth(vertical)
+        heights = height[:, None] + vertical @ self.points.T - self._depth(vertical)[:, None]
+        return heights, speed[:, None] + turning @ self.points.T + rolled[:, None]
+
+    def _depth(self, vertical: Array) -> Array:
+        """Depth of the lowest points below the corners [m] in directions in the body, shape (m, 3); at least `SHALLOWEST`."""
+        if self._is_ball:
+            return np.full(len(vertical), self.semi_axes[0])
+        return np.maximum(length(self.semi_axes * vertical), SHALLOWEST * self._size)
+
+    def _of_surface(self, now: float) -> tuple[Array, float]:
+        """The least upward velocity of any point about each corner [m/s], shape (n,), and the bound |S n'|²/|S n| [m/s²]; of a ball 0."""
+        if self._is_ball:
+            return np.zeros(len(self.points)), 0.0
+        _, speed, vertical, turning = self._vertical_motion(np.array([now]))
+        fastest = float(length(self.semi_axes * turning)[0])
+        return speed[0] + self.points @ turning[0] - fastest, fastest**2 / float(self._depth(vertical)[0])
 
     def _vertical_motion(self, times: Array) -> tuple[Array, Array, Array, Array]:
         """Height and speed of the centre of mass, shape (m,), and the vectors in the body whose products with an arm add to them."""
         states = self.flight(times)
         up = np.broadcast_to(UP, (len(times), 3))
         turning = unrotate(states[:, ORIENTATION], cross(up, states[:, SPIN]))  # (ω × r)·UP = (UP × ω)·r
-        return states[:, 1] - self.rounding, states[:, 8], unrotate(states[:, ORIENTATION], up), turning
+        return states[:, 1], states[:, 8], unrotate(states[:, ORIENTATION], up), turning
 
     def _tolerance(self, times: Array) -> Array:
         """Rounding error of the height of a corner [m] at times [s], shape (m,)."""

@@ -18,6 +18,7 @@ from itertools import islice
 
 import numpy as np
 
+from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY, Array
@@ -73,7 +74,9 @@ def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Trut
         return Truth("flight", "free flight above the floor", states, horizon=last.end, ends=last.reason)
     impulse = LAW_NAMES[law] if law != "note" else "eq 15" if floor.friction == "none" else "sticking impulse, eq 17"
     points = len(_touching(scene, events[0].before))
-    where = "ball" if scene.body.is_ball else {1: "corner", 2: "edge"}.get(points, "face")
+    where = {1: "corner", 2: "edge"}.get(points, "face")
+    if scene.body.semi_axes.any():
+        where = "ball" if scene.body.is_ball else "point"
     count = "one" if len(events) == 1 else str(len(events))
     statement = f"free rotor and parabola, {count} {where} impact{'s' if len(events) > 1 else ''} ({impulse})"
     return Truth(f"{where}-impact", statement, states, events, last.end, last.reason)
@@ -166,11 +169,12 @@ def _next_impact(scene: Scenario, flight: Flight, duration: float, leaves: bool)
         leaves: Whether the body leaves the floor at the beginning of the flight, after an impact.
     """
     body, start = scene.body, flight.start
-    offsets = rotate(start[ORIENTATION], body.hull)
-    is_on_floor = start[1] + offsets[:, 1].min() - body.rounding <= TOUCHING * body.size
+    semi_axes = body.semi_axes
+    lowest = rotate(start[ORIENTATION], body.hull)[:, 1].min() - depth_below_centre(start[ORIENTATION], semi_axes)
+    is_on_floor = start[1] + lowest <= TOUCHING * body.size
     if is_on_floor and not leaves and _descends(scene, start):
         return Contact(0.0, True)
-    return ContactSearch(flight, body.hull, body.rounding).next_contact(duration)
+    return ContactSearch(flight, body.hull, semi_axes).next_contact(duration)
 
 
 def _descends(scene: Scenario, state: Array) -> bool:
@@ -181,7 +185,7 @@ def _descends(scene: Scenario, state: Array) -> bool:
 
 def _touching(scene: Scenario, state: Array) -> Array:
     """Offsets of the lowest points from the centre of mass, shape (n, 3)."""
-    return scene.body.lowest(state[ORIENTATION], CORNER_TOLERANCE) - scene.body.rounding * UP
+    return scene.body.lowest(state[ORIENTATION], CORNER_TOLERANCE)
 
 
 def _leave(points: Array, state: Array) -> bool:

@@ -1,4 +1,4 @@
-"""A ball on a rough floor, level or sloped: it slides until its contact point is at rest, and rolls from then on.
+"""A ball, or a cylinder on its side, on a rough floor, level or sloped: it slides until its contact is at rest, and rolls from then on.
 
 With r the radius, I the moment of inertia, k = 1 + M r²/I, and s = v + ω × (-r Y) the velocity of the contact point:
 
@@ -7,23 +7,25 @@ With r the radius, I the moment of inertia, k = 1 + M r²/I, and s = v + ω × (
     v = v₀ + g_t t - (s₀ + g_t t - s)/k            of both, because friction changes v and s as 1 : k
     ω = ω₀ + (k - 1)/r Y × (s₀ + g_t t - s)/k      of both, by the torque of the same friction
 
-A solid ball, k = 7/2, that is thrown without spin rolls at 5/7 of its speed; on a slope it rolls with 5/7 of g_t. The component of ω
-along Y is constant. The angle of the rotation is an integral of ω where its direction is constant; else the orientation is integrated
-numerically.
+A solid ball, k = 7/2, that is thrown without spin rolls at 5/7 of its speed; on a slope it rolls with 5/7 of g_t. A solid cylinder has
+k = 3, a hollow one k = 2. The component of ω along Y is constant. The angle of the rotation is an integral of ω where its direction is
+constant; else the orientation is integrated numerically.
 
 Source: G. G. de Coriolis, Théorie mathématique des effets du jeu de billard (1835); `dry_friction` for the velocity of the contact point.
-Valid for: a ball of equal moments that touches the floor at the start, with any velocity along the floor and any spin; any friction, but
+Valid for: a ball of equal moments that touches the floor at the start, with any velocity along the floor and any spin; a capsule or a
+cylinder on its side, if its axis is principal, velocity and slope are across it, and the spin is about it; any friction, but
 infinite friction only without slip; gravity into the floor, which may be sloped, no damping. Restitution has no effect, because the
 contact does not separate.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from dropspin.scenarios.bodies import Capsule, Cylinder
 from dropspin.scenarios.model import Floor, Scenario
-from dropspin.scenarios.rotations import about, multiply
+from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.coulomb_slide import LEVEL
 from dropspin.scenarios.truths.dry_friction import Motion, dry_friction
@@ -33,6 +35,8 @@ NO_SLIP = 1e-14
 """Speed of a contact point that counts as rest, relative to the ball's speed."""
 ONE_AXIS = 1e-14
 """Largest part of an angular velocity across the largest one, relative to it, up to which the axis counts as constant."""
+ACROSS = 1e-12
+"""Largest part of a direction across the one that is meant, relative to it, that is attributed to rounding."""
 SAMPLES = 50
 """Times at which the axis is compared."""
 STEP = 0.05
@@ -42,16 +46,17 @@ STEP = 0.05
 def rolling(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a ball that slides and rolls."""
     start, g, body = scene.initial_state, scene.acceleration, scene.body
-    if not (body.is_ball and scene.starts_on_floor and g[1] < 0.0 and start[8] == 0.0 and len(set(body.moments)) == 1):
-        return None
     velocity, spin, pull = start[VELOCITY], start[SPIN], g * LEVEL
-    radius = body.rounding
+    rolls = _ball(scene) or _on_its_side(scene, (velocity, pull)) if scene.starts_on_floor and g[1] < 0.0 and start[8] == 0.0 else None
+    if rolls is None:
+        return None
+    radius, moment = rolls
     slip = velocity + radius * np.cross(UP, spin)
     if np.linalg.norm(slip) <= NO_SLIP * np.linalg.norm(velocity):
         slip = np.zeros(3)
     if math.isinf(floor.coefficient) and slip.any():
         return None
-    share = 1.0 + body.mass * radius**2 / body.moments[0]  # k
+    share = 1.0 + body.mass * radius**2 / moment  # k
     contact, stops = dry_friction(slip, pull, share * floor.coefficient * -float(g[1]))
 
     def lost(t: Array) -> tuple[Array, Array]:
@@ -79,6 +84,31 @@ def rolling(scene: Scenario, floor: Floor) -> Truth | None:
 
     statement = "friction f g on the contact point until it is at rest, then rolling (Coriolis 1835)"
     return Truth("rolling", statement, states, horizon=scene.duration)
+
+
+def _ball(scene: Scenario) -> tuple[float, float] | None:
+    """The radius of a ball of equal moments, and its moment of inertia."""
+    return (scene.body.size, scene.body.moments[0]) if scene.body.is_ball and len(set(scene.body.moments)) == 1 else None
+
+
+def _on_its_side(scene: Scenario, along: Sequence[Array]) -> tuple[float, float] | None:
+    """The radius of a capsule or a cylinder that lies on its side, and its moment about its axis; None if it leaves its course.
+
+    It keeps it if the axis is a principal axis, the spin is about it, and what is along the floor is across it.
+    """
+    body, orientation, spin = scene.body, np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
+    if not isinstance(body, Capsule | Cylinder):
+        return None
+    is_balanced = np.abs(body.vertices[:, [0, 2]]).max() <= ACROSS * body.size and np.prod(body.vertices[:, 1]) < 0.0
+    axis, moment = rotate(orientation, UP), float(body.inertia_tensor[1, 1])
+    keeps = (
+        is_balanced
+        and abs(axis[1]) <= ACROSS
+        and np.abs(body.inertia_tensor[1, [0, 2]]).max() <= ACROSS * moment
+        and np.linalg.norm(np.cross(spin, axis)) <= ACROSS * np.linalg.norm(spin)
+        and all(abs(vector @ axis) <= ACROSS * np.linalg.norm(vector) for vector in along)
+    )
+    return (body.radius, moment) if keeps else None
 
 
 def _orientations(scene: Scenario, spins: Motion, kink: float) -> Callable[[Array], Array]:

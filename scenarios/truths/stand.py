@@ -87,7 +87,7 @@ def on_one_edge(scene: Scenario) -> Stand | None:
     of mass is between the two ends of every edge.
     """
     body, start, g = scene.body, scene.initial_state, scene.acceleration
-    if g[1] >= 0.0 or body.rounding or not scene.starts_on_floor:
+    if g[1] >= 0.0 or any(body.semi_axes) or not scene.starts_on_floor:
         return None
     offsets = rotate(start[ORIENTATION], body.hull)
     lowest = offsets[offsets[:, 1] <= offsets[:, 1].min() + TOUCHING * body.size] * (1.0 - UP)

@@ -38,7 +38,7 @@ def top(scene: Scenario, floor: Floor) -> Truth | None:
     start, body = scene.initial_state, scene.body
     if floor.friction != "infinite" or not scene.falls_straight_down:
         return None
-    if body.rounding or not scene.starts_on_floor or not start[SPIN].any():
+    if any(body.semi_axes) or not scene.starts_on_floor or not start[SPIN].any():
         return None
     heights = rotate(start[ORIENTATION], body.vertices)[:, 1]
     lowest = np.flatnonzero(heights <= heights.min() + TOUCHING * body.size)

@@ -119,7 +119,7 @@ def test_balls_of_an_ensemble_turn_if_one_of_them_spins():
         (lambda: run(body=Body(np.array([1.0, 2.0, -1.0]), BOX.inertia, POINTS)), "mass: got -1.0 for body 2; must be a number above 0"),
         (lambda: run(dt=np.array([1e-3, np.nan])), "dt: got nan for body 1"),
         (lambda: run(dt=np.full(5, 1e-3)), "ensemble: got 4 of state but 5 of body, world and dt"),
-        (lambda: run(body=Body(np.ones(3), BOX.inertia, POINTS, np.zeros(2))), "ensemble: got 3 of mass but 2 of radius"),
+        (lambda: run(body=Body(np.ones(3), BOX.inertia, POINTS, np.zeros((2, 3)))), "ensemble: got 3 of mass but 2 of semi_axes"),
         (lambda: run(states=np.zeros((0, 13))), r"state: must have shape \(13,\) or \(B, 13\), got \(0, 13\)"),
         (lambda: run(world=World(G, Floor(np.array([0.5, 1.5]), 0.0))), "restitution: got 1.5 for body 1; must be between 0 and 1"),
         (lambda: run(world=World(G, Floor(0.5, np.array([0.0, 0.3])))), "friction: got 0.3; law 'note' takes 0 and infinity only"),

@@ -257,7 +257,7 @@ def test_invalid_arguments_are_rejected():
         (lambda: run(b=Body(1.0, np.zeros((3, 3)), body.points)), "inertia: got .* positive definite"),
         (lambda: run(b=Body(1.0, body.inertia * np.nan, body.points)), "inertia: got"),
         (lambda: run(b=Body(1.0, body.inertia, body.points[:, :2])), r"points: must have shape \(8, 3\) or \(B, 8, 3\), got \(8, 2\)"),
-        (lambda: run(b=Body(1.0, body.inertia, body.points, -1.0)), "radius: got -1.0"),
+        (lambda: run(b=Body(1.0, body.inertia, body.points, (1.0, -1.0, 1.0))), r"semi_axes: got \[1.0, -1.0, 1.0\]; must be 0 or more"),
         (lambda: run(world=World(gravity=np.array([0, np.inf, 0]))), "gravity: got"),
         (lambda: run(world=World(floor=Floor(1.5, 0.0))), "restitution: got 1.5; must be between 0 and 1"),
         (lambda: run(world=World(floor=Floor(0.5, -1.0))), "friction: got -1.0"),

@@ -74,7 +74,7 @@ def test_deepest_dip_of_a_tumbling_body_is_found_and_a_miss_is_none(seed, gravit
     found = []
     for rise in (-bottom + dip, -bottom - dip):
         start = state + rise * np.eye(13)[1]
-        found.append(ContactSearch(flight_states(start, inertia, pull), corners, 0.0).next_contact(duration))
+        found.append(ContactSearch(flight_states(start, inertia, pull), corners, np.zeros(3)).next_contact(duration))
         if rise < -bottom and heights[0] + rise > dip:
             below = times[heights + rise < 0.0]
             assert found[-1].is_decided
@@ -97,7 +97,7 @@ def test_search_is_as_long_as_the_motion_not_as_the_scene():
     corners, state, inertia, _ = drawn_flight(0, 1.6)
     state[1], state[8], state[10:13] = 1000.0, 0.0, state[10:13] / np.linalg.norm(state[10:13])
     flight = flight_states(state, inertia, np.array([0.0, -1.6, 0.0]))
-    assert Counted(flight, corners, 0.0).next_contact(1000.0).time == pytest.approx(np.sqrt(2 * 1000.0 / 1.6), abs=1.0)
+    assert Counted(flight, corners, np.zeros(3)).next_contact(1000.0).time == pytest.approx(np.sqrt(2 * 1000.0 / 1.6), abs=1.0)
     assert count < 500
 
 
@@ -108,7 +108,7 @@ def test_no_corner_accelerates_more_than_the_bound_of_the_search(is_steady):
     for seed in range(40):
         corners, state, inertia, _ = drawn_flight(seed, 1.6)
         flight = flight_states(state, np.eye(3) if is_steady else inertia, np.array([0.0, 1.6, 0.0]))
-        search = ContactSearch(flight, corners, 0.0)
+        search = ContactSearch(flight, corners, np.zeros(3))
         times = np.linspace(1.0, 40.0, 2000) / flight.rotor.largest_spin
         ahead = 1e-5 / flight.rotor.largest_spin
         accelerations = (search._corners(times + ahead)[1] - search._corners(times - ahead)[1]) / (2.0 * ahead)
@@ -128,7 +128,7 @@ def test_excluded_intervals_contain_no_contact():
         if seed % 2:
             corners, inertia, state[10:13] = corners[:1], np.eye(3), [0.0, 0.0, 5.0]
         state[1], state[8] = np.linalg.norm(corners, axis=1).max() * rng.uniform(0.3, 1.0), 0.0
-        search = ContactSearch(flight_states(state, inertia, np.zeros(3)), corners, 0.0)
+        search = ContactSearch(flight_states(state, inertia, np.zeros(3)), corners, np.zeros(3))
         begins, widths = rng.uniform(0.0, 20.0, 100), 10.0 ** rng.uniform(-1.7, 0.5, 100)
         begins, widths = begins / search.flight.rotor.largest_spin, widths / search.flight.rotor.largest_spin
         times = begins[:, None] + widths[:, None] * np.linspace(0.0, 1.0, 51)

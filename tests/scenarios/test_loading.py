@@ -36,7 +36,7 @@ def test_malformed_file_is_rejected_with_its_message(path):
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ({"mas": 2.0}, "scene['body']['mas']: unknown key. Allowed: mass, shape, radius, inertia. Did you mean 'mass'?"),
+        ({"mas": 2.0}, "scene['body']['mas']: unknown key. Allowed: mass, center_of_mass, shape, radius, inertia. Did you mean 'mass'?"),
         ({"mas": 2.0, "raduis": 0.1}, "Did you mean 'mass'? (and 1 more problem)"),
         ({"radius": -1.0, "mas": 2.0}, "Did you mean 'mass'? (and 1 more problem)"),
         ({"radius": 0.1, "mass": 1.0, "inertai": 1.0}, "Did you mean 'inertia'?"),
@@ -154,7 +154,10 @@ def test_mapping_may_have_a_name():
             "scene['start']['position']: got [0.0, 0.0, 0.0]; there the body is 0.1 m below the floor; increase its height.",
         ),
         ({"gravity": {"acceleration": -9.8}}, "scene['gravity']['acceleration']: got -9.8; must be a list."),
-        ({"body": {"shape": "ball"}}, "scene['body']['shape']: got 'ball'; must be one of 'sphere', 'box', 'vertices'."),
+        (
+            {"body": {"shape": "ball"}},
+            "scene['body']['shape']: got 'ball'; must be one of 'sphere', 'box', 'capsule', 'cylinder', 'ellipsoid', 'vertices'.",
+        ),
         (
             {"floor": {"restitution": 0.5, "friction": "sticky"}},
             "scene['floor']['friction']: got 'sticky'; must be 'none' or 'infinite', or a",

@@ -50,7 +50,7 @@ def integrate(scene, most=200, shortest=1e-9):
     body = scene.body
     rows = _integrate(
         np.ascontiguousarray(body.hull),
-        body.rounding,
+        body.semi_axes[0],
         body.size,
         body.mass,
         body.inertia_tensor,

@@ -106,7 +106,7 @@ def _bounces(scene, truth):
     """The law of a body whose impacts do not change its rotation."""
     if truth.events[0].time == 0.0:
         return "The floor carries the body and exerts no friction: x is constant, and the body turns about the vertical as a free body."
-    face = "" if scene.body.rounding else "The four lower corners strike at once, so that the box stays flat. "
+    face = "" if scene.body.is_ball else "The four lower corners strike at once, so that the box stays flat. "
     law = f"{face}Between impacts dv/dt = g. When the lowest point reaches the floor, v_y becomes -e v_y (Newton's restitution)."
     if scene.floor.rest_speed:
         return f"{law} An impact slower than {number(scene.floor.rest_speed)} m/s has e = 0; after it the body lies still."

@@ -131,7 +131,7 @@ def test_start_depends_only_on_its_number():
     """Each start is within the spread, as high above the floor as the scene's own, and a valid state."""
     scene = load("drop-box-anyhow")
     body, spread, own = scene.body, scene.ensemble, scene.initial_state
-    together = spread_starts(np.tile(own, (400, 1)), spread, np.arange(400), body.vertices, body.rounding, True)
+    together = spread_starts(np.tile(own, (400, 1)), spread, np.arange(400), body.vertices, body.semi_axes, True)
     for number in (0, 7, 399):
         np.testing.assert_array_equal(together[number], spread_start(scene, number))
     for start in together[:50]:
@@ -147,7 +147,7 @@ def test_starts_are_uniform_over_all_attitudes():
 
     scene = load("drop-box-anyhow")
     own = np.tile(scene.initial_state, (4000, 1))
-    drawn = spread_starts(own, scene.ensemble, np.arange(4000), scene.body.vertices, scene.body.rounding, True)
+    drawn = spread_starts(own, scene.ensemble, np.arange(4000), scene.body.vertices, scene.body.semi_axes, True)
     for axis in np.eye(3):
         turned = rotate(drawn[:, ORIENTATION], axis)
         assert np.abs(turned.mean(axis=0)).max() < 0.03

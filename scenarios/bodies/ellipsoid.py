@@ -1,0 +1,66 @@
+"""An ellipsoid."""
+
+import math
+from functools import cached_property
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from dropspin.scenarios.bodies.hull import Outline, around_axis, outline
+from dropspin.scenarios.bodies.inertia import Moments
+from dropspin.scenarios.bodies.shape import Shape
+from dropspin.scenarios.state import Array
+from dropspin.scenarios.tables import PositiveVector
+
+
+class Ellipsoid(Shape):
+    """An ellipsoid; its half extents lie along the x, y and z axes of the body frame."""
+
+    lengths: ClassVar = ("half_extents",)
+
+    shape: Literal["ellipsoid"]
+    half_extents: PositiveVector
+    inertia: Literal["solid"] | Moments = "solid"
+
+    @cached_property
+    def corners(self) -> Array:
+        return np.zeros((1, 3))
+
+    @property
+    def semi_axes(self) -> Array:
+        return np.array(self.half_extents)
+
+    @property
+    def resting_height(self) -> float:
+        """The distance of the centre of mass c from the nearest point of the surface, at a² c / (a² - t) along each axis.
+
+        By a Lagrange multiplier t up to the square of the shortest half extent, which it is if c has no part along that axis.
+
+        Source: D. Eberly, Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid (2013).
+        """
+        from scipy.optimize import brentq
+
+        squares, centre = self.semi_axes**2, self.centre
+        least = squares.min()
+        is_shortest = squares == least
+        offset = float(np.linalg.norm(centre[is_shortest]))
+
+        def outside(t: float) -> float:
+            gaps = np.where(squares > t, squares - t, 1.0)
+            return float(np.sum(squares * (centre / gaps) ** 2)) - 1.0
+
+        if offset == 0.0 and outside(least) < 0.0:
+            across = centre[~is_shortest] / (squares[~is_shortest] - least)
+            height = math.sqrt(least * (1.0 - float(np.sum(squares[~is_shortest] * across**2))))
+            return math.hypot(height, float(least * np.linalg.norm(across)))
+        t = brentq(outside, 0.0, least - math.sqrt(least) * offset, xtol=1e-300, rtol=1e-15)
+        return float(np.linalg.norm(centre * t / (squares - t)))
+
+    @property
+    def outline(self) -> Outline:
+        angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)
+        return outline(self.semi_axes * around_axis(np.cos(angles), np.sin(angles)) - self.centre, self.size)
+
+    def tensor_of(self, distribution: str) -> Array:
+        a, b, c = np.square(self.half_extents)
+        return 0.2 * self.mass * np.diag([b + c, c + a, a + b])

@@ -1,0 +1,136 @@
+"""Engines with round bodies, meshes, offset centres of mass and full tensors: against exact solutions, and in other frames."""
+
+import numpy as np
+import pytest
+
+import dropspin as ds
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.registry import engine
+from dropspin.scenarios import load, truth_for
+from dropspin.scenarios.bodies import SHAPES
+from dropspin.scenarios.rotations import conjugate, multiply, unrotate
+
+EXACT_WANG = "wang[rotation=exact,law=normal]"
+LYING = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
+TURNED = (np.array([0.3, 0.2, 0.5, 0.8]) / np.linalg.norm([0.3, 0.2, 0.5, 0.8])).tolist()
+TETRAHEDRON = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 0.35]]
+BODIES = {
+    "capsule": {"shape": "capsule", "radius": 0.1, "half_length": 0.2, "mass": 1.0},
+    "cylinder": {"shape": "cylinder", "radius": 0.1, "half_length": 0.2, "mass": 1.0},
+    "ellipsoid": {"shape": "ellipsoid", "half_extents": [0.1, 0.2, 0.15], "mass": 1.0},
+    "mesh": {"shape": "mesh", "points": TETRAHEDRON, "faces": [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], "mass": 1.0},
+    "offset": {"shape": "sphere", "radius": 0.1, "mass": 1.0, "center_of_mass": [0.02, 0.03, 0.0], "inertia": [4e-3, 3.9e-3, 4.2e-3]},
+    "tensor": {"shape": "box", "half_extents": [0.1, 0.2, 0.3], "mass": 1.0, "inertia": [0.04, 0.03, 0.02, 2e-3, 1e-3, 3e-3]},
+}
+TUMBLING = {"position": [0.0, 0.6, 0.0], "orientation": TURNED, "angular_velocity": [1.0, 2.0, 3.0]}
+
+
+def scene(body, start, friction="none", restitution=0.5, duration=0.6):
+    floor = {"restitution": restitution, "friction": friction}
+    return load({"duration": duration, "body": body, "start": start, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": floor})
+
+
+def errors_after_impact(one, name, dts):
+    """The largest errors of velocity and angular velocity 10 ms after the first impact, at each time step."""
+    truth = truth_for(one)
+    found = []
+    for dt in dts:
+        row = round((truth.events[0].time + 0.01) / dt)
+        motion, exact = ds.simulate(one, name, dt=dt), truth([row * dt])
+        found.append(np.abs(motion.states[row, 7:] - exact.states[0, 7:]).max())
+    return found
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco"])
+def test_an_oblique_impact_converges_to_the_exact_one(name, engine_name):
+    """To less than a percent of the change at the impact, and by about four times in two quarterings of the step."""
+    one = scene(BODIES[name], TUMBLING, duration=0.45)
+    coarse, fine = errors_after_impact(one, engine_name, (1.6e-3, 1e-4))
+    impact = truth_for(one).events[0]
+    assert fine < 0.01 * np.abs(impact.after[7:] - impact.before[7:]).max()
+    assert fine < 0.25 * coarse
+
+
+@pytest.mark.parametrize("name", ["capsule", "cylinder", "offset", "tensor"])
+def test_pybullet_converges_where_it_has_the_shape(name):
+    """Its cylinder has a margin, whose error remains."""
+    one = scene(BODIES[name], TUMBLING, duration=0.45)
+    impact = truth_for(one).events[0]
+    (error,) = errors_after_impact(one, "pybullet", (1e-4,))
+    assert error < 0.02 * np.abs(impact.after[7:] - impact.before[7:]).max()
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "message"),
+    [
+        ("ellipsoid", TUMBLING, "Bullet has no ellipsoids: this one is the convex hull of"),
+        ("cylinder", {"position": [0.0, 0.4, 0.0]}, "a cylinder that lands upright one contact point"),
+    ],
+)
+def test_pybullet_says_what_it_cannot_build_and_carry(name, start, message):
+    """In the limitations of the run."""
+    with pytest.warns(UserWarning, match=message):
+        ds.simulate(scene(BODIES[name], start), "pybullet", dt=4e-3)
+
+
+@pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco", "pybullet"])
+def test_a_body_is_the_same_in_another_frame_of_its_own(engine_name):
+    """Vertices and tensor turned in the body, and the orientation turned back: the same motion, but for what a contact solver leaves."""
+    points = np.array([[0.1, 0.0, 0.2], [-0.2, 0.1, 0.0], [0.0, -0.25, -0.1], [0.1, 0.15, -0.1], [0.0, 0.3, 0.1]])
+    turn = np.array([0.5, -0.1, 0.7, 0.5]) / np.linalg.norm([0.5, -0.1, 0.7, 0.5])
+    own = scene({"shape": "vertices", "points": points.tolist(), "mass": 1.0}, TUMBLING, duration=0.4)
+    start = TUMBLING | {"orientation": multiply(np.array(TURNED), turn).tolist()}
+    other = scene({"shape": "vertices", "points": unrotate(turn, points).tolist(), "mass": 1.0}, start, duration=0.4)
+    one, another = (ds.simulate(each, engine_name, dt=1e-3) for each in (own, other))
+    np.testing.assert_allclose(one.position, another.position, atol=1e-7)
+    np.testing.assert_allclose(one.angular_velocity, another.angular_velocity, atol=1e-6)
+    difference = multiply(multiply(one.orientation, turn), conjugate(another.orientation))
+    np.testing.assert_allclose(np.abs(difference[:, 3]), 1.0, atol=1e-7)
+
+
+@pytest.mark.filterwarnings("ignore:contacts slip", "ignore:in maximal coordinates")
+@pytest.mark.parametrize("engine_name", ["wang[rotation=exact,law=coulomb]", "mujoco", "pybullet"])
+def test_cylinders_and_capsules_roll_on_their_sides(engine_name):
+    """Thrown without spin they slide, then roll at (k - 1)/k of their speed, to the order of the time step."""
+    for name in ("cylinder", "capsule"):
+        one = scene(
+            BODIES[name], {"position": [0.0, 0.1, 0.0], "orientation": LYING, "velocity": [1.0, 0.0, 0.0]}, friction=0.3, duration=1.0
+        )
+        motion, truth = ds.simulate(one, engine_name, dt=1e-3), truth_for(one)
+        assert truth.name == "rolling"
+        assert motion.velocity[-1, 0] == pytest.approx(truth([1.0]).velocity[0, 0], abs=0.02)
+
+
+@pytest.mark.parametrize("options", ["", "contact=sequential,law=normal"])
+@pytest.mark.parametrize("name", ["capsule", "cylinder", "ellipsoid", "offset", "mesh"])
+def test_an_ensemble_of_round_bodies_moves_as_each_alone(name, options):
+    """To the last bit, in the lanes of the processor too; with a level cylinder among the starts."""
+    chosen = engine(f"wang[{options}]" if options else "wang")
+    start = scene(BODIES[name], TUMBLING)
+    turned = [TURNED, [0.0, 0.0, 0.0, 1.0], LYING, [0.0, 0.6, 0.0, 0.8], [0.1, 0.1, 0.1, 0.98]]
+    scenes = [scene(BODIES[name], TUMBLING | {"orientation": orientation}) for orientation in turned]
+    assert start.body.shape in SHAPES
+    with chosen.prepare_batch(scenes, 1e-3) as batch:
+        together = batch.record(500)
+    for one, states in zip(scenes, together, strict=True):
+        with chosen.prepare(one, 1e-3) as simulation:
+            np.testing.assert_array_equal(simulation.record(500), states)
+
+
+class Plain(Engine):
+    """An engine that names no shapes."""
+
+    name = "plain"
+
+    def prepare(self, scene, dt):
+        raise NotImplementedError
+
+
+def test_adapters_decline_what_they_do_not_build():
+    """A shape that an adapter does not name, and a centre of mass elsewhere, on a floor; without a floor both have no effect."""
+    for name, reason in (("capsule", "onto a floor, not capsule"), ("offset", "the centre of mass at the centre of their shape")):
+        on_floor = scene(BODIES[name], TUMBLING)
+        assert reason in Plain().refusal(on_floor)
+        assert Plain().refusal(on_floor.model_copy(update={"floor": None})) is None
+        assert engine("wang").refusal(on_floor) is None

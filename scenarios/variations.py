@@ -68,6 +68,8 @@ def content_of(scene: Scenario) -> dict[str, Any]:
     content = scene.model_dump(include={"duration", *TABLES}, exclude_none=True)
     if scene.floor is not None and scene.floor.impact_law == "cone":
         del content["floor"]["impact_law"]  # the keys of jobs that had no other law stay the same
+    if content["body"].get("center_of_mass") == (0.0, 0.0, 0.0):
+        del content["body"]["center_of_mass"]  # so do those of bodies that had no other centre of mass
     return content
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, combinations
 from typing import Any
 
-from dropspin.comparisons.engines.options import calibrated_label
 from dropspin.comparisons.judging.agreement import judge_agreement
 from dropspin.comparisons.judging.error_budget import is_sufficient
 from dropspin.comparisons.judging.verdicts import Judgement
@@ -64,8 +63,7 @@ def run_scene(
         if dt == min(dts):
             distances += _distances_to_other_laws(own.scene, dt, phases, compared)
     for study in studies:
-        calibrated = calibrated_label(study.entry.label)
-        study.calibrated = next((other for other in studies if other.entry.label == calibrated), None)
+        study.calibrated = next(filter(study.is_default_of, studies), None)
     judged = [row for study in studies for row in study.rows(is_extrapolated=is_sufficient(sorted(dts)))]
     return _results(own, studies, [*judged, *distances], agreements, stamp)
 

@@ -162,7 +162,7 @@ def rotations() -> dict[str, Entry]:
 
 def parts() -> dict[str, Entry]:
     """A ball in flight with everything modelled, and with one part after the other not modelled."""
-    ball = reference_impl.Body(1.0, 0.004 * np.eye(3), np.zeros((1, 3)), 0.1)
+    ball = reference_impl.Body(1.0, 0.004 * np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     turning = np.array([0, 1e3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1e-3])
     still = np.array([0, 1e3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0])
     g, floor = np.array([0, -9.8, 0]), reference_impl.Floor(0.5, 0.0)

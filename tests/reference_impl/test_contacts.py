@@ -57,7 +57,7 @@ def test_mean_contact_leaves_vertices_approaching():
 @pytest.mark.parametrize("friction", [0.2, 1.0])
 def test_sequential_friction_of_a_sliding_ball(friction):
     """Δv_t = -f (1 + e) |u_n| t, to 1e-9 in each direction."""
-    ball = Body(2.0, reference_impl.solid_sphere_inertia(2.0, 0.1), np.zeros((1, 3)), 0.1)
+    ball = Body(2.0, reference_impl.solid_sphere_inertia(2.0, 0.1), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     state = np.array([0, 0.1 - 1e-6, 0, 0, 0, 0, 1, 6.0, -1.0, 8.0, 0, 0, 0])
     for e, threshold in ((0.5, 0.0), (0.0, 2.0)):  # below the threshold there is no restitution
         floor = Floor(0.5, friction, threshold)
@@ -155,7 +155,7 @@ def test_dropped_cube_sinks_without_projection():
 def test_limit_cycle_of_a_lively_ball(mu):
     """Known fault: for µ above 1/2 the literal bouncer never rests but strikes at u* = g h / (1 - µ), to 2 %."""
     h = 1 / 60
-    ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
+    ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     state = np.array([0, 1.1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
     rows = reference_impl.simulate(state, ball, World(G, Floor(mu, 0.0)), h, 120_000)
     v = rows[-20_000:, 8]

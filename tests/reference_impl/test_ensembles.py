@@ -104,7 +104,7 @@ def test_forces_may_differ_from_body_to_body():
 
 def test_balls_of_an_ensemble_turn_if_one_of_them_spins():
     """The rotation is left out only if no body needs it; balls without spin keep their attitude either way."""
-    ball = Body(1.0, 0.4 * 0.01 * np.eye(3), np.zeros((1, 3)), 0.1)
+    ball = Body(1.0, 0.4 * 0.01 * np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     many = np.tile(np.array([0, 5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0]), (20, 1))
     many[3, 11] = 1.0
     rows = reference_impl.simulate(many, ball, World(G), 1e-3, 100)

@@ -41,7 +41,7 @@ def tumbling(which, law):
     friction = np.array([0.1, np.inf, 0, 0.4, 0.8]) if law == "coulomb" else np.array([np.inf, 0, np.inf, np.inf, 0])
     floor = Floor(restitution[which], friction[which], rest_speed[which])
     world = World(gravity[which], floor, (linear[which], angular[which]))
-    return starts[which], Body(mass[which], inertia[which], points[which], 0.01), world, dt[which]
+    return starts[which], Body(mass[which], inertia[which], points[which], (0.01, 0.01, 0.01)), world, dt[which]
 
 
 def alone(choice):
@@ -142,7 +142,7 @@ import numba, sys
 before = numba.config.CACHE_DIR
 import numpy as np
 import dropspin.reference_impl as r
-body = r.Body(1.0, np.eye(3), np.zeros((1, 3)), 0.1)
+body = r.Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))
 rows = r.simulate(np.array([0, 9, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.]), body, r.World(np.array([0, -1, 0])), 1.0, 1)
 from dropspin.reference_impl.kernels import Parts, recording_kernel
 kernel = recording_kernel(r.Methods(), Parts(gravity=True, forces=False, damping=False, floor=False, turning=False), 1)

@@ -232,7 +232,7 @@ def test_damping_factors_per_step_have_no_limit():
     rates = {h: -np.log(0.98) / h for h in (1 / 60, 1e-3)}
     assert rates[1 / 60] == pytest.approx(1.212, abs=1e-3)
     assert rates[1e-3] == pytest.approx(20.2, abs=1e-2)
-    ball = Body(1.0, np.eye(3), np.zeros((1, 3)), 0.1)
+    ball = Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     start = np.array([0, 0, 0, 0, 0, 0, 1, 1.0, 0, 0, 0, 0, 0])
     ends = [reference_impl.simulate(start, ball, World(damping=(1.212, 0.0)), h, round(1 / h))[-1, 7] for h in (1 / 60, 1e-3)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)

@@ -48,7 +48,7 @@ def test_ensemble_runs_in_lanes_unless_one_of_its_methods_cannot():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_laws_without_a_friction_cone_reject_a_finite_coefficient(law):
-    ball = Body(1.0, np.eye(3), np.zeros((1, 3)), 0.1)
+    ball = Body(1.0, np.eye(3), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     start, world = [0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0], World(floor=Floor(0.5, 0.3))
     if LAWS[law].ANY_FRICTION:
         assert simulate(start, ball, world, 1e-3, 0, methods=Methods(law=law)).shape == (1, 13)

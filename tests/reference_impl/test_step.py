@@ -100,7 +100,7 @@ def test_absent_part_has_the_bits_of_a_part_without_effect():
 
 def test_ball_bounces_at_its_lowest_point():
     """A ball is one vertex at -R N; an impact changes its spin only if it slides on a floor with friction."""
-    ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
+    ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     start = state(x=(0, 0.1 - 1e-4, 0), v=(2, -3, 0), w=(0, 0, 5))
     smooth = reference_impl.step(start, ball, World(floor=Floor(0.8, 0.0)), 1e-4)
     rough = reference_impl.step(start, ball, World(floor=Floor(0.8, np.inf)), 1e-4)
@@ -151,7 +151,7 @@ def test_eq7_and_eq9_for_a_tilted_box():
 @pytest.mark.parametrize("sideways", [(0, 0, 0), (0.1, 0, 0), (0, 0, 0.1)])
 def test_ball_turns_only_if_it_spins_or_slides(motion, turns, sideways):
     """With infinite friction: by spin, sliding, or gravity along the floor, in x and in z. Otherwise its attitude keeps every bit."""
-    ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), 0.1)
+    ball = Body(1.0, reference_impl.solid_sphere_inertia(1.0, 0.1), np.zeros((1, 3)), (0.1, 0.1, 0.1))
     start = state(x=(0, 0.2, 0), **motion)
     rows = reference_impl.simulate(start, ball, World(G + np.array(sideways), Floor(0.5, np.inf)), 1e-3, 400)
     turned = bool(np.any(rows[-1, ORIENTATION] != rows[0, ORIENTATION]))

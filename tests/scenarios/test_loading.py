@@ -156,7 +156,7 @@ def test_mapping_may_have_a_name():
         ({"gravity": {"acceleration": -9.8}}, "scene['gravity']['acceleration']: got -9.8; must be a list."),
         (
             {"body": {"shape": "ball"}},
-            "scene['body']['shape']: got 'ball'; must be one of 'sphere', 'box', 'capsule', 'cylinder', 'ellipsoid', 'vertices'.",
+            "scene['body']['shape']: got 'ball'; must be one of 'sphere', 'box', 'capsule', 'cylinder', 'ellipsoid', 'vertices', 'mesh'.",
         ),
         (
             {"floor": {"restitution": 0.5, "friction": "sticky"}},

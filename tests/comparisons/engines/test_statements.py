@@ -133,7 +133,6 @@ def test_engines_without_a_rest_speed_say_so_in_one_form(name):
 @pytest.mark.parametrize(
     ("name", "body", "tables"),
     [
-        ("pybullet", ASKEW, {}),
         ("mujoco", ASKEW, {"damping": {"angular": 0.1}}),
         ("dart", BLOCK, {"damping": {"angular": 0.1}}),
         ("drake", BLOCK, {"damping": {"angular": 0.1}}),

@@ -53,8 +53,8 @@ class Parts:
     damping: bool
     floor: bool
     turning: bool
-    ellipsoids: bool
-    rims: bool
+    ellipsoids: bool = False
+    rims: bool = False
 
 
 @cache

@@ -448,9 +448,9 @@ class WrongRotor(Made):
         q = (solved.y[:4] / np.linalg.norm(solved.y[:4], axis=0)).T
 
         def distort(rows, at, step, truth):
-            rows = rows.copy()
-            rows[:, ORIENTATION] = q[: len(rows)]
-            rows[:, SPIN] = rotate(q[: len(rows)], solved.y[4:].T[: len(rows)])
+            rows, known = rows.copy(), np.minimum(np.arange(len(rows)), steps)  # whoever times steps may take more than the scene has
+            rows[:, ORIENTATION] = q[known]
+            rows[:, SPIN] = rotate(q[known], solved.y[4:].T[known])
             return rows
 
         return Sampled(scene, dt, scene, distort)

@@ -8,7 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from dropspin import reference_impl
 from dropspin.reference_impl import Body, Floor, Methods, World
+from dropspin.reference_impl.floor_plane import contact_count, contact_offset
+from dropspin.reference_impl.parameters import pack, read_body, read_semi_axes
+from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.state import ORIENTATION, SPIN, VELOCITY
+from dropspin.reference_impl.vectors import Quat
 
 G = np.array([0.0, -9.8, 0.0])
 STICKS = np.inf
@@ -188,3 +192,20 @@ def test_fast_small_body_stays_below_the_floor():
     heights = reference_impl.simulate(state, body, World(G, Floor(0.0, STICKS)), 1 / 60, 600)[:, 1]
     assert heights[-1] < -0.05
     assert np.ptp(heights[-60:]) < 1e-2
+
+
+def test_points_of_a_rim_divide_it_into_three_from_the_lowest():
+    """Of a cylinder at random orientations: on the rim, 120° apart, the first as low as the disc is; of a level disc too."""
+    packed = pack(Body(1.0, np.eye(3), np.array([[0.0, -0.3, 0.0], [0.0, 0.3, 0.0]]), (0.2, 0.0, 0.2)), World(), 1.0)
+    body = read_body(lambda columns, _, column: float(columns[0, column]), packed.columns, packed.points[0], 0, read_semi_axes, True)
+    assert contact_count(body) == 6
+    for q in (np.array([0.0, 0.0, 0.0, 1.0]), *np.random.default_rng(2).normal(size=(5, 4))):
+        R = rotation_matrix(Quat(*(q / np.linalg.norm(q)).tolist()))
+        axes = np.array([[*R.row1], [*R.row2], [*R.row3]])
+        for vertex in range(2):
+            centre = axes @ packed.points[0][vertex]
+            arms = np.array([[*contact_offset(R, body, 3 * vertex + place)] for place in range(3)]) - centre
+            np.testing.assert_allclose(np.linalg.norm(arms, axis=1), 0.2, rtol=1e-14)
+            np.testing.assert_allclose(arms @ axes[:, 1], 0.0, atol=1e-15)
+            np.testing.assert_allclose(arms.sum(axis=0), 0.0, atol=1e-15)
+            assert arms[0, 1] == pytest.approx(-0.2 * np.hypot(axes[1, 0], axes[1, 2]), abs=1e-15)

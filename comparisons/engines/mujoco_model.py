@@ -23,7 +23,7 @@ import numpy as np
 
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, bodies_in, friction_of, principal_frame
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere, Vertices
+from dropspin.scenarios.bodies import Box, Capsule, Ellipsoid, Mesh, OnAxis, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.model import Floor
 
@@ -180,7 +180,7 @@ def _shape(scene: Scenario, form: Mapping[str, str]) -> dict[str, Any]:
     at = {"pos": -body.centre} if body.centre.any() else {}
     if isinstance(body, Sphere):
         return {"type": kinds.mjGEOM_SPHERE, "size": [body.radius, 0.0, 0.0], **at}
-    if isinstance(body, Capsule | Cylinder):  # along z
+    if isinstance(body, OnAxis):  # along z
         kind = kinds.mjGEOM_CAPSULE if isinstance(body, Capsule) else kinds.mjGEOM_CYLINDER
         return {"type": kind, "size": [body.radius, body.half_length, 0.0], "quat": UPWARD, **at}
     assert isinstance(body, Box | Ellipsoid)

@@ -27,7 +27,7 @@ from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION, PyBulletSimulation
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
-from dropspin.scenarios.bodies import SHAPES, Box, Capsule, Cylinder, Vertices
+from dropspin.scenarios.bodies import SHAPES, Box, OnAxis, Vertices
 
 SMALLEST_INERTIA = 2.3e-16  # (kg m²)³; Bullet's solver of three equations takes a smaller determinant for 0
 FASTEST_DECAY = 30.0  # 1/s; from 37 on 1 - exp(-rate) is 1 in double precision, and the body stops
@@ -140,7 +140,7 @@ class PyBullet(Engine):
     def _floor_in(self, scene: Scenario) -> str:
         """The floor of a scene: `plane`, `box` or `mesh`; `fitting` is a plane, or, calibrated, a box for what can lie."""
         if self.option("floor") == "fitting":
-            return "box" if isinstance(scene.body, Box | Capsule | Cylinder) and not self.is_default else "plane"
+            return "box" if isinstance(scene.body, Box | OnAxis) and not self.is_default else "plane"
         return self.option("floor")
 
     def _parameters(self, scene: Scenario, dt: float) -> dict[str, float]:

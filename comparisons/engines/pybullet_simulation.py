@@ -16,7 +16,7 @@ from dropspin.comparisons.engines.base import Array, AsBuilt, KnownLimitation, S
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, SQUARE, TRIANGLES, bodies_in, built, principal_frame
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario, Trajectory
-from dropspin.scenarios.bodies import Body, Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
+from dropspin.scenarios.bodies import Body, Box, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Sphere
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
@@ -93,14 +93,14 @@ class PyBulletSimulation(Simulation):
         if kind == "hull" or isinstance(body, Mesh):
             return bullet.createCollisionShape(bullet.GEOM_MESH, vertices=corners)
         at = {"collisionFramePosition": unrotate(axes, -body.centre).tolist()} if body.centre.any() else {}
-        along_z = isinstance(body, Capsule | Cylinder)
+        along_z = isinstance(body, OnAxis)
         if is_turned or along_z:
             at["collisionFrameOrientation"] = multiply(conjugate(axes), Z_TO_Y if along_z else IDENTITY).tolist()
         if isinstance(body, Sphere):
             return bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=body.radius, **at)
         if isinstance(body, Box):
             return bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=body.half_extents, **at)
-        if isinstance(body, Capsule | Cylinder):
+        if isinstance(body, OnAxis):
             kind_of = bullet.GEOM_CAPSULE if isinstance(body, Capsule) else bullet.GEOM_CYLINDER
             return bullet.createCollisionShape(kind_of, radius=body.radius, height=2.0 * body.half_length, **at)
         if isinstance(body, Ellipsoid):

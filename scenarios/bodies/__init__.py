@@ -9,11 +9,12 @@ from dropspin.scenarios.bodies.capsule import Capsule
 from dropspin.scenarios.bodies.cylinder import Cylinder
 from dropspin.scenarios.bodies.ellipsoid import Ellipsoid
 from dropspin.scenarios.bodies.mesh import Mesh
+from dropspin.scenarios.bodies.on_axis import OnAxis
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.bodies.sphere import Sphere
 from dropspin.scenarios.bodies.vertices import Vertices
 
-__all__ = ["SHAPES", "Body", "Box", "Capsule", "Cylinder", "Ellipsoid", "Mesh", "Shape", "Sphere", "Vertices"]
+__all__ = ["SHAPES", "Body", "Box", "Capsule", "Cylinder", "Ellipsoid", "Mesh", "OnAxis", "Shape", "Sphere", "Vertices"]
 
 Shapes = Sphere | Box | Capsule | Cylinder | Ellipsoid | Vertices | Mesh
 SHAPES: tuple[str, ...] = tuple(shape for kind in get_args(Shapes) for shape in get_args(kind.model_fields["shape"].annotation))

@@ -1,32 +1,19 @@
 """A capsule: a cylinder with a half ball at each end; the hull of two balls."""
 
 import math
-from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from dropspin.scenarios.bodies.hull import Outline, around_axis, outline
-from dropspin.scenarios.bodies.inertia import Moments
-from dropspin.scenarios.bodies.shape import Shape
-from dropspin.scenarios.state import UP, Array
-from dropspin.scenarios.tables import Positive
+from dropspin.scenarios.bodies.on_axis import OnAxis
+from dropspin.scenarios.state import Array
 
 
-class Capsule(Shape):
+class Capsule(OnAxis):
     """A capsule; its axis is the y axis of the body frame, and `half_length` is half of its length without the half balls."""
 
-    lengths: ClassVar = ("radius", "half_length")
-    has_own_axis: ClassVar = True
-
     shape: Literal["capsule"]
-    radius: Positive
-    half_length: Positive
-    inertia: Literal["solid", "surface"] | Moments = "solid"
-
-    @cached_property
-    def corners(self) -> Array:
-        return np.outer([-self.half_length, self.half_length], UP)
 
     @property
     def semi_axes(self) -> Array:

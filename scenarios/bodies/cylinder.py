@@ -2,31 +2,19 @@
 
 import math
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from dropspin.scenarios.bodies.hull import Outline, around_axis, outline
-from dropspin.scenarios.bodies.inertia import Moments
-from dropspin.scenarios.bodies.shape import Shape
-from dropspin.scenarios.state import UP, Array
-from dropspin.scenarios.tables import Positive
+from dropspin.scenarios.bodies.on_axis import OnAxis
+from dropspin.scenarios.state import Array
 
 
-class Cylinder(Shape):
+class Cylinder(OnAxis):
     """A cylinder; its axis is the y axis of the body frame, and `half_length` is half of its length."""
 
-    lengths: ClassVar = ("radius", "half_length")
-    has_own_axis: ClassVar = True
-
     shape: Literal["cylinder"]
-    radius: Positive
-    half_length: Positive
-    inertia: Literal["solid", "surface"] | Moments = "solid"
-
-    @cached_property
-    def corners(self) -> Array:
-        return np.outer([-self.half_length, self.half_length], UP)
 
     @property
     def semi_axes(self) -> Array:

@@ -215,8 +215,9 @@ class ContactSearch:
     def _corners(self, times: Array) -> tuple[Array, Array]:
         """Heights above the floor [m] and upward velocities [m/s] of the corners, shapes (m, n), at times [s], shape (m,)."""
         height, speed, vertical, turning = self._vertical_motion(times)
-        rolled = np.zeros(len(times)) if self._is_ball else -dot(self.semi_axes**2 * vertical, turning) / self._depth(vertical)
-        heights = height[:, None] + vertical @ self.points.T - self._depth(vertical)[:, None]
+        depth = self._depth(vertical)
+        rolled = np.zeros(len(times)) if self._is_ball else -dot(self.semi_axes**2 * vertical, turning) / depth
+        heights = height[:, None] + vertical @ self.points.T - depth[:, None]
         return heights, speed[:, None] + turning @ self.points.T + rolled[:, None]
 
     def _depth(self, vertical: Array) -> Array:

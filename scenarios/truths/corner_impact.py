@@ -18,9 +18,7 @@ from itertools import islice
 
 import numpy as np
 
-from dropspin.scenarios.bodies.surface import depth_below_centre
 from dropspin.scenarios.model import TOUCHING, Floor, Scenario
-from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.contact_search import Contact, ContactSearch
 from dropspin.scenarios.truths.flight import TURNS_OVER, Flight, flight_states
@@ -169,12 +167,10 @@ def _next_impact(scene: Scenario, flight: Flight, duration: float, leaves: bool)
         leaves: Whether the body leaves the floor at the beginning of the flight, after an impact.
     """
     body, start = scene.body, flight.start
-    semi_axes = body.semi_axes
-    lowest = rotate(start[ORIENTATION], body.hull)[:, 1].min() - depth_below_centre(start[ORIENTATION], semi_axes)
-    is_on_floor = start[1] + lowest <= TOUCHING * body.size
+    is_on_floor = start[1] + body.lowest(start[ORIENTATION], 0.0)[0, 1] <= TOUCHING * body.size
     if is_on_floor and not leaves and _descends(scene, start):
         return Contact(0.0, True)
-    return ContactSearch(flight, body.hull, semi_axes).next_contact(duration)
+    return ContactSearch(flight, body.hull, body.semi_axes).next_contact(duration)
 
 
 def _descends(scene: Scenario, state: Array) -> bool:

@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from dropspin.scenarios.bodies import Capsule, Cylinder
+from dropspin.scenarios.bodies import OnAxis
 from dropspin.scenarios.model import Floor, Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
@@ -97,7 +97,7 @@ def _on_its_side(scene: Scenario, along: Sequence[Array]) -> tuple[float, float]
     It keeps it if the axis is a principal axis, the spin is about it, and what is along the floor is across it.
     """
     body, orientation, spin = scene.body, np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
-    if not isinstance(body, Capsule | Cylinder):
+    if not isinstance(body, OnAxis):
         return None
     is_balanced = np.abs(body.vertices[:, [0, 2]]).max() <= ACROSS * body.size and np.prod(body.vertices[:, 1]) < 0.0
     axis, moment = rotate(orientation, UP), float(body.inertia_tensor[1, 1])

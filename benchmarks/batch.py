@@ -58,7 +58,7 @@ def document_alone(starts: Sequence[scenarios.Scenario], every: int) -> Call:
     """The function of the reference implementation, with its arguments from the scenes."""
 
     def call() -> object:
-        body, world = reference_body(starts[0].body), reference_world(starts[0])
+        body, world = reference_body(starts[0].body), reference_world(starts[0], DT)
         return reference_impl.simulate(initial_states(starts), body, world, DT, STEPS, every)
 
     return call

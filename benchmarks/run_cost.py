@@ -144,7 +144,7 @@ def sweep_cost() -> None:
     """Print the cost of a job in a sweep of small jobs, and the share of stepping alone."""
     sweep = ds.load_sweep(SWEEP)
     scene = sweep.scenes[0]
-    simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene), DT)
+    simulator = reference_impl.Simulator(reference_body(scene.body), reference_world(scene, DT), DT)
     states, steps = np.tile(scene.initial_state, (JOBS // 10, 1)), scene.steps(DT)
     simulator.run(states, steps, threads=1)
     start = time.perf_counter()

@@ -29,6 +29,8 @@ def unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(component / length for component in quaternion)
 
 
+MOTIONS = ("linear", "angular")
+Share = Annotated[Number, Field(gt=0, le=1)]
 Orientation = Annotated[tuple[Number, ...], Field(min_length=4, max_length=4), AfterValidator(unit)]
 
 
@@ -77,10 +79,41 @@ class Floor(Table):
 
 
 class Damping(Table):
-    """Exponential decay of velocity and angular velocity [1/s]."""
+    """Exponential decay of velocity and angular velocity.
+
+    `linear` and `angular` are rates [1/s]. `linear_factor` and `angular_factor` are given in their place: what one step of `factor_dt` [s]
+    leaves of a velocity, as Algorithm 1 of Wang's lecture note has it. The rates are then -ln(factor) / factor_dt.
+    """
 
     linear: NotNegative = 0.0
     angular: NotNegative = 0.0
+    linear_factor: Share | None = Field(default=None, exclude=True)
+    angular_factor: Share | None = Field(default=None, exclude=True)
+    factor_dt: Positive | None = None
+
+    @model_validator(mode="after")
+    def _factors_give_rates(self) -> Self:
+        given = {name: factor for name in MOTIONS if (factor := getattr(self, f"{name}_factor")) is not None}
+        step = self.factor_dt
+        if given and step is None:
+            raise ValueError("a factor needs factor_dt, the time step that it is meant at, in s")
+        if given and self.model_fields_set & {*MOTIONS}:
+            raise ValueError("has rates (linear, angular) and factors (linear_factor, angular_factor); give one kind")
+        for name, factor in given.items():
+            assert step is not None
+            object.__setattr__(self, name, -math.log(factor) / step)
+            object.__setattr__(self, f"{name}_factor", None)
+        return self
+
+    @property
+    def rates(self) -> dict[str, float]:
+        """`linear` and `angular` [1/s]."""
+        return {name: getattr(self, name) for name in MOTIONS}
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """`linear_factor` and `angular_factor` for one step of `factor_dt`; empty without it."""
+        return {f"{name}_factor": math.exp(-rate * self.factor_dt) for name, rate in self.rates.items()} if self.factor_dt else {}
 
 
 class Ensemble(Table):
@@ -150,7 +183,7 @@ class Scenario(Table):
         start: Position [m], orientation, velocity [m/s] and angular velocity [rad/s] at t = 0, in the world frame.
         gravity: The acceleration of gravity [m/s²], or None.
         floor: Restitution, friction and rest speed [m/s] of the plane y = 0, or None.
-        damping: Decay rates [1/s], or None.
+        damping: Decay rates [1/s], or factors of a step, or None.
         ensemble: The distribution of the initial states of an ensemble, or None.
         expect: Bounds on metrics, each with a reason.
     """

@@ -70,6 +70,8 @@ def content_of(scene: Scenario) -> dict[str, Any]:
         del content["floor"]["impact_law"]  # the keys of jobs that had no other law stay the same
     if content["body"].get("center_of_mass") == (0.0, 0.0, 0.0):
         del content["body"]["center_of_mass"]  # so do those of bodies that had no other centre of mass
+    if scene.damping is not None and scene.damping.factors:
+        content["damping"] = scene.damping.factors | {"factor_dt": scene.damping.factor_dt}
     return content
 
 
@@ -159,7 +161,12 @@ def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: floa
     if scene.floor is not None:
         tables["floor"] = {"rest_speed": speed * scene.floor.rest_speed}
     if scene.damping is not None:
-        tables["damping"] = {"linear": scene.damping.linear / time, "angular": scene.damping.angular / time}
+        step = scene.damping.factor_dt
+        tables["damping"] = {
+            "linear": scene.damping.linear / time,
+            "angular": scene.damping.angular / time,
+            "factor_dt": step and time * step,
+        }
     return changed(scene, time * scene.duration, **tables)
 
 

@@ -173,9 +173,15 @@ def _last_good_row(rows: Array) -> int:
 
 
 def set_damping(model: Any, scene: Scenario) -> None:
-    """Give each body of a compiled model the scene's damping."""
+    """Give each body of a compiled model the scene's damping.
+
+    All integrators but RK4 divide a velocity by 1 + d dt for a damper d; the d of factors of a step is such that it is the scene's decay.
+    """
     if scene.damping is not None:
-        rates = np.repeat([scene.damping.linear * scene.body.mass, scene.damping.angular], 3)
+        linear, angular = scene.damping.rates.values()
+        if scene.damping.factors and model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+            linear, angular = np.expm1(model.opt.timestep * np.array([linear, angular])) / model.opt.timestep
+        rates = np.repeat([linear * scene.body.mass, angular], 3)
         rates[3:] *= np.diag(scene.body.inertia_tensor)
         model.dof_damping[:] = np.outer(model.body_mass[model.body_mass > 0.0] / scene.body.mass, rates).ravel()
 

@@ -160,7 +160,7 @@ class PyBullet(Engine):
         damping keeps Bullet's default of 0.04.
         """
         floor, damping = scene.floor, scene.damping
-        rates = {f"{motion}Damping": rate for motion, rate in damping.model_dump().items()} if damping else {}
+        rates = {f"{motion}Damping": rate for motion, rate in damping.rates.items()} if damping else {}
         found = {"restitution": floor.restitution, "lateralFriction": friction_of(floor, STRONGEST_FRICTION)} if floor else {}
         if self.is_default:
             return found | rates

@@ -55,7 +55,7 @@ class RapierJSSimulation(Simulation):
 
     def __init__(self, scene: Scenario, dt: float, options: Mapping[str, str]) -> None:
         parameters: dict[str, float] = {"dt": dt}
-        decay = scene.damping.model_dump() if scene.damping else {}
+        decay = scene.damping.rates if scene.damping else {}
         calibrated = options["profile"] == "calibrated"
         if calibrated:
             parameters |= {name: value for name, (value, _) in PARAMETERS.items()}

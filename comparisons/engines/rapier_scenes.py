@@ -30,7 +30,7 @@ def refusal(scene: Scenario, kind: str) -> str | None:
 
 def damping_of(scene: Scenario, dt: float) -> dict[str, float]:
     """Rapier's coefficients of the damping of `linear` and `angular` velocities [1/s]; empty without damping."""
-    return {motion: float(np.expm1(rate * dt)) / dt for motion, rate in scene.damping.model_dump().items()} if scene.damping else {}
+    return {motion: float(np.expm1(rate * dt)) / dt for motion, rate in scene.damping.rates.items()} if scene.damping else {}
 
 
 def surface_of(scene: Scenario) -> dict[str, float]:

@@ -1,13 +1,15 @@
 """The engine `wang`: the reference implementation of Wang's lecture note, and of the methods beside it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dropspin import reference_impl
-from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, Simulation
+from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, KnownLimitation, Simulation
 from dropspin.comparisons.engines.mapping import may_tumble
 from dropspin.comparisons.engines.packages import version
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
@@ -42,7 +44,9 @@ class Wang(Engine):
         return reference_impl.Methods(**{name: self.option(name) for name in self.choices})
 
     def order_in(self, scene: Scenario) -> float | None:
-        """The lowest order among the methods that the scene needs; None if one of them claims none, as all contacts do."""
+        """The lowest order among the methods that the scene needs; None if one claims none, as contacts do, and factors of a step."""
+        if scene.damping is not None and scene.damping.factors:
+            return None
         return self.methods().order(gravity=scene.gravity is not None, damping=scene.damping is not None, floor=scene.floor is not None)
 
     def discretisation(self, scene: Scenario) -> str | None:
@@ -79,9 +83,10 @@ class WangSimulation(Simulation):
 
     def __init__(self, scene: Scenario, dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt
-        self._body, self._world = reference_body(scene.body), reference_world(scene)
+        self._body, self._world = reference_body(scene.body), reference_world(scene, dt)
         self._simulator = reference_impl.Simulator(self._body, self._world, dt, methods)
         self._state, self._steps = scene.initial_state, 0
+        self.known_limitations = self._limitations = _limitations_met(scene, dt)
         self.settings = {"version": version("dropspin"), "numba": version("numba"), **asdict(methods)}
 
     def advance(self, steps: int) -> None:
@@ -95,7 +100,10 @@ class WangSimulation(Simulation):
         self._state = rows[-1].copy()
         self._steps += steps
         if self._simulator.unsolved_steps:
-            self.known_limitations = [f"the contact was not solved in {self._simulator.unsolved_steps} of {self._steps} steps"]
+            self.known_limitations = [
+                *self._limitations,
+                f"the contact was not solved in {self._simulator.unsolved_steps} of {self._steps} steps",
+            ]
         return rows
 
     def as_built(self) -> AsBuilt:
@@ -109,11 +117,11 @@ class WangBatch(BatchSimulation):
     def __init__(self, members: Sequence[Scenario], dt: float, methods: reference_impl.Methods) -> None:
         self.velocity_lag = 0.5 * dt
         if differ_in_start_alone(members):
-            body, world = reference_body(members[0].body), reference_world(members[0])
+            body, world = reference_body(members[0].body), reference_world(members[0], dt)
         else:
-            body, world = reference_bodies([member.body for member in members]), _reference_worlds(members)
+            body, world = reference_bodies([member.body for member in members]), _reference_worlds(members, dt)
         self._simulator = reference_impl.Simulator(body, world, dt, methods)
-        self._states = initial_states(members)
+        self._states, self._dt = initial_states(members), dt
 
     def advance(self, steps: int) -> None:
         self.record(steps, max(steps, 1))
@@ -125,6 +133,9 @@ class WangBatch(BatchSimulation):
         rows = self._simulator.run(self._states, steps, every)
         self._states = rows[:, -1].copy()
         return rows
+
+    def limitations_of(self, scene: Scenario, states: Array) -> Sequence[str | KnownLimitation]:
+        return _limitations_met(scene, self._dt)
 
 
 def reference_body(body: Body) -> reference_impl.Body:
@@ -153,19 +164,30 @@ def _inertia(body: Body) -> Array:
     return reference_impl.vertex_inertia(body.vertices, share)
 
 
-def reference_world(scene: Scenario) -> reference_impl.World:
-    """A scene's gravity, floor and damping in the form that the reference implementation takes."""
-    floor = scene.floor
+def _limitations_met(scene: Scenario, dt: float) -> list[str | KnownLimitation]:
+    """That factors of a step act in steps of another size, as Algorithm 1 has it."""
+    meant = dt if scene.damping is None else scene.damping.factor_dt or dt
+    if math.isclose(meant, dt, rel_tol=1e-9):
+        return []
+    return [
+        f"Algorithm 1 applies the factors of damping in each step: they are meant at {meant:g} s, and damp {meant / dt:.3g} times as much"
+    ]
+
+
+def reference_world(scene: Scenario, dt: ArrayLike) -> reference_impl.World:
+    """A scene's gravity, floor and damping in the form that the reference implementation takes, for time steps [s]."""
+    floor, damping = scene.floor, scene.damping
+    share = 1.0 if damping is None or damping.factor_dt is None else damping.factor_dt / np.asarray(dt)
     return reference_impl.World(
         gravity=None if scene.gravity is None else scene.acceleration,
         floor=None if floor is None else reference_impl.Floor(floor.restitution, floor.coefficient, floor.rest_speed),
-        damping=None if scene.damping is None else (scene.damping.linear, scene.damping.angular),
+        damping=None if damping is None else (share * damping.linear, share * damping.angular),
     )
 
 
-def _reference_worlds(scenes: Sequence[Scenario]) -> reference_impl.World:
+def _reference_worlds(scenes: Sequence[Scenario], dt: float) -> reference_impl.World:
     """The same of scenes of one structure, with a row for each scene."""
-    worlds = [reference_world(scene) for scene in scenes]
+    worlds = [reference_world(scene, dt) for scene in scenes]
     gravity, floor, damping = ([getattr(world, part.name) for world in worlds] for part in fields(reference_impl.World))
     return reference_impl.World(
         gravity=None if gravity[0] is None else np.array(gravity),

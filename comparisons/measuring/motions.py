@@ -36,6 +36,7 @@ class Setup:
         clearance: Height of the lowest point above the floor at the start [m], shape (...).
         gravity: Acceleration of gravity [m/s²], shape (..., 3).
         damping: Decay rate of the velocity [1/s], shape (...); None if damping is not modelled.
+        factor_dt: Time step that the factors of damping are meant at, which a step of another size may apply too [s]; 0 for rates.
         floor: Whether there is a floor.
     """
 
@@ -48,6 +49,7 @@ class Setup:
     clearance: Array
     gravity: Array
     damping: Array | None
+    factor_dt: float
     floor: bool
 
     @classmethod
@@ -64,6 +66,7 @@ class Setup:
             clearance=np.asarray(scene.clearance),
             gravity=scene.acceleration,
             damping=None if scene.damping is None else np.asarray(scene.damping.linear),
+            factor_dt=0.0 if scene.damping is None else scene.damping.factor_dt or 0.0,
             floor=scene.floor is not None,
         )
 
@@ -99,8 +102,8 @@ class Setup:
         return np.sqrt(scalar_product((x, y, z), (x, y, z)))
 
     def damping_share(self, dt: Array) -> Array:
-        """The share of the velocity that a body loses by damping in a step, shape (...)."""
-        return np.zeros_like(dt) if self.damping is None else dt * self.damping
+        """The largest share of the velocity that a body loses by damping in a step, shape (...)."""
+        return np.zeros_like(dt) if self.damping is None else np.maximum(dt, self.factor_dt) * self.damping
 
 
 @dataclass(frozen=True, eq=False)

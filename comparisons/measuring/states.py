@@ -88,7 +88,8 @@ class States:
         """For each step, whether the velocity changes otherwise than by gravity and damping (`is_touching`), shape (n - 1,)."""
         dt, gravity, damping = float(self.motion.t[1] - self.motion.t[0]), tuple(self.scene.acceleration), self.scene.damping
         before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
-        strength, damping_share = float(np.sqrt(scalar_product(gravity, gravity))), 0.0 if damping is None else dt * damping.linear
+        strength = float(np.sqrt(scalar_product(gravity, gravity)))
+        damping_share = 0.0 if damping is None else max(dt, damping.factor_dt or 0.0) * damping.linear
         found: Mask = is_touching(before, after, dt, gravity, strength, damping_share)
         return found
 

@@ -25,7 +25,7 @@ from dropspin.comparisons.sweeps.outcomes import Outcomes, not_run, requested_me
 from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.ensemble import clearances, spread_starts
-from dropspin.scenarios.model import TOUCHING, unit
+from dropspin.scenarios.model import MOTIONS, TOUCHING, unit
 from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP
 from dropspin.scenarios.variations import Path, path_of, set_field, with_fields
 
@@ -135,14 +135,14 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
     if jobs.seeds is not None:
         assert scene.ensemble is not None
         starts = spread_starts(starts, scene.ensemble, jobs.seeds, vertices, semi_axes, scene.floor is not None)
-    world = reference_world(scene)
+    world = reference_world(scene, jobs.dts)
     if world.gravity is not None:
         world = replace(world, gravity=vectors("gravity", "acceleration", otherwise=world.gravity))
     if world.floor is not None:
         floor = (column("floor", name, otherwise=value) for name, value in world.floor._asdict().items())
         world = replace(world, floor=reference_impl.Floor(*floor))
     if world.damping is not None:
-        linear, angular = (column("damping", name, otherwise=getattr(scene.damping, name)) for name in ("linear", "angular"))
+        linear, angular = (column("damping", name, otherwise=rate) for name, rate in zip(MOTIONS, world.damping, strict=True))
         world = replace(world, damping=(linear, angular))
     setup = Setup(
         mass=np.array([body.mass for body in bodies]),
@@ -154,6 +154,7 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
         clearance=clearances(starts, vertices, semi_axes),
         gravity=np.zeros((1, 3)) if world.gravity is None else world.gravity,
         damping=None if world.damping is None else np.asarray(world.damping[0]),
+        factor_dt=0.0 if scene.damping is None else scene.damping.factor_dt or 0.0,
         floor=scene.floor is not None,
     )
     if scene.floor is not None:  # a start nearer to the limit is left to the scene's own check

@@ -15,7 +15,11 @@ def modelled(scene: Scenario) -> list[str]:
         grip = {"none": "no friction", "infinite": "infinite friction"}.get(str(friction), f"friction {friction}")
         parts.append(f"a floor of restitution {scene.floor.restitution:g} and {grip}")
     if scene.damping is not None:
-        parts.append(f"linear damping of {scene.damping.linear:g} and angular damping of {scene.damping.angular:g} per second")
+        linear, angular = scene.damping.rates.values()
+        parts.append(f"linear damping of {linear:g} and angular damping of {angular:g} per second")
+    if scene.damping is not None and scene.damping.factors:
+        linear, angular = scene.damping.factors.values()
+        parts[-1] += f", by factors of {linear:g} and {angular:g} per step of {scene.damping.factor_dt:g} s"
     if scene.ensemble is not None:
         parts.append(f"{scene.ensemble.size} starts drawn around the scene's own")
     return parts

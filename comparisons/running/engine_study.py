@@ -115,7 +115,7 @@ class EngineStudy:
             yield from (timed.remark("limited", limitation.message) for limitation in run.limitations if not limitation.is_minor)
             for name, point in points.items():
                 metric = METRICS[name]
-                judgement = judge(scene, truth, _claim([run]), metric, point, causes.get(name))
+                judgement = judge(scene, truth, _claim(run), metric, point, causes.get(name))
                 yield timed.measurement(metric.kind, name, metric.unit, judgement, truths[metric.kind])
             if truth is None:
                 yield timed.remark("no_truth", "no closed form is known for this scene")
@@ -129,8 +129,12 @@ class EngineStudy:
 
     @cached_property
     def claim(self) -> Claim:
-        """The properties that the engine declares, and the limitations that it met at any time step."""
-        return _claim([outcome.run for outcome in self.outcomes if outcome.run.motion is not None])
+        """The properties that the engine declares, and the limitations that it met at its finest time step.
+
+        A limitation that it met at coarser ones alone vanishes with the time step, and explains no error that does not.
+        """
+        moved = [outcome for outcome in self.outcomes if outcome.run.motion is not None]
+        return _claim(min(moved, key=lambda outcome: outcome.case.dt).run)
 
     @cached_property
     def series(self) -> Mapping[str, list[SeriesPoint]]:
@@ -220,10 +224,9 @@ class EngineStudy:
         return engine.options == {**calibrated.options, "profile": "default"}
 
 
-def _claim(runs: Sequence[EngineRun]) -> Claim:
-    """The properties that an engine declares, and the limitations that it met in some runs."""
-    last = runs[-1]
-    return Claim(last.label, last.order, last.precision, tuple(limitation for run in runs for limitation in run.limitations))
+def _claim(run: EngineRun) -> Claim:
+    """The properties that an engine declares, and the limitations that it met in a run."""
+    return Claim(run.label, run.order, run.precision, tuple(run.limitations))
 
 
 def _short(value: str) -> str:

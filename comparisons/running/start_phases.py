@@ -20,6 +20,8 @@ from dropspin.comparisons.running.engine_run import EngineRun
 from dropspin.scenarios import Scenario, Trajectory, Truth
 
 START_PHASES, QUICK_START_PHASES = 32, 8
+MOST_ROWS = 400_000
+"""Steps from all start phases together, unless a single start takes more: their motions and what is computed of them take a gigabyte."""
 REST_SHARE = 0.1
 """A scene whose impacts are over in this share of its duration is about rest, not about impacts."""
 QUICK_NOISE = 2.0
@@ -47,11 +49,14 @@ class StartPhase(NamedTuple):
 
 
 def number_of_phases(own: StartPhase, dt: float) -> int:
-    """The number of start phases: 1 if no impact comes after the first step [s], or if all are over in a tenth of the duration."""
+    """The number of start phases: 1 if no impact comes after the first step [s], or if all are over in a tenth of the duration.
+
+    Long scenes have fewer, so that they fit into memory.
+    """
     scene, truth, quick, *_ = own
     if truth is None or not truth.events or truth.events[0].time <= dt or truth.events[-1].time < REST_SHARE * scene.duration:
         return 1
-    return QUICK_START_PHASES if quick else START_PHASES
+    return max(1, min(QUICK_START_PHASES if quick else START_PHASES, MOST_ROWS // scene.steps(dt)))
 
 
 def start_phases(scene: Scenario, truth: Truth | None, dt: float, *, quick: bool = False) -> list[StartPhase]:

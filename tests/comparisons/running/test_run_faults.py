@@ -75,6 +75,23 @@ def test_one_per_cent_of_restitution_is_caught():
     assert {"bounce_height_error", "energy_error"} <= set(failed["metric"])
 
 
+@pytest.mark.parametrize(("above", "verdict"), [(2e-3, "failed"), (0.0, "limited")])
+def test_limitation_met_at_coarse_time_steps_alone_explains_no_model_error(above, verdict):
+    """An engine shifted by 1 mm, with a limitation that explains 1 cm and that it meets at time steps larger than `above`."""
+
+    class Shifted(made.Exact):
+        name = "shifted"
+
+        def prepare(self, scene, dt):
+            simulation = made.ExactSimulation(scene, dt, lambda state, time: state + 1e-3 * np.eye(13)[0])
+            simulation.known_limitations = [ds.KnownLimitation("coarse", {"position_error": 0.01})] if dt > above else []
+            return simulation
+
+    table = ds.run("fall-spin", Shifted(), [4e-3, 2e-3, 1e-3]).table
+    [row] = table[(table["kind"] == "asymptotic_error") & (table["metric"] == "position_error")].to_dict("records")
+    assert (row["cause"], row["verdict"]) == ("model", verdict)
+
+
 @pytest.mark.parametrize("package", ["mujoco", "pybullet"])
 def test_missing_engine_costs_its_row_and_fails_only_if_named(package, monkeypatch):
     """Its row says how to install it, and the rest runs."""

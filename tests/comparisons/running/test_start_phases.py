@@ -6,7 +6,7 @@ import pytest
 import dropspin as ds
 from dropspin.comparisons.measuring.batch import AT_ONCE, compute_states
 from dropspin.comparisons.measuring.states import States
-from dropspin.comparisons.running.start_phases import StartPhase, phases_at
+from dropspin.comparisons.running.start_phases import MOST_ROWS, START_PHASES, StartPhase, number_of_phases, phases_at
 
 DT = 4e-3
 SCENES = ("drop-box-flat", "spin-asymmetric", "roll-prism", "slide-box")
@@ -51,3 +51,12 @@ def test_quantities_of_all_motions_at_once_are_those_of_each(name):
         assert not np.isinf(together.lowest_height[alone.lowest_height <= 0.0]).any()
     motions[-1].position[0] = np.nan
     assert not set(AT_ONCE) & vars(states_at_once(scenes, motions)[-1]).keys()
+
+
+def test_long_scenes_have_fewer_start_phases():
+    """All steps together stay within `MOST_ROWS`, unless a single start takes more."""
+    scene = ds.load("drop-ball-lively")
+    counts = {dt: number_of_phases(StartPhase(scene, ds.truth_for(scene)), dt) for dt in (1e-3, 1e-4, 2e-6)}
+    assert (counts[1e-3], counts[2e-6]) == (START_PHASES, 1)
+    assert 1 < counts[1e-4] < START_PHASES
+    assert counts[1e-4] * scene.steps(1e-4) <= MOST_ROWS

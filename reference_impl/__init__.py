@@ -6,6 +6,7 @@ This package imports no code of scenes or engines. README.md in this folder list
 from dropspin.reference_impl import sources  # noqa: F401  # isort: skip  # before anything that is compiled from them
 from dropspin.reference_impl.body import Body as Body
 from dropspin.reference_impl.body import Floor as Floor
+from dropspin.reference_impl.body import Wall as Wall
 from dropspin.reference_impl.body import World as World
 from dropspin.reference_impl.inertia import solid_box_inertia as solid_box_inertia
 from dropspin.reference_impl.inertia import solid_sphere_inertia as solid_sphere_inertia

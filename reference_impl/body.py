@@ -1,7 +1,7 @@
 """The body and the world that acts on it: the public description, and the form that the kernels use."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,7 @@ class Body:
 
 
 class Floor(NamedTuple):
-    """Contact parameters of the floor y = 0. Each is a number or of shape (B,)."""
+    """The floor y = 0, or the surface of a wall. Each number may also be of shape (B,)."""
 
     restitution: float | Array
     """Separation speed over approach speed: µ in the lecture note, e elsewhere."""
@@ -40,6 +40,21 @@ class Floor(NamedTuple):
     """Coulomb's coefficient: 0 for a frictionless floor (eq 15), infinity for sticking (eq 17)."""
     rest_speed: float | Array = 0.0
     """Normal speed [m/s] below which restitution is 0 (section 3.2); 0 disables this rule."""
+    half_extents: Any = None
+    """Largest |x| and |z| of a point that the floor carries [m], shape (2,) or (B, 2). None: no limit."""
+    thickness: Any = None
+    """Depth down to which the floor carries a point [m]. None: no limit."""
+
+
+class Wall(NamedTuple):
+    """A plane other than the floor."""
+
+    point: Array
+    """A point of the plane [m], shape (3,) or (B, 3)."""
+    normal: Array
+    """Unit vector into the space that the body can be in, shape (3,) or (B, 3)."""
+    surface: Floor
+    """Restitution, friction and rest speed; a wall has no end."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +66,13 @@ class World:
         floor: The floor y = 0.
         damping: Decay rates of velocity and angular velocity [1/s], each a number or of shape (B,); the factors of Algorithm 1 are
             c = exp(-rate dt).
+        walls: Other planes, which act after the floor, in this order.
     """
 
     gravity: Array | None = None
     floor: Floor | None = None
     damping: tuple[float | Array, float | Array] | None = None
+    walls: tuple[Wall, ...] = ()
 
 
 class KernelBody(NamedTuple):
@@ -77,6 +94,18 @@ class KernelBody(NamedTuple):
     """Of the ellipsoid about each vertex [m]; None if it is a ball."""
     has_rims: bool
     """Whether this ellipsoid is a disc across y, so that a rim is about each vertex."""
+
+
+class KernelWall(NamedTuple):
+    """A wall in the form that the kernels use."""
+
+    frame: Mat3
+    """The rotation that takes the normal to the y axis."""
+    turn: Quat
+    """The same rotation."""
+    distance: float
+    """Of the plane from the origin, along the normal [m]."""
+    surface: Floor
 
 
 class KernelDamping(NamedTuple):

@@ -21,6 +21,21 @@ def along_normal(a):
 
 
 @compiled
+def is_below(x, r, floor):
+    """Eq 10: whether the point at the offset r from the centre x is below the floor, and not beyond an end of it."""
+    return _is_below(x, r, floor.half_extents, floor.thickness)
+
+
+@compiled
+def _is_below(x, r, half_extents, thickness):
+    height = x.y + along_normal(r)
+    if half_extents is None:
+        return height < 0.0
+    within = (abs(x.x + r.x) <= half_extents[0]) & (abs(x.z + r.z) <= half_extents[1])
+    return (height < 0.0) & (height >= -thickness) & within
+
+
+@compiled
 def contact_count(body):
     """The number of points at which the body can touch the floor."""
     return body.points.shape[0] * (RIM_POINTS if body.has_rims else 1)

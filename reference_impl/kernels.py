@@ -29,6 +29,7 @@ from dropspin.reference_impl.parameters import (
     read_body,
     read_damping,
     read_floor,
+    read_floor_with_edges,
     read_gravity,
     read_nothing,
     read_quaternion,
@@ -55,6 +56,8 @@ class Parts:
     turning: bool
     ellipsoids: bool = False
     rims: bool = False
+    edges: bool = False
+    walls: int = 0
 
 
 @cache
@@ -65,12 +68,13 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
     """
     gravity_of = read_gravity if parts.gravity else read_nothing
     damping_of = read_damping if parts.damping else read_nothing
-    floor_of = read_floor if parts.floor else read_nothing
+    floor_of = (read_floor_with_edges if parts.edges else read_floor) if parts.floor else read_nothing
     turn = ROTATIONS[methods.rotation].turn if parts.turning else None
     law = LAWS[methods.law].impulse
     collide = COLLIDE[methods.contact][methods.law]
     correction = CORRECTIONS[methods.correction]
     correct = None if correction is None else correction.correct
+    walls_of, wall_count = _walls_of if parts.walls else _no_walls, parts.walls
     load, rows_of, record = (_load, _rows_of, _record) if width == 1 else (lanes.load, lanes.rows_of, lanes.record)
     forces_of = rows_of if parts.forces else _no_forces
     semi_axes_of, has_rims = read_semi_axes if parts.ellipsoids else read_nothing, parts.rims
@@ -84,6 +88,7 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
             gravity = gravity_of(load, columns, own)
             damping = damping_of(load, columns, own)
             floor = floor_of(load, columns, own)
+            walls = walls_of(load, columns, own, wall_count)
             on_vertices = forces_of(forces, block)
             x = read_vector(load, states, block, 0)
             q = read_quaternion(load, states, block, 3)
@@ -92,12 +97,25 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
             record(recorded, block, 0, x, q, v, w)
             for row in range(1, recorded.shape[1]):
                 for _ in range(every):
-                    x, q, v, w, converged = advance(x, q, v, w, dt, body, gravity, on_vertices, damping, floor, turn, collide, law, correct)
+                    x, q, v, w, converged = advance(
+                        x, q, v, w, dt, body, gravity, on_vertices, damping, floor, walls, turn, collide, law, correct
+                    )
                     unsolved += not converged
                 record(recorded, block, row, x, q, v, w)
         return unsolved
 
     return compile_cached(fill)
+
+
+@compiled
+def _walls_of(load, columns, block, count):
+    """The walls of a block, which are read where they are used: the registers do not hold them."""
+    return load, columns, block, count
+
+
+@compiled
+def _no_walls(load, columns, block, count):
+    return None
 
 
 # A block of one body, whose numbers are floats.

@@ -1,13 +1,13 @@
 """Parameters that may differ from body to body. They are checked and packed into rows of numbers, which the kernels read."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dropspin.reference_impl.body import Body, Floor, KernelBody, KernelDamping, World
+from dropspin.reference_impl.body import Body, Floor, KernelBody, KernelDamping, KernelWall, Wall, World
 from dropspin.reference_impl.quaternion import from_matrix
 from dropspin.reference_impl.vectors import Mat3, Quat, Vec3, compiled
 
@@ -16,14 +16,14 @@ Test = Callable[[Array], NDArray[np.bool_]]
 
 # The first column of each quantity: `pack` writes them in this order, the functions at the end of this file read them.
 STEP_SIZE, GRAVITY, DAMPING, FLOOR, MASS, INERTIA, INVERSE_INERTIA, MOMENTS, AXES, SEMI_AXES, REACH = 0, 1, 4, 6, 9, 10, 19, 28, 31, 35, 38
-FRICTION = FLOOR + 1
+EDGES, WALLS, WALL_COLUMNS = 39, 42, 17
 
 
 class Parameters(NamedTuple):
     """Bodies in their worlds with their time steps: one row for all, or one for each."""
 
     columns: Array
-    """Shape (1, 39) or (B, 39)."""
+    """Shape (1, 42 + 17 n) or (B, 42 + 17 n) with n walls."""
     points: Array
     """Vertices [m], shape (1, n, 3) or (B, n, 3)."""
     is_ensemble: bool
@@ -60,7 +60,14 @@ def pack(body: Body, world: World, dt: float | Array) -> Parameters:
         axes,
         given["semi_axes"],
         reach,
+        given["half_extents"],
+        given["thickness"],
     ]
+    for name in _walls(world):
+        frames = _frames(given[f"{name}normal"])
+        in_order += [given[f"{name}restitution"], given[f"{name}friction"], given[f"{name}rest_speed"], frames]
+        in_order += [np.array([from_matrix(_matrix(frame)) for frame in frames])]
+        in_order += [np.sum(given[f"{name}normal"] * given[f"{name}point"], axis=1)]
     columns = np.concatenate([np.broadcast_to(part.reshape(len(part), -1), (size, part[0].size)) for part in in_order], axis=1)
     return Parameters(columns, points, is_ensemble)
 
@@ -72,6 +79,11 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
     if world.damping is not None and len(world.damping) != 2:
         raise ValueError(f"damping: got {world.damping!r}; must be two rates, of velocity and of angular velocity, in 1/s")
     linear, angular = world.damping or (0.0, 0.0)
+    walls: dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]] = {}
+    for name, wall in _walls(world).items():
+        walls |= _surface(name, wall.surface)
+        walls[f"{name}point"] = (wall.point, (3,), "finite numbers, in m", is_finite)
+        walls[f"{name}normal"] = (wall.normal, (3,), "a vector of length 1", _is_unit)
     points = _numbers("points", body.points, "finite numbers, in m")
     vertices = max((1, *points.shape[-2:-1]))
     return {
@@ -79,14 +91,34 @@ def _quantities(body: Body, world: World, dt: float | Array) -> dict[str, tuple[
         "gravity": (gravity, (3,), "finite numbers, in m/s²", is_finite),
         "linear damping": (linear, (), "0 or more, in 1/s", _is_not_negative),
         "angular damping": (angular, (), "0 or more, in 1/s", _is_not_negative),
-        "restitution": (floor.restitution, (), "between 0 and 1", lambda e: (e >= 0.0) & (e <= 1.0)),
-        "friction": (floor.friction, (), "0 or more", lambda f: f >= 0.0),
-        "rest_speed": (floor.rest_speed, (), "0 or more, in m/s", _is_not_negative),
+        **_surface("", floor),
+        "half_extents": ((np.inf, np.inf) if floor.half_extents is None else floor.half_extents, (2,), "above 0, in m", _are_above_zero),
+        "thickness": (np.inf if floor.thickness is None else floor.thickness, (), "above 0, in m", lambda depth: depth > 0.0),
         "mass": (body.mass, (), "a number above 0, in kg", _is_above_zero),
         "inertia": (body.inertia, (3, 3), "a symmetric, positive definite 3 x 3 matrix, in kg m²", _is_inertia),
         "points": (points, (vertices, 3), "finite numbers, in m, for at least one vertex", is_finite),
         "semi_axes": (body.semi_axes, (3,), "0 or more, in m, of a disc 0 along y", _is_ellipsoid),
+        **walls,
     }
+
+
+def _walls(world: World) -> dict[str, Wall]:
+    """The walls by the beginning of the names of their quantities."""
+    return {f"walls[{number}].": wall for number, wall in enumerate(world.walls)}
+
+
+def _surface(name: str, surface: Floor) -> dict[str, tuple[ArrayLike, tuple[int, ...], str, Test]]:
+    return {
+        f"{name}restitution": (surface.restitution, (), "between 0 and 1", lambda e: (e >= 0.0) & (e <= 1.0)),
+        f"{name}friction": (surface.friction, (), "0 or more", lambda f: f >= 0.0),
+        f"{name}rest_speed": (surface.rest_speed, (), "0 or more, in m/s", _is_not_negative),
+    }
+
+
+def frictions(world: World) -> Iterator[Array]:
+    """The coefficients of friction of the floor and of the walls."""
+    surfaces = [*([world.floor] if world.floor else []), *(wall.surface for wall in world.walls)]
+    return (np.asarray(surface.friction, dtype=float) for surface in surfaces)
 
 
 def is_finite(values: Array) -> NDArray[np.bool_]:
@@ -96,6 +128,14 @@ def is_finite(values: Array) -> NDArray[np.bool_]:
 
 def _is_above_zero(values: Array) -> NDArray[np.bool_]:
     return is_finite(values) & (values > 0.0)
+
+
+def _are_above_zero(values: Array) -> NDArray[np.bool_]:
+    return np.all(values > 0.0, axis=1)
+
+
+def _is_unit(vectors: Array) -> NDArray[np.bool_]:
+    return np.abs(np.sum(vectors * vectors, axis=1) - 1.0) < 1e-12
 
 
 def _is_not_negative(values: Array) -> NDArray[np.bool_]:
@@ -185,7 +225,22 @@ def _principal_of_one(inertia: Array) -> tuple[Array, Quat]:
     odd = int(np.argmin(gaps))
     order = [(odd + 1) % 3, (odd + 2) % 3, odd]  # a cyclic permutation keeps the axes right-handed
     axes = axes[:, order] * np.linalg.det(axes)
-    return moments[order], from_matrix(Mat3(*(Vec3(*map(float, row)) for row in axes)))
+    return moments[order], from_matrix(_matrix(axes))
+
+
+def _matrix(rows: Array) -> Mat3:
+    return Mat3(*(Vec3(*map(float, row)) for row in rows.reshape(3, 3)))
+
+
+def _frames(normals: Array) -> Array:
+    """Rotations that take unit vectors, shape (B, 3), to the y axis, as matrices, shape (B, 9).
+
+    Source: J. F. Hughes & T. Möller, Building an orthonormal basis from a unit vector, J. Graphics Tools 4 (1999).
+    """
+    sign = np.where(normals[:, 1] < 0.0, -1.0, 1.0)  # the half turn about x comes first where 1 + y would lose digits
+    x, y, z = sign * normals.T
+    a, c, b = 1.0 - x * x / (1.0 + y), 1.0 - z * z / (1.0 + y), -x * z / (1.0 + y)
+    return np.stack([a, -x, b, *normals.T, sign * b, -sign * z, sign * c], axis=1)
 
 
 # Reading, by a `load(columns, block, column)` that returns a number, or the lanes of many bodies.
@@ -228,8 +283,33 @@ def read_damping(load, columns, block):
 
 @compiled
 def read_floor(load, columns, block):
-    """The floor."""
-    return Floor(load(columns, block, FLOOR), load(columns, block, FLOOR + 1), load(columns, block, FLOOR + 2))
+    """A floor without an end."""
+    return _read_surface(load, columns, block, FLOOR)
+
+
+@compiled
+def read_floor_with_edges(load, columns, block):
+    """A floor that ends."""
+    endless = _read_surface(load, columns, block, FLOOR)
+    half_extents = (load(columns, block, EDGES), load(columns, block, EDGES + 1))
+    return Floor(endless.restitution, endless.friction, endless.rest_speed, half_extents, load(columns, block, EDGES + 2))
+
+
+@compiled
+def read_wall(load, columns, block, number):
+    """One of the walls."""
+    first = WALLS + number * WALL_COLUMNS
+    return KernelWall(
+        _read_matrix(load, columns, block, first + 3),
+        read_quaternion(load, columns, block, first + 12),
+        load(columns, block, first + 16),
+        _read_surface(load, columns, block, first),
+    )
+
+
+@compiled
+def _read_surface(load, columns, block, first):
+    return Floor(load(columns, block, first), load(columns, block, first + 1), load(columns, block, first + 2), None, None)
 
 
 @compiled

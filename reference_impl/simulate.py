@@ -12,7 +12,7 @@ from dropspin.reference_impl import lanes
 from dropspin.reference_impl.body import Body, World
 from dropspin.reference_impl.kernels import Parts, blocks, config, recording_kernel
 from dropspin.reference_impl.methods import Methods
-from dropspin.reference_impl.parameters import FRICTION, SEMI_AXES, checked, ensemble_size, is_finite, pack
+from dropspin.reference_impl.parameters import SEMI_AXES, checked, ensemble_size, frictions, is_finite, pack
 from dropspin.reference_impl.state import ORIENTATION, SPIN
 from dropspin.reference_impl.threads import share_out
 
@@ -110,8 +110,8 @@ class Simulator:
     def __init__(self, body: Body, world: World, dt: float | Array, methods: Methods | None = None) -> None:
         self._methods = methods or Methods()
         self._parameters = pack(body, world, dt)
-        if world.floor is not None:
-            _assert_law_fits(self._methods, self._parameters.columns[:, FRICTION])
+        for friction in frictions(world):
+            _assert_law_fits(self._methods, friction)
         self._world = world
         semi_axes = self._parameters.columns[:, SEMI_AXES : SEMI_AXES + 3]
         self._surface = bool(np.ptp(semi_axes, axis=1).any()), bool(((semi_axes[:, 1] == 0.0) & semi_axes.any(axis=1)).any())
@@ -133,9 +133,9 @@ class Simulator:
             starts = np.broadcast_to(starts, (size, 13))
         turning = on_vertices is not None or not (self._can_fall_without_turning and _is_without_spin(starts, self._world))
         world = self._world
-        parts = Parts(
-            world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning, *self._surface
-        )
+        modelled = (world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning)
+        edges = world.floor is not None and not (world.floor.half_extents is None and world.floor.thickness is None)
+        parts = Parts(*modelled, *self._surface, edges, len(world.walls))
         width = lanes.WIDTH if size > 1 and self._methods.runs_in_lanes and not config.DISABLE_JIT else 1
         recorded = np.empty((size, 1 + steps // every, 13))
         if width not in self._packed:
@@ -190,7 +190,8 @@ def _can_fall_without_turning(body: Body, world: World) -> bool:
     """Whether the bodies are balls that rotate only if they do so initially or slide: there is no gravity along a floor with friction."""
     semi_axes = np.asarray(body.semi_axes)
     is_ball = np.all(semi_axes > 0.0) and not np.ptp(semi_axes, axis=-1).any() and not np.any(body.points)
-    return bool(is_ball and (not _grips(world) or world.gravity is None or not np.any(np.asarray(world.gravity)[..., [0, 2]])))
+    falls_straight = world.gravity is None or not np.any(np.asarray(world.gravity)[..., [0, 2]])
+    return bool(is_ball and (not _grips(world) or (falls_straight and not world.walls)))
 
 
 def _is_without_spin(states: Array, world: World) -> bool:
@@ -199,4 +200,4 @@ def _is_without_spin(states: Array, world: World) -> bool:
 
 
 def _grips(world: World) -> bool:
-    return world.floor is not None and bool(np.any(world.floor.friction))
+    return any(np.any(friction) for friction in frictions(world))

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from dropspin.scenarios.bodies.mesh_files import read_mesh
 from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
 from dropspin.scenarios.files import read_file
-from dropspin.scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start
+from dropspin.scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start, Wall
 from dropspin.scenarios.problems import scene_name
 from dropspin.scenarios.tables import LARGEST
 from dropspin.scenarios.validation import Alternatives, first_problem, shown
@@ -30,6 +30,7 @@ DEEPEST = 30
 """Largest depth of nested tables and lists in a file; a baseline has six."""
 FEATURES: dict[str, type[BaseModel]] = {
     "floor": Floor,
+    "wall": Wall,
     "gravity": Gravity,
     "start": Start,
     "damping": Damping,
@@ -39,6 +40,8 @@ FEATURES: dict[str, type[BaseModel]] = {
 ALTERNATIVES: Alternatives = {
     ("floor.friction", "literal_error"): ", or a Coulomb coefficient of 0 or more",
     ("floor.friction", "*"): ", or be 'none' or 'infinite'",
+    ("wall.friction", "literal_error"): ", or a Coulomb coefficient of 0 or more",
+    ("wall.friction", "*"): ", or be 'none' or 'infinite'",
     ("body.inertia", "*"): ", or three positive moments [Ixx, Iyy, Izz], or a tensor of three such rows",
 }
 

@@ -10,8 +10,8 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.surface import depth_below_centre
-from dropspin.scenarios.rotations import rotate
-from dropspin.scenarios.state import PARTS, Array
+from dropspin.scenarios.rotations import rotate, turned_states
+from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, Array
 from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector
 from dropspin.scenarios.text import Prose, Text, joined, verify_line
 
@@ -19,14 +19,14 @@ TOUCHING = 1e-9
 """Height above the floor, relative to the size of the body, up to which the body counts as touching the floor."""
 
 
-def unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
-    """The quaternion normalised to length 1; a quaternion whose length is 1 up to rounding is returned unchanged."""
-    length = math.hypot(*quaternion)
+def unit(vector: tuple[float, ...]) -> tuple[float, ...]:
+    """The vector or quaternion normalised to length 1; one whose length is 1 up to rounding is returned unchanged."""
+    length = math.hypot(*vector)
     if length == 0.0:
-        raise ValueError("must not be the zero quaternion")
+        raise ValueError("must not be all zeros")
     if abs(length - 1.0) < 4e-16:  # a saved scene loads with the same digits
-        return quaternion
-    return tuple(component / length for component in quaternion)
+        return vector
+    return tuple(component / length for component in vector)
 
 
 MOTIONS = ("linear", "angular")
@@ -49,8 +49,8 @@ class Gravity(Table):
     acceleration: Vector
 
 
-class Floor(Table):
-    """The plane y = 0, facing up.
+class Surface(Table):
+    """What the contacts of a floor or a wall depend on.
 
     `impact_law` is the model of an impact with a coefficient of friction: see `dropspin.scenarios.truths.friction_impact`.
     """
@@ -76,6 +76,37 @@ class Floor(Table):
         if self.impact_law != "cone" and isinstance(self.friction, str):
             raise ValueError(f"impact_law is {self.impact_law!r}, which needs a coefficient of friction; friction is {self.friction!r}")
         return self
+
+
+class Floor(Surface):
+    """The plane y = 0, facing up, or, with an end, the box below it: |x| and |z| up to `half_extents` [m], y down to -`thickness` [m]."""
+
+    half_extents: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=2)] | None = None
+    thickness: Positive | None = None
+
+    @property
+    def ends(self) -> bool:
+        """Whether a body can pass by the floor."""
+        return self.half_extents is not None or self.thickness is not None
+
+
+class Wall(Surface):
+    """The plane through a point [m], with a normal, of length 1, into the space that the body can be in."""
+
+    point: Vector
+    normal: Annotated[Vector, AfterValidator(unit)]
+
+    @property
+    def frame(self) -> Array:
+        """The rotation that takes the normal to the y axis, a quaternion, shape (4,)."""
+        x, y, z = self.normal
+        return np.array(unit((-z, 0.0, x, 1.0 + y))) if y > -1.0 else np.array([1.0, 0.0, 0.0, 0.0])
+
+    def as_floor(self, states: Array) -> Array:
+        """States, shape (..., 13), in the frame in which the wall is the plane y = 0, facing up."""
+        moved = states.copy()
+        moved[..., POSITION] -= self.point
+        return turned_states(moved, self.frame)
 
 
 class Damping(Table):
@@ -182,7 +213,8 @@ class Scenario(Table):
         body: Shape (`sphere`, `box` or `vertices`), size [m], mass [kg] and inertia [kg m²].
         start: Position [m], orientation, velocity [m/s] and angular velocity [rad/s] at t = 0, in the world frame.
         gravity: The acceleration of gravity [m/s²], or None.
-        floor: Restitution, friction and rest speed [m/s] of the plane y = 0, or None.
+        floor: Restitution, friction and rest speed [m/s] of the plane y = 0, and where it ends, or None.
+        wall: The other planes, each with a point, a normal, restitution, friction and rest speed, or None; only beside a floor.
         damping: Decay rates [1/s], or factors of a step, or None.
         ensemble: The distribution of the initial states of an ensemble, or None.
         expect: Bounds on metrics, each with a reason.
@@ -198,6 +230,7 @@ class Scenario(Table):
     start: Start = Start()
     gravity: Gravity | None = None
     floor: Floor | None = None
+    wall: tuple[Wall, ...] | None = None
     damping: Damping | None = None
     ensemble: Ensemble | None = None
     expect: tuple[Expectation, ...] = ()
@@ -207,6 +240,11 @@ class Scenario(Table):
     @classmethod
     def _is_joined(cls, given: object) -> object:
         return joined(given)
+
+    @field_validator("wall")
+    @classmethod
+    def _no_wall_is_none(cls, given: tuple[Wall, ...] | None) -> tuple[Wall, ...] | None:
+        return given or None
 
     @field_validator("name", "summary", "source", "tags")
     @classmethod
@@ -224,9 +262,19 @@ class Scenario(Table):
 
     @model_validator(mode="after")
     def _starts_above_the_floor(self) -> Self:
-        if self.floor is not None and self.clearance < -TOUCHING * self.body.size:
-            start = list(self.start.position)
+        start, size = list(self.start.position), self.body.size
+        if self.wall is not None and self.floor is None:
+            raise ValueError("wall: needs a [floor], which may be far below the body")
+        if self.floor is not None and self.clearance < -TOUCHING * size and not self._starts_beside_the_floor:
             raise ValueError(f"start.position: got {start}; there the body is {-self.clearance:.3g} m below the floor; increase its height")
+        room = size if self.ensemble else 0.0  # a member may have any orientation
+        for number, wall in enumerate(self.wall or ()):
+            distance = self.height_above(wall) - 2.0 * room
+            if distance < -TOUCHING * size:
+                text = f"{-distance:.3g} m behind wall[{number}]" if not room else f"too near to wall[{number}] for an ensemble"
+                raise ValueError(
+                    f"start.position: got {start}; there the body is {text}; move it along the wall's normal {list(wall.normal)}"
+                )
         return self
 
     @property
@@ -238,9 +286,34 @@ class Scenario(Table):
     @property
     def clearance(self) -> float:
         """Height of the body's lowest point at the start [m]."""
-        orientation = np.array(self.start.orientation)
+        return self._lowest(self.initial_state)
+
+    def height_above(self, wall: Wall) -> float:
+        """Distance of the body from a wall at the start [m]."""
+        return self._lowest(wall.as_floor(self.initial_state))
+
+    def _lowest(self, state: Array) -> float:
+        orientation = state[ORIENTATION]
         heights, depth = rotate(orientation, self.body.vertices)[:, 1], depth_below_centre(orientation, self.body.semi_axes)
-        return self.start.position[1] + float(heights.min()) - float(depth)
+        return float(state[1]) + float(heights.min()) - float(depth)
+
+    @property
+    def _starts_beside_the_floor(self) -> bool:
+        """Whether the body is beyond the edges of the floor, or below it, at the start."""
+        assert self.floor is not None
+        (x, y, z), size = self.start.position, self.body.size
+        beyond = any(abs(at) >= end + size for at, end in zip((x, z), self.floor.half_extents or (), strict=False))
+        return beyond or (self.floor.thickness is not None and y + size <= -self.floor.thickness)
+
+    @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The floor and the walls, in the order in which Wang's method treats them."""
+        return () if self.floor is None else (self.floor, *(self.wall or ()))
+
+    @property
+    def has_edges_or_walls(self) -> bool:
+        """Whether there are walls, or a floor that ends."""
+        return self.wall is not None or (self.floor is not None and self.floor.ends)
 
     @property
     def starts_above_floor(self) -> bool:
@@ -276,8 +349,9 @@ class Scenario(Table):
     @property
     def structure(self) -> tuple[str | int | bool, ...]:
         """What is not a number of the scene: the kind of body, how many vertices, which tables there are, and the kind of friction."""
-        friction = "" if self.floor is None else self.floor.friction if isinstance(self.floor.friction, str) else "coefficient"
-        return self.body.shape, len(self.body.vertices), self.gravity is None, self.damping is None, friction
+        frictions = [one.friction if isinstance(one.friction, str) else "coefficient" for one in self.surfaces]
+        ends = self.floor is not None and self.floor.ends
+        return self.body.shape, len(self.body.vertices), self.gravity is None, self.damping is None, ends, *frictions
 
     def steps(self, dt: float) -> int:
         """Number of whole steps of dt [s] that fit into the duration."""
@@ -295,7 +369,9 @@ def differ_in_start_alone(scenes: Sequence[Scenario]) -> bool:
     tables = [scene.__dict__ for scene in scenes]  # reading four attributes of each takes twice as long
     own = tables[0]
     # `count` compares values only of what is not the same object; starts of one scene share its tables.
-    return all([table[name] for table in tables].count(own[name]) == len(tables) for name in ("body", "gravity", "floor", "damping"))
+    return all(
+        [table[name] for table in tables].count(own[name]) == len(tables) for name in ("body", "gravity", "floor", "wall", "damping")
+    )
 
 
 def initial_states(scenes: Sequence[Scenario]) -> Array:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropspin.scenarios.state import Array
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -48,6 +48,12 @@ def rotate(q: Array, vectors: Array) -> Array:
 def unrotate(q: Array, vectors: Array) -> Array:
     """World-frame vectors, shape (..., 3), in the body frame."""
     return rotate(conjugate(q), vectors)
+
+
+def turned_states(states: Array, rotation: Array) -> Array:
+    """States, shape (..., 13), turned about the origin by a rotation, a unit quaternion."""
+    parts = [rotate(rotation, states[..., part]) for part in (POSITION, VELOCITY, SPIN)]
+    return np.concatenate([parts[0], multiply(rotation, states[..., ORIENTATION]), *parts[1:]], axis=-1)
 
 
 def about(axis: Array, angle: Array) -> Array:

@@ -102,12 +102,14 @@ def _described(kind: type[BaseModel], problem: Problem, alternatives: Alternativ
         case "too_short" | "too_long" as fault:
             bound, count = problem["ctx"]["min_length" if fault == "too_short" else "max_length"], problem["ctx"]["actual_length"]
             return f"{prefix}got {given}; must have at {'least' if fault == 'too_short' else 'most'} {_items(bound)}, has {count}."
+        case "tuple_type" if isinstance(problem["input"], dict) and not root:
+            return f"{prefix}got {given}; must be a list of tables, each of which begins with [[{key}]]."
         case "model_type" | "model_attributes_type":
             example = f", such as [{key}] with its keys below" if key and not root else ""
             return f"{prefix}got {given}; must be a {'mapping' if root else 'table'}{example}."
     message = re.sub("a (tuple|array)", "a list", problem["msg"].replace("Input should", "must").replace("valid ", ""))
     message = message.replace(f"{Decimal(repr(LARGEST)):f}", f"{LARGEST:g}")  # pydantic writes all of its zeros
-    dotted = key_of(path)
+    dotted = ".".join(part for part in path if isinstance(part, str))
     return f"{prefix}got {given}; {message}{alternatives.get((dotted, problem['type']), alternatives.get((dotted, '*'), ''))}."
 
 

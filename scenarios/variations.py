@@ -5,7 +5,7 @@ By its tables and fields; one quantity with all that goes with it; and the same 
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -14,8 +14,8 @@ import numpy as np
 from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.errors import DropspinError, did_you_mean
 from dropspin.scenarios.loading import FEATURES, from_mapping, from_table
-from dropspin.scenarios.model import Scenario
-from dropspin.scenarios.rotations import conjugate, multiply, rotate
+from dropspin.scenarios.model import Scenario, Surface, Wall
+from dropspin.scenarios.rotations import conjugate, multiply, rotate, turned_states
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.validation import key_of
 
@@ -28,11 +28,11 @@ REFLECTED = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0,
 """The signs of a state that is mirrored at the plane x = 0; rotations and angular velocities are axial."""
 
 
-def changed(scene: Scenario, duration: float | None = None, **tables: Mapping[str, Any]) -> Scenario:
-    """The scene with some keys of some tables, or its duration, replaced, and without expectations and ensemble."""
+def changed(scene: Scenario, duration: float | None = None, **tables: Mapping[str, Any] | Sequence[Any] | None) -> Scenario:
+    """The scene with some keys of some tables, the walls, or its duration replaced, and without expectations and ensemble."""
     content = scene.model_dump(exclude={"expect", "ensemble"}, exclude_none=True)
     for table, keys in tables.items():
-        content[table] = {**content[table], **keys}
+        content[table] = {**content[table], **keys} if isinstance(keys, Mapping) else keys
     return from_mapping({**content, "duration": scene.duration if duration is None else duration})
 
 
@@ -46,6 +46,11 @@ def with_values(scene: Scenario, table: str, **values: Any) -> Scenario:
         return scene
     new = {key: value(getattr(old, key)) if callable(value) else value for key, value in values.items()}
     return scene.model_copy(update={table: type(old).model_validate(old.model_dump() | new)})
+
+
+def _walls(scene: Scenario, change: Callable[[Wall], Mapping[str, Any]]) -> list[dict[str, Any]] | None:
+    """The walls with some keys of each replaced; None if there are none."""
+    return None if scene.wall is None else [wall.model_dump() | dict(change(wall)) for wall in scene.wall]
 
 
 Path = tuple[str | int, ...]
@@ -148,7 +153,8 @@ def with_inertia_ratio(scene: Scenario, ratio: float) -> Scenario:
 def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Scenario:
     """The scene in other units; the arguments are a metre, a second and a kilogram in these units."""
     start, speed = scene.start, length / time
-    tables: dict[str, Mapping[str, Any]] = {
+    tables: dict[str, Mapping[str, Any] | Sequence[Any] | None] = {
+        "wall": _walls(scene, lambda wall: {"point": times(length, wall.point), "rest_speed": speed * wall.rest_speed}),
         "body": scene.body.scaled(length, mass),
         "start": {
             "position": times(length, start.position),
@@ -159,7 +165,9 @@ def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: floa
     if scene.gravity is not None:
         tables["gravity"] = {"acceleration": times(length / time**2, scene.gravity.acceleration)}
     if scene.floor is not None:
-        tables["floor"] = {"rest_speed": speed * scene.floor.rest_speed}
+        ends = {"half_extents": scene.floor.half_extents, "thickness": scene.floor.thickness} if scene.floor.ends else {}
+        ends = {name: times(length, end) for name, end in ends.items() if end is not None}
+        tables["floor"] = {"rest_speed": speed * scene.floor.rest_speed} | ends
     if scene.damping is not None:
         step = scene.damping.factor_dt
         tables["damping"] = {
@@ -172,16 +180,19 @@ def in_units(scene: Scenario, length: float = 1.0, time: float = 1.0, mass: floa
 
 def with_other_numbers(scene: Scenario, share: float) -> Scenario:
     """A scene of the same structure: a smaller body, and the other numbers of all tables but the start multiplied by a factor above 1."""
-    tables: dict[str, Mapping[str, Any]] = {"body": scene.body.scaled(1.0 / share, share)}
+
+    def other(surface: Surface) -> dict[str, Any]:
+        friction = surface.friction if isinstance(surface.friction, str) else share * surface.friction
+        return {"restitution": surface.restitution / share, "friction": friction, "rest_speed": share * surface.rest_speed}
+
+    tables: dict[str, Mapping[str, Any] | Sequence[Any] | None] = {
+        "body": scene.body.scaled(1.0 / share, share),
+        "wall": _walls(scene, other),
+    }
     if scene.gravity is not None:
         tables["gravity"] = {"acceleration": times(share, scene.gravity.acceleration)}
     if scene.floor is not None:
-        friction = scene.floor.friction
-        tables["floor"] = {
-            "restitution": scene.floor.restitution / share,
-            "friction": friction if isinstance(friction, str) else share * friction,
-            "rest_speed": share * scene.floor.rest_speed,
-        }
+        tables["floor"] = other(scene.floor)
     if scene.damping is not None:
         tables["damping"] = {"linear": share * scene.damping.linear, "angular": share * scene.damping.angular}
     return changed(scene, scene.duration, **tables)
@@ -194,26 +205,30 @@ def units_of_states(length: float = 1.0, time: float = 1.0) -> Array:
     return units
 
 
-def turned_states(states: Array, rotation: Array) -> Array:
-    """States, shape (..., 13), turned by a rotation, a unit quaternion."""
-    parts = [rotate(rotation, states[..., part]) for part in (POSITION, VELOCITY, SPIN)]
-    return np.concatenate([parts[0], multiply(rotation, states[..., ORIENTATION]), *parts[1:]], axis=-1)
-
-
 def turned(scene: Scenario, rotation: Array) -> Scenario:
-    """The scene, gravity included, turned about the vertical by a rotation."""
+    """The scene, gravity and walls included, turned about the vertical by a rotation."""
+
+    def turn(vector: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(map(float, rotate(rotation, np.array(vector))))
+
     found = scene.starting_at(turned_states(scene.initial_state, rotation))
+    if scene.wall is not None:
+        found = changed(found, wall=_walls(scene, lambda wall: {"point": turn(wall.point), "normal": turn(wall.normal)}))
     if scene.gravity is None:
         return found
-    return changed(found, gravity={"acceleration": tuple(map(float, rotate(rotation, scene.acceleration)))})
+    return changed(found, gravity={"acceleration": turn(scene.gravity.acceleration)})
 
 
 def mirrored(scene: Scenario) -> Scenario:
     """The scene, body and gravity included, mirrored at the plane x = 0."""
-    tables: dict[str, Mapping[str, Any]] = {"body": scene.body.mirrored()}
+
+    def mirror(vector: tuple[float, ...]) -> tuple[float, ...]:
+        return (-vector[0], *vector[1:])
+
+    walls = _walls(scene, lambda wall: {"point": mirror(wall.point), "normal": mirror(wall.normal)})
+    tables: dict[str, Mapping[str, Any] | Sequence[Any] | None] = {"body": scene.body.mirrored(), "wall": walls}
     if scene.gravity is not None:
-        x, y, z = scene.gravity.acceleration
-        tables["gravity"] = {"acceleration": (-x, y, z)}
+        tables["gravity"] = {"acceleration": mirror(scene.gravity.acceleration)}
     return changed(scene.starting_at(REFLECTED * scene.initial_state), scene.duration, **tables)
 
 
@@ -232,11 +247,14 @@ def with_previous_axes(states: Array) -> Array:
 
 
 def moving(scene: Scenario, offset: Array, velocity: Array) -> Scenario:
-    """The scene from a frame of reference: moved by an offset [m], and with an additional velocity [m/s]."""
+    """The scene from a frame of reference: moved by an offset [m], walls included, and with an additional velocity [m/s]."""
     state = scene.initial_state
     state[POSITION] += offset
     state[VELOCITY] += velocity
-    return scene.starting_at(state)
+    found = scene.starting_at(state)
+    if scene.wall is None:
+        return found
+    return changed(found, wall=_walls(scene, lambda wall: {"point": tuple(np.add(wall.point, offset).tolist())}))
 
 
 def heavy_neighbour(scene: Scenario) -> Scenario:
@@ -246,8 +264,8 @@ def heavy_neighbour(scene: Scenario) -> Scenario:
 
 
 def is_sliding_free(scene: Scenario) -> bool:
-    """Whether a horizontal velocity has no effect on the motion: no friction and no damping."""
-    return scene.damping is None and (scene.floor is None or scene.floor.coefficient == 0.0)
+    """Whether a horizontal velocity has no effect on the motion: no friction, no damping, no walls, no end of the floor."""
+    return scene.damping is None and (scene.floor is None or scene.floor.coefficient == 0.0) and not scene.has_edges_or_walls
 
 
 def whole_steps(scene: Scenario, dt: float, steps: int) -> Scenario:

@@ -84,6 +84,8 @@ class Engine(Configured, ABC):
     """The shapes of bodies that it builds on a floor; scenes with others are declined."""
     takes_offsets: ClassVar[bool] = False
     """Whether it builds a body on a floor whose centre of mass is not at the centre of its shape."""
+    takes_walls: ClassVar[bool] = False
+    """Whether it builds walls, and floors that end."""
     order: ClassVar[float | None] = None
     """Claimed order of accuracy in free flight; inf for exact, None for no claim."""
     precision: ClassVar[type] = np.float64
@@ -139,6 +141,8 @@ class Engine(Configured, ABC):
             return f"the adapter maps the shapes {', '.join(self.shapes)} onto a floor, not {scene.body.shape}"
         if scene.floor is not None and not self.takes_offsets and scene.body.shape != "vertices" and scene.body.centre.any():
             return "the adapter builds bodies with the centre of mass at the centre of their shape"
+        if scene.has_edges_or_walls and not self.takes_walls:
+            return "the adapter builds no walls" if scene.wall is not None else "the adapter builds a floor that does not end"
         return self.declines(scene)
 
 

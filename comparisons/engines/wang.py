@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, fields
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,14 +16,14 @@ from dropspin.comparisons.measuring.predictions import bounce_error, flight_erro
 from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.bodies import SHAPES, Body, Box, Sphere, Vertices
-from dropspin.scenarios.model import differ_in_start_alone, initial_states
+from dropspin.scenarios.model import Floor, Surface, differ_in_start_alone, initial_states
 
 
 class Wang(Engine):
     """Algorithms 1 and 2 of Wang's lecture note; each option replaces one of their parts by another method."""
 
     name = "wang"
-    shapes, takes_offsets = SHAPES, True
+    shapes, takes_offsets, takes_walls = SHAPES, True, True
     mixes_scenes = True
     choices: ClassVar = {
         "rotation": tuple(ROTATIONS),
@@ -65,10 +65,11 @@ class Wang(Engine):
     def declines(self, scene: Scenario) -> str | None:
         """Most laws take no finite coefficient of friction."""
         law = self.option("law")
-        if scene.floor is not None and not isinstance(scene.floor.friction, str) and not self.methods().takes_any_friction:
-            return f"law={law} has no Coulomb coefficient ({scene.floor.friction:g}); friction is 'none' or 'infinite', or use law=coulomb"
-        if scene.floor is not None and law == "normal" and scene.floor.friction != "none":
-            return "law=normal has no friction; the scene's floor has"
+        for friction in [surface.friction for surface in scene.surfaces]:
+            if not isinstance(friction, str) and not self.methods().takes_any_friction:
+                return f"law={law} has no Coulomb coefficient ({friction:g}); friction is 'none' or 'infinite', or use law=coulomb"
+            if law == "normal" and friction != "none":
+                return f"law=normal has no friction; the scene's floor{' or a wall' if scene.wall else ''} has"
         return None
 
     def prepare(self, scene: Scenario, dt: float) -> Simulation:
@@ -175,22 +176,38 @@ def _limitations_met(scene: Scenario, dt: float) -> list[str | KnownLimitation]:
 
 
 def reference_world(scene: Scenario, dt: ArrayLike) -> reference_impl.World:
-    """A scene's gravity, floor and damping in the form that the reference implementation takes, for time steps [s]."""
-    floor, damping = scene.floor, scene.damping
+    """A scene's gravity, floor, walls and damping in the form that the reference implementation takes, for time steps [s]."""
+    damping = scene.damping
     share = 1.0 if damping is None or damping.factor_dt is None else damping.factor_dt / np.asarray(dt)
+    walls = (reference_impl.Wall(np.array(wall.point), np.array(wall.normal), _surface(wall)) for wall in scene.wall or ())
     return reference_impl.World(
         gravity=None if scene.gravity is None else scene.acceleration,
-        floor=None if floor is None else reference_impl.Floor(floor.restitution, floor.coefficient, floor.rest_speed),
+        floor=None if scene.floor is None else _floor(scene.floor),
         damping=None if damping is None else (share * damping.linear, share * damping.angular),
+        walls=tuple(walls),
     )
+
+
+def _surface(surface: Surface) -> reference_impl.Floor:
+    return reference_impl.Floor(surface.restitution, surface.coefficient, surface.rest_speed)
+
+
+def _floor(floor: Floor) -> reference_impl.Floor:
+    if not floor.ends:
+        return _surface(floor)
+    extents, thickness = floor.half_extents or (math.inf, math.inf), floor.thickness or math.inf
+    return _surface(floor)._replace(half_extents=np.array(extents), thickness=thickness)
 
 
 def _reference_worlds(scenes: Sequence[Scenario], dt: float) -> reference_impl.World:
     """The same of scenes of one structure, with a row for each scene."""
     worlds = [reference_world(scene, dt) for scene in scenes]
-    gravity, floor, damping = ([getattr(world, part.name) for world in worlds] for part in fields(reference_impl.World))
-    return reference_impl.World(
-        gravity=None if gravity[0] is None else np.array(gravity),
-        floor=None if floor[0] is None else reference_impl.Floor(*np.transpose(floor)),
-        damping=None if damping[0] is None else tuple(np.transpose(damping)),
-    )
+    return reference_impl.World(*(_in_rows([getattr(world, part.name) for world in worlds]) for part in fields(reference_impl.World)))
+
+
+def _in_rows(values: Sequence[Any]) -> Any:
+    """Values of many worlds as one with a row for each: numbers, arrays, tuples of them, or None."""
+    if not isinstance(values[0], tuple):
+        return None if values[0] is None else np.array(values)
+    parts = [_in_rows(column) for column in zip(*values, strict=True)]
+    return type(values[0])(*parts) if hasattr(values[0], "_fields") else tuple(parts)

@@ -112,7 +112,7 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
     """The contacts of a motion, each with the impulse of the floor and the largest violation of each law of contact.
 
     Args:
-        scene: A scene with a floor and without damping.
+        scene: A scene with a floor that does not end, without walls and without damping.
         motion: Its motion, such as `simulate` returns it.
 
     Returns:
@@ -121,12 +121,14 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
         and `gap` of its steps, as in `ContactResiduals`.
 
     Raises:
-        DropspinError: The scene has no floor, or it has damping.
+        DropspinError: The scene has no such floor, or it has walls or damping.
     """
     import pandas as pd
 
-    if scene.floor is None or scene.damping is not None:
-        raise DropspinError(f"{scene.name}: the forces of the floor need a scene with a floor and without damping.")
+    if scene.floor is None or scene.damping is not None or scene.has_edges_or_walls:
+        raise DropspinError(
+            f"{scene.name}: the forces of the floor need a scene with a floor that does not end, without walls and damping."
+        )
     motions = Motions.of(scene, motion)
     found = contact_residuals(scene, motion.states, motions)
     starts, ends = motions.contacts.before, motions.contacts.after

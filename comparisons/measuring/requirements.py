@@ -70,25 +70,25 @@ def has_apex(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def has_floor(scene: Scenario, truth: Truth | None) -> bool:
-    """A floor."""
-    return scene.floor is not None
+    """A floor that does not end."""
+    return scene.floor is not None and not scene.floor.ends
 
 
 def obeys_contact_laws(scene: Scenario, truth: Truth | None) -> bool:
-    """A floor, no damping.
+    """A floor that does not end, no walls, no damping.
 
     The forces of the floor can then be computed from the motion.
     """
-    return scene.floor is not None and scene.damping is None
+    return scene.floor is not None and scene.damping is None and not scene.has_edges_or_walls
 
 
 def limits_friction(scene: Scenario, truth: Truth | None) -> bool:
-    """A floor whose friction is not infinite, no damping."""
+    """A floor that does not end, whose friction is not infinite, no walls, no damping."""
     return obeys_contact_laws(scene, truth) and scene.floor is not None and scene.floor.friction != "infinite"
 
 
 def opposes_slip_left(scene: Scenario, truth: Truth | None) -> bool:
-    """A floor whose friction opposes the slip that is left, no damping.
+    """A floor that does not end, whose friction opposes the slip that is left, no walls, no damping.
 
     In other laws friction opposes the slip at each instant of the impact.
     """
@@ -96,11 +96,11 @@ def opposes_slip_left(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def gains_no_energy(scene: Scenario, truth: Truth | None) -> bool:
-    """No damping, and no impact that gains energy in the exact solution.
+    """No damping, no walls, no end of the floor, and no impact that gains energy in the exact solution.
 
     Some gain energy whose restitution is large and Newton's.
     """
-    if scene.damping is not None:
+    if scene.damping is not None or scene.has_edges_or_walls:
         return False
     return truth is None or all(_kinetic(scene, one.after) <= (1.0 + 1e-9) * _kinetic(scene, one.before) for one in truth.events)
 
@@ -111,8 +111,8 @@ def _kinetic(scene: Scenario, state: Array) -> float:
 
 
 def keeps_energy_in_flight(scene: Scenario, truth: Truth | None) -> bool:
-    """No damping, a start in flight."""
-    return scene.damping is None and starts_in_flight(scene)
+    """No damping, no walls, no end of the floor, a start in flight."""
+    return scene.damping is None and not scene.has_edges_or_walls and starts_in_flight(scene)
 
 
 def spins_in_flight(scene: Scenario, truth: Truth | None) -> bool:
@@ -126,6 +126,6 @@ def starts_in_flight(scene: Scenario) -> bool:
 
 
 def keeps_horizontal_momentum(scene: Scenario, truth: Truth | None) -> bool:
-    """A frictionless floor, gravity straight down, no damping."""
+    """A frictionless floor that does not end, no walls, gravity straight down, no damping."""
     upright = scene.acceleration[0] == 0.0 and scene.acceleration[2] == 0.0
-    return upright and scene.damping is None and scene.floor is not None and scene.floor.friction == "none"
+    return upright and obeys_contact_laws(scene, truth) and scene.floor is not None and scene.floor.friction == "none"

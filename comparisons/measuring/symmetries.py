@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.rotations import about, conjugate
+from dropspin.scenarios.rotations import about, conjugate, turned_states
 from dropspin.scenarios.state import POSITION, UP, VELOCITY
 from dropspin.scenarios.variations import (
     AWAY,
@@ -20,7 +20,6 @@ from dropspin.scenarios.variations import (
     mirrored,
     moving,
     turned,
-    turned_states,
     units_of_states,
     with_next_axes,
     with_previous_axes,
@@ -48,9 +47,16 @@ class Symmetry:
     time: float = 1.0
 
 
+def _has_no_edges(scene: Scenario) -> bool:
+    """Whether the floor is everywhere, so that it is the same for a body elsewhere."""
+    return scene.floor is None or scene.floor.half_extents is None
+
+
 def _turned_by(name: str, angle: float) -> Symmetry:
     rotation = about(UP, np.array(angle))
-    return Symmetry(name, lambda scene: turned(scene, rotation), lambda t, states: turned_states(states, conjugate(rotation)))
+    return Symmetry(
+        name, lambda scene: turned(scene, rotation), lambda t, states: turned_states(states, conjugate(rotation)), _has_no_edges
+    )
 
 
 def _seen_from(name: str, distance: float, speed: float = 0.0) -> Symmetry:
@@ -60,7 +66,7 @@ def _seen_from(name: str, distance: float, speed: float = 0.0) -> Symmetry:
         found[:, VELOCITY] -= speed * AWAY
         return found
 
-    applies = is_sliding_free if speed else lambda scene: True
+    applies = is_sliding_free if speed else _has_no_edges
     return Symmetry(name, lambda scene: moving(scene, distance * AWAY, speed * AWAY), back, applies)
 
 

@@ -81,7 +81,7 @@ def diagnose(motion: ExtendedMotion, within: float) -> Diagnosis:
         exact = None if whole.reference is None else whole.reference[: len(motion.own)]
         own = Comparison.with_truth(motion.scene, motion.own, motion.truth, exact)
         found = [*_energy_gain(whole), *_errors(motion, own, within), *_position_off(own)]
-        if motion.scene.floor is not None:
+        if motion.scene.floor is not None and not motion.scene.floor.ends:
             found += [*_tunnels(motion), *_sinks(motion), *_never_rests(motion, whole)]
     return worst(found)
 
@@ -101,8 +101,7 @@ def _energy_gain(whole: Comparison) -> Iterator[Diagnosis]:
 
 
 def _may_gain(scene: Scenario) -> bool:
-    floor = scene.floor
-    return floor is not None and floor.friction != "none" and floor.restitution > 0.0 and not scene.body.is_ball
+    return not scene.body.is_ball and any(one.friction != "none" and one.restitution > 0.0 for one in scene.surfaces)
 
 
 def _tunnels(motion: ExtendedMotion) -> Iterator[Diagnosis]:

@@ -69,14 +69,18 @@ def _groups(jobs: Jobs) -> Iterable[NDArray[np.intp]]:
 
 
 def _representative_scene(jobs: Jobs) -> Scenario | None:
-    """A scene with the structure of all jobs of a group; the fields that differ are passed as arrays. None if no such scene is valid."""
+    """A scene with the structure of all jobs of a group; the fields that differ are passed as arrays.
+
+    None if no such scene is valid, or if it has walls or a floor that ends.
+    """
     fields = jobs.fields.items()
     shared = [(name, column[0]) for name, column in fields if name == FRICTION or not _is_array_field(name, column)]
     for others in ((), fields):
         try:
-            return with_fields(jobs.scene, [*shared, *((name, column[0]) for name, column in others)])
+            found = with_fields(jobs.scene, [*shared, *((name, column[0]) for name, column in others)])
         except SceneError:
             continue
+        return None if found.has_edges_or_walls else found
     return None
 
 
@@ -139,7 +143,7 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
     if world.gravity is not None:
         world = replace(world, gravity=vectors("gravity", "acceleration", otherwise=world.gravity))
     if world.floor is not None:
-        floor = (column("floor", name, otherwise=value) for name, value in world.floor._asdict().items())
+        floor = (column("floor", name, otherwise=getattr(world.floor, name)) for name in ("restitution", "friction", "rest_speed"))
         world = replace(world, floor=reference_impl.Floor(*floor))
     if world.damping is not None:
         linear, angular = (column("damping", name, otherwise=rate) for name, rate in zip(MOTIONS, world.damping, strict=True))

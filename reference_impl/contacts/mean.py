@@ -8,7 +8,7 @@ Source: H. Wang, Rigid Body Dynamics, Algorithm 2, eq 10, 12 and section 3.2.
 """
 
 from dropspin.reference_impl.contacts.response import impulse_response
-from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset
+from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset, is_below
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import Vec3, any_, compiled, cross, select, transpose
 
@@ -20,7 +20,7 @@ RUNS_IN_LANES = True
 def collide(x, q, v, w, body, floor, law):
     """Algorithm 2: the velocities (v, ω) after the floor has acted, and True, because no iteration can fail."""
     R = rotation_matrix(q)
-    r, hit = contact_point(R, v, w, x.y, body)
+    r, hit = contact_point(R, x, v, w, body, floor)
     if any_(hit):
         v_after, w_after = apply_impulse(r, R, v, w, body, floor, law)
         v, w = select(hit, v_after, v), select(hit, w_after, w)
@@ -28,12 +28,12 @@ def collide(x, q, v, w, body, floor, law):
 
 
 @compiled
-def contact_point(R, v, w, height, body):
+def contact_point(R, x, v, w, body, floor):
     """Eq 10 and section 3.2: the mean offset r of the vertices that are below the floor and descending, and whether there are any."""
     total = Vec3(0.0, 0.0, 0.0)
     count = 0.0
     for i in range(contact_count(body)):
-        below = height + along_normal(contact_offset(R, body, i)) < 0.0
+        below = is_below(x, contact_offset(R, body, i), floor)
         if any_(below):
             r = contact_offset(R, body, i)
             descends = along_normal(v + cross(w, r)) < 0.0

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from dropspin.reference_impl.contacts.response import impulse_response
-from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset
+from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset, is_below
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import Vec3, compiled, cross, transpose
 
@@ -51,7 +51,7 @@ def _sweep(x, q, v, w, body, floor, friction):
         largest = 0.0
         for i in range(contact_count(body)):
             r = contact_offset(R, body, i)
-            if x.y + along_normal(r) < 0.0:
+            if is_below(x, r, floor):
                 approach = along_normal(v0 + cross(w0, r))
                 mu = 0.0 if abs(approach) < floor.rest_speed else floor.restitution
                 j = Vec3(float(impulses[i, 0]), float(impulses[i, 1]), float(impulses[i, 2]))

@@ -1,1 +1,1 @@
-"""Position corrections after the step: `correction=…`, each a `correct(x, q, body)`."""
+"""Position corrections after the step: `correction=…`, each a `correct(x, q, body, floor)`."""

@@ -9,7 +9,7 @@ Cost: one pass over the vertices of a body that is near the floor.
 Source: the simplest stabilisation of J. Baumgarte, CMAME 1 (1972), and E. Catto, Iterative Dynamics (GDC 2005).
 """
 
-from dropspin.reference_impl.floor_plane import N, along_normal, contact_count, contact_offset
+from dropspin.reference_impl.floor_plane import N, along_normal, contact_count, contact_offset, is_below
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import any_, compiled, select
 
@@ -20,7 +20,7 @@ PENETRATION_LEFT = 1e-7  # m
 
 
 @compiled
-def correct(x, q, body):
+def correct(x, q, body, floor):
     """The position after lifting the lowest vertex to `PENETRATION_LEFT` below the floor, if it was lower."""
     near = x.y < body.reach
     if not any_(near):
@@ -28,5 +28,6 @@ def correct(x, q, body):
     R = rotation_matrix(q)
     lowest = 0.0
     for i in range(contact_count(body)):
-        lowest = min(lowest, x.y + along_normal(contact_offset(R, body, i)))
+        r = contact_offset(R, body, i)
+        lowest = select(is_below(x, r, floor), min(lowest, x.y + along_normal(r)), lowest)
     return select(near, x + max(-lowest - PENETRATION_LEFT, 0.0) * N, x)

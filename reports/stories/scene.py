@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.model import Scenario, Surface
 
 
 def modelled(scene: Scenario) -> list[str]:
@@ -11,9 +11,13 @@ def modelled(scene: Scenario) -> list[str]:
     if scene.gravity is not None:
         parts.append(f"gravity of {np.linalg.norm(scene.acceleration):g} m/s²")
     if scene.floor is not None:
-        friction = scene.floor.friction
-        grip = {"none": "no friction", "infinite": "infinite friction"}.get(str(friction), f"friction {friction}")
-        parts.append(f"a floor of restitution {scene.floor.restitution:g} and {grip}")
+        x, z = scene.floor.half_extents or (0.0, 0.0)
+        extent = f" up to |x| = {x:g} m and |z| = {z:g} m," if x else ""
+        depth = f" {scene.floor.thickness:g} m thick," if scene.floor.thickness else ""
+        parts.append(f"a floor{extent}{depth} of {_surface(scene.floor)}")
+    for wall in scene.wall or ():
+        through, along = ("(" + ", ".join(f"{value:g}" for value in vector) + ")" for vector in (wall.point, wall.normal))
+        parts.append(f"a wall through {through} m with the normal {along}, of {_surface(wall)}")
     if scene.damping is not None:
         linear, angular = scene.damping.rates.values()
         parts.append(f"linear damping of {linear:g} and angular damping of {angular:g} per second")
@@ -23,6 +27,11 @@ def modelled(scene: Scenario) -> list[str]:
     if scene.ensemble is not None:
         parts.append(f"{scene.ensemble.size} starts drawn around the scene's own")
     return parts
+
+
+def _surface(surface: Surface) -> str:
+    grip = {"none": "no friction", "infinite": "infinite friction"}.get(str(surface.friction), f"friction {surface.friction}")
+    return f"restitution {surface.restitution:g} and {grip}"
 
 
 def left_out(scene: Scenario) -> list[str]:

@@ -50,6 +50,8 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     if not isinstance(scene, Scenario):
         raise DropspinError(f"scene: got {scene!r} ({type(scene).__name__}); give a Scenario, as load() returns it.")
     floor = scene.floor
+    if scene.has_edges_or_walls:
+        return None
     if floor is None:
         return flight(scene) if law is None else None
     if scene.damping is not None:

@@ -121,7 +121,7 @@ def test_python_of_the_reference_prints_what_the_page_shows(capsys):
 
 
 def test_scenes_of_the_pages_are_valid():
-    of_readme, of_capsule, of_ball, of_box = (
+    of_readme, of_capsule, of_ball, of_box, of_wall = (
         ds.load(tomllib.loads(scene) | {"name": "mine"})
         for page in ("README.md", "docs/scenes.md")
         for scene in re.findall(r"^```toml\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
@@ -129,6 +129,7 @@ def test_scenes_of_the_pages_are_valid():
     assert of_readme.expect[0].metric == "bounce_height_error"
     assert ds.truth_for(of_capsule).events
     assert of_ball.damping.rates == pytest.approx({"linear": 0.0667, "angular": 1.35}, abs=5e-3)
+    assert of_wall.wall[0].normal == (-1.0, 0.0, 0.0)
     assert of_box.body.inertia_tensor[0, 2] == 0.001
 
 

@@ -28,34 +28,38 @@ def cross_matrix(r):
     return np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
 
 
-def collision_handler(x, q, v, w, mass, inertia, points, mu, sticking, rest_speed):
-    R = rotation_matrix(q)
+def collision_handler(
+    x, q, v, w, mass, inertia, points, mu, sticking, rest_speed, point=(0.0, 0.0, 0.0), normal=UP, carries=lambda at: True
+):
+    """Of the plane through `point`, at points that it `carries`."""
+    R, N = rotation_matrix(q), normal
     r_sum, count = np.zeros(3), 0
     for p in points:
         r = R @ p
-        if (x + r) @ UP < 0 and (v + np.cross(w, r)) @ UP < 0:
+        if (x + r - point) @ N < 0 and carries(x + r) and (v + np.cross(w, r)) @ N < 0:
             r_sum = r_sum + r
             count = count + 1
     if count == 0:
         return v, w
     r = r_sum / count
     vi = v + np.cross(w, r)
-    if abs(vi @ UP) < rest_speed:
+    if abs(vi @ N) < rest_speed:
         mu = 0.0
     r_star = cross_matrix(r)
     inertia_inverse = np.linalg.inv(R @ inertia @ R.T)
     K = np.eye(3) / mass - r_star @ inertia_inverse @ r_star
-    wanted = -vi - mu * (vi @ UP) * UP if sticking else -(mu + 1) * (vi @ UP) * UP
+    wanted = -vi - mu * (vi @ N) * N if sticking else -(mu + 1) * (vi @ N) * N
     j = np.linalg.solve(K, wanted)
     return v + j / mass, w + inertia_inverse @ np.cross(r, j)
 
 
-def update(state, mass, inertia, points, dt, gravity, c_linear, c_angular, mu, sticking, rest_speed):
+def update(state, mass, inertia, points, dt, gravity, c_linear, c_angular, mu, sticking, rest_speed, planes=({},)):
     x, q, v, w = state[0:3], state[3:7], state[7:10], state[10:13]
     v = v + dt * gravity
     v = c_linear * v
     w = c_angular * w
-    v, w = collision_handler(x, q, v, w, mass, inertia, points, mu, sticking, rest_speed)
+    for plane in planes:
+        v, w = collision_handler(x, q, v, w, mass, inertia, points, mu, sticking, rest_speed, **plane)
     x = x + dt * v
     q = q + dt / 2 * quaternion_product(np.append(w, 0.0), q)
     q = q / np.linalg.norm(q)

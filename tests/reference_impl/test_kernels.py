@@ -21,7 +21,7 @@ from dropspin.reference_impl.state import ORIENTATION
 PACKAGE = Path(reference_impl.__file__).parent
 KINDS, BODIES = 5, 19  # 19 bodies of 5 kinds: more than fill the lanes, and not a multiple of their number
 ALL = np.arange(BODIES) % KINDS
-STEPS = 300
+STEPS = 100
 
 
 def tumbling(which, law):
@@ -36,7 +36,7 @@ def tumbling(which, law):
     starts[:, 3:] = rng.normal(size=(KINDS, 10))
     starts[:, ORIENTATION] /= np.linalg.norm(starts[:, ORIENTATION], axis=1)[:, None]
     gravity = np.array([0, -9.8, 0]) + rng.normal(size=(KINDS, 3))
-    dt, restitution, linear, angular = rng.uniform([8e-4, 0.3, 0.1, 0.2], [2e-3, 0.9, 0.3, 0.4], (KINDS, 4)).T
+    dt, restitution, linear, angular = rng.uniform([2.4e-3, 0.3, 0.1, 0.2], [6e-3, 0.9, 0.3, 0.4], (KINDS, 4)).T
     rest_speed = np.array([0, 0.01, 0, 0.02, 0.3])
     friction = np.array([0.1, np.inf, 0, 0.4, 0.8]) if law == "coulomb" else np.array([np.inf, 0, np.inf, np.inf, 0])
     floor = Floor(restitution[which], friction[which], rest_speed[which])

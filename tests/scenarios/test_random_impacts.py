@@ -92,9 +92,9 @@ def verify_solutions(seeds):
 
 
 def test_solutions_match_an_event_driven_integration_up_to_their_horizon():
-    """Of 30 bodies; the slow test has ten thousand."""
-    total, lacking = verify_solutions(range(30))
-    assert total > 25
+    """Of 20 bodies: every kind with every friction. The slow test has ten thousand."""
+    total, lacking = verify_solutions(range(20))
+    assert total > 15
     assert lacking == 0
 
 

@@ -8,6 +8,7 @@ It covers impacts of one point, in double precision: flights shorter than 1e-9 o
 outside of it.
 """
 
+import math
 from dataclasses import dataclass
 
 import numba
@@ -75,12 +76,6 @@ def _product(a, b, k):
     return total
 
 
-@numba.njit(cache=True)
-def _cross(a, b):
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-@numba.njit(cache=True)
 def _matrix(q):
     x, y, z, w = q
     return np.array(
@@ -96,7 +91,10 @@ def _matrix(q):
 def _series(q, rates, inertia, inverse):
     """Taylor coefficients of the quaternion, (4, TERMS), and of the rates in the body, (3, TERMS)."""
     Q, W, L = np.zeros((4, TERMS)), np.zeros((3, TERMS)), np.zeros((3, TERMS))
-    Q[:, 0], W[:, 0] = q, rates
+    for i in range(4):
+        Q[i, 0] = q[i]
+    for i in range(3):
+        W[i, 0] = rates[i]
     for k in range(TERMS - 1):
         for i in range(3):
             L[i, k] = inertia[i, 0] * W[0, k] + inertia[i, 1] * W[1, k] + inertia[i, 2] * W[2, k]
@@ -106,7 +104,7 @@ def _series(q, rates, inertia, inverse):
             torque[i] = _product(L[a], W[b], k) - _product(L[b], W[a], k)
         for i in range(3):
             W[i, k + 1] = (inverse[i, 0] * torque[0] + inverse[i, 1] * torque[1] + inverse[i, 2] * torque[2]) / (k + 1)
-        x, y, z, w = Q
+        x, y, z, w = Q[0], Q[1], Q[2], Q[3]
         half = 0.5 / (k + 1)
         Q[0, k + 1] = half * (_product(w, W[0], k) + _product(y, W[2], k) - _product(z, W[1], k))
         Q[1, k + 1] = half * (_product(w, W[1], k) + _product(z, W[0], k) - _product(x, W[2], k))
@@ -162,76 +160,72 @@ def _first_zero(polynomial, end):
     return np.inf
 
 
-@numba.njit(cache=True)
 def _impulse(response, u, e, kind, friction):
-    target = np.array([-u[0], -u[1] - e * u[1], -u[2]])
     if kind == NO_FRICTION:
         return np.array([0.0, -(1.0 + e) * u[1] / response[1, 1], 0.0])
-    sticking = np.linalg.solve(response, target)
-    if kind == STICKING or np.hypot(sticking[0], sticking[2]) <= friction * sticking[1]:
+    sticking = np.linalg.solve(response, np.array([-u[0], -u[1] - e * u[1], -u[2]]))
+    if kind == STICKING or math.hypot(sticking[0], sticking[2]) <= friction * sticking[1]:
         return sticking
     # The cone law, by bisection of the direction of the slip that is left: of all directions, the one that it has itself.
-    before, last = 0.0, np.nan
-    for n in range(SECTORS + 1):
-        now = 2.0 * np.pi * n / SECTORS
-        turned, _ = _slip(response, u, e, friction, now)
-        if n > 0 and (turned > 0.0) != (last > 0.0):
-            low, high = before, now
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                if (_slip(response, u, e, friction, middle)[0] > 0.0) == (last > 0.0):
-                    low = middle
-                else:
-                    high = middle
-            if _slip(response, u, e, friction, high)[1] > 0.0:
-                direction = np.array([-friction * np.cos(high), 1.0, -friction * np.sin(high)])
-                return -(1.0 + e) * u[1] / (response[1] @ direction) * direction
-        before, last = now, turned
+    angles = np.linspace(0.0, 2.0 * np.pi, SECTORS + 1)
+    turned = _slip(response, u, e, friction, angles)[0] > 0.0
+    for n in np.flatnonzero(turned[1:] != turned[:-1]):
+        low, high = angles[n], angles[n + 1]
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if (_slip(response, u, e, friction, middle)[0] > 0.0) == turned[n]:
+                low = middle
+            else:
+                high = middle
+        if _slip(response, u, e, friction, high)[1] > 0.0:
+            direction = np.array([-friction * math.cos(high), 1.0, -friction * math.sin(high)])
+            return -(1.0 + e) * u[1] / (response[1] @ direction) * direction
     return np.full(3, np.nan)
 
 
-@numba.njit(cache=True)
 def _slip(response, u, e, friction, angle):
-    """The slip that friction in a direction leaves: its parts across this direction and along it."""
+    """The slip that friction in a direction leaves: its parts across this direction and along it. `angle` may be an array."""
     c, s = np.cos(angle), np.sin(angle)
-    direction = np.array([-friction * c, 1.0, -friction * s])
-    left = u - (1.0 + e) * u[1] / (response[1] @ direction) * (response @ direction)
-    return c * left[2] - s * left[0], c * left[0] + s * left[2]
+    along = [response[i, 1] - friction * (response[i, 0] * c + response[i, 2] * s) for i in range(3)]
+    normal = (1.0 + e) * u[1] / along[1]
+    left_x, left_z = u[0] - normal * along[0], u[2] - normal * along[2]
+    return c * left_z - s * left_x, c * left_x + s * left_z
 
 
 @numba.njit(cache=True)
-def _heights(points, rounding, struck, Q, x, v, g):
-    """Taylor coefficients of the height of each point, shape (n, TERMS), for a struck point of its height over the time."""
-    row = np.zeros((3, TERMS))  # the second row of the rotation matrix
+def _second_row(Q):
+    """Taylor coefficients of the second row of the rotation matrix, shape (3, TERMS)."""
+    row = np.zeros((3, TERMS))
     for k in range(TERMS):
         row[0, k] = 2.0 * (_product(Q[0], Q[1], k) + _product(Q[2], Q[3], k))
         row[1, k] = -2.0 * (_product(Q[0], Q[0], k) + _product(Q[2], Q[2], k))
         row[2, k] = 2.0 * (_product(Q[1], Q[2], k) - _product(Q[0], Q[3], k))
     row[1, 0] += 1.0
-    heights = points @ row
+    return row
+
+
+def _heights(points, rounding, struck, Q, x, v, g):
+    """Taylor coefficients of the height of each point, shape (n, TERMS), for a struck point of its height over the time."""
+    heights = points @ _second_row(Q)
     heights[:, 0] += x[1] - rounding
     heights[:, 1] += v[1]
     heights[:, 2] += 0.5 * g[1]
-    for i in range(len(points)):
-        if struck[i]:
-            heights[i, :-1] = heights[i, 1:]
-            heights[i, -1] = 0.0
+    heights[struck, :-1] = heights[struck, 1:]
+    heights[struck, -1] = 0.0
     return heights
 
 
-@numba.njit(cache=True)
 def _struck(R, arm, v, w, mass, inverse, e, rest_speed, kind, friction):
     """The velocity and the rates in the body after the impact of a point, and the point's upward velocity."""
-    u = v + _cross(R @ w, arm)
+    u = v + np.cross(R @ w, arm)
     skew = np.array([[0.0, -arm[2], arm[1]], [arm[2], 0.0, -arm[0]], [-arm[1], arm[0], 0.0]])
     response = np.eye(3) / mass - skew @ (R @ inverse @ R.T) @ skew
     impulse = _impulse(response, u, e if -u[1] >= rest_speed else 0.0, kind, friction)
     v = v + impulse / mass
-    w = w + inverse @ (R.T @ _cross(arm, impulse))
-    return v, w, (v + _cross(R @ w, arm))[1]
+    w = w + inverse @ (R.T @ np.cross(arm, impulse))
+    return v, w, (v + np.cross(R @ w, arm))[1]
 
 
-@numba.njit(cache=True)
 def _integrate(points, rounding, size, mass, inertia, start, g, e, rest_speed, kind, friction, duration, most, shortest):
     inverse, moments = np.linalg.inv(inertia), np.linalg.eigvalsh(inertia)
     rows = np.empty((most, 28))

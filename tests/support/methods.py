@@ -7,8 +7,7 @@ COVERING = [
     {"rotation": "midpoint", "law": "coulomb"},
     {"rotation": "symmetric-top", "law": "clamped"},
     {"rotation": "rk4", "law": "normal"},
-    {"rotation": "exact", "law": "poisson"},
-    {"rotation": "rk4", "law": "coulomb", "contact": "sequential"},
+    {"rotation": "exact", "law": "coulomb", "contact": "sequential"},
     {"rotation": "exact", "law": "normal", "contact": "sequential", "correction": "projection"},
 ]
 """Every leaf, with `law=normal` and `law=coulomb` for both contacts."""

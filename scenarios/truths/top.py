@@ -15,11 +15,13 @@ to the centre of mass; infinite friction, gravity straight down, no damping; unt
 it.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dropspin.scenarios.model import TOUCHING, Floor, Scenario
-from dropspin.scenarios.rotations import multiply, rotate
+from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
 from dropspin.scenarios.truths.truth import Truth
 
@@ -72,10 +74,17 @@ def _integrated(scene: Scenario, arm: Array, along: float, across: float, others
         found: Array = momentum / across + (1.0 / along - 1.0 / across) * np.sum(momentum * n, axis=-1, keepdims=True) * n
         return found
 
+    body_arm, body_axis, force = arm.tolist(), axis.tolist(), weight.tolist()
+
     def rates(t: float, y: Array) -> Array:
-        q, momentum = y[:4], y[4:]
-        turning = 0.5 * multiply(np.append(spin_of(q, momentum), 0.0), q)
-        return np.concatenate([turning, np.cross(rotate(q, arm), weight)])
+        """dq/dt and dL/dt, in numbers: arrays of three take seven times as long, and the integrator needs ten thousand of them."""
+        *q, x, y_, z = y.tolist()
+        momentum, n = (x, y_, z), _rotated(q, body_axis)
+        faster = (1.0 / along - 1.0 / across) * (x * n[0] + y_ * n[1] + z * n[2])
+        spin = [part / across + faster * direction for part, direction in zip(momentum, n, strict=True)]
+        turning = [0.5 * (q[3] * rate + other) for rate, other in zip(spin, _cross(spin, q), strict=True)]
+        scalar = -0.5 * (spin[2] * q[2] + spin[0] * q[0] + spin[1] * q[1])
+        return np.array([*turning, scalar, *_cross(_rotated(q, body_arm), force)])
 
     n = rotate(start[ORIENTATION], axis)
     momentum = across * start[SPIN] + (along - across) * (start[SPIN] @ n) * n
@@ -115,3 +124,14 @@ def _integrated(scene: Scenario, arm: Array, along: float, across: float, others
     ends = "" if held.all() else "the tip lifts off the floor, or another corner strikes the floor"
     statement = "equations of Lagrange's top (1788), integrated numerically (DOP853)"
     return Truth("top", statement, states, horizon=min(horizon, scene.duration) if solved.success else 0.0, ends=ends)
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    """A × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _rotated(q: Sequence[float], vector: Sequence[float]) -> list[float]:
+    """`rotate` of one vector."""
+    twice = [2.0 * part for part in _cross(q, vector)]
+    return [part + q[3] * turn + other for part, turn, other in zip(vector, twice, _cross(q, twice), strict=True)]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import cast
 
-from dropspin.comparisons.conformance import protocol, symmetries, timing
+from dropspin.comparisons.conformance import impacts, protocol, symmetries, timing
 from dropspin.comparisons.conformance.motions import check_motion
 from dropspin.comparisons.conformance.outcomes import OUTCOMES, CheckOutcome, CheckResult, described, whole_traceback
 from dropspin.comparisons.conformance.probes import PROBES
@@ -31,6 +31,8 @@ CHECKS: dict[str, Callable[[Engine], str]] = {
     "states": protocol.check_states,
     "settings": protocol.check_settings,
     "files": protocol.check_files,
+    "impacts": impacts.check_impacts,
+    "later impacts": impacts.check_later_impacts,
     **{probe.name: partial(check_motion, probe=probe) for probe in PROBES},
 }
 """By name; each returns what it found, and raises one of `OUTCOMES` otherwise."""

@@ -14,10 +14,12 @@ from itertools import chain, combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from dropspin.comparisons.conformance.impacts import BY_SLIP, decaying_restitution, explain_impact
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences, exact_solution
 from dropspin.comparisons.engines.base import Engine, KnownLimitation
 from dropspin.comparisons.faults.fault_model import FaultModel
+from dropspin.comparisons.faults.mistakes import MISTAKES, Mistake
 from dropspin.comparisons.faults.parameters import FAULT_MODELS
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
@@ -29,7 +31,8 @@ from dropspin.scenarios.truths import LAWS, Law
 
 Array = NDArray[np.float64]
 
-SINGLY = tuple(fault for fault in FAULT_MODELS if fault.about != "start")  # the start has a check of its own
+Fault = FaultModel | Mistake
+SINGLY: tuple[Fault, ...] = (*MISTAKES, *(fault for fault in FAULT_MODELS if fault.about != "start"))  # the start has a check of its own
 QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("angular velocity", "rad/s"))
 """Those of `differences`."""
 CLEAR = 1e-3
@@ -54,10 +57,22 @@ def check_motion(engine: Engine, probe: Probe) -> str:
     law = _own_law(engine, probe, found)
     if law is not None:
         raise Noted(f"impacts follow the {law} law, as the engine states")
+    mistake = _in_impacts(engine, probe, recording.motion)
+    if mistake is not None:
+        raise mistake
     fault = explain_motion(probe, found, lambda other: _states(engine, other))
     if fault is None:
         raise CheckFailed("; ".join(symptoms(probe, recording.motion)))
     raise Noted(fault.message) if fault.is_peculiarity else CheckFailed(fault.message)
+
+
+def _in_impacts(engine: Engine, probe: Probe, motion: Trajectory) -> CheckFailed | Noted | None:
+    """A mistake in an impact, or that restitution decays, by which another fault could seem to explain the motion."""
+    mistake = explain_impact(probe.scene, motion)
+    if mistake is not None:
+        return Noted(mistake) if mistake == BY_SLIP else CheckFailed(mistake)
+    decay = decaying_restitution(engine) if probe.scene.floor is not None and probe.scene.floor.friction == "none" else None
+    return None if decay is None else CheckFailed(decay)
 
 
 def _states(engine: Engine, probe: Probe) -> Array | None:
@@ -83,7 +98,7 @@ def _explains(limitation: KnownLimitation, found: Array, exact: Array, probe: Pr
     return bool(explained) and all(error <= max(explained.get(name, 0.0), own) for name, error, own in errors)
 
 
-def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Array | None]) -> FaultModel | None:
+def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Array | None]) -> Fault | None:
     """The fault, or the two, that give an engine's states of a probe, shape (2, 13); None if there are none.
 
     Several faults may give the same motion of a probe. A fault is no explanation if it changes the motion of another probe in which the
@@ -111,7 +126,7 @@ def _has_pairs(probe: Probe) -> bool:
     return probe.scene.floor is None or probe.scene.body.is_ball
 
 
-def _best(candidates: Iterable[FaultModel], probes: Iterable[Probe], motion_of: Callable[[Probe], Array | None]) -> FaultModel | None:
+def _best(candidates: Iterable[Fault], probes: Iterable[Probe], motion_of: Callable[[Probe], Array | None]) -> Fault | None:
     """The fault that gives the engine's states of the most probes, without those that change a probe in which the engine is right."""
     explained = dict.fromkeys(candidates, 0)
     for probe in probes:
@@ -129,11 +144,11 @@ def _best(candidates: Iterable[FaultModel], probes: Iterable[Probe], motion_of: 
 
 
 @cache
-def _motions_with_faults(probe: Probe, count: int) -> dict[FaultModel, Array]:
+def _motions_with_faults(probe: Probe, count: int) -> dict[Fault, Array]:
     return _motions(probe, SINGLY if count == 1 else _pairs())
 
 
-def _motions(probe: Probe, faults: Iterable[FaultModel]) -> dict[FaultModel, Array]:
+def _motions(probe: Probe, faults: Iterable[Fault]) -> dict[Fault, Array]:
     """The states of a probe with each of some faults for which they are known, shape (2, 13)."""
     return {fault: states for fault in faults if (states := fault.motion(probe.scene, probe.times)) is not None}
 

@@ -92,7 +92,9 @@ def verified_record(states: Any, rows: int) -> NDArray[np.float64]:
     off = np.abs(lengths - 1.0) > UNIT_TOLERANCE
     if off.any():
         row = int(np.argmax(off))
-        raise BuildMismatch(f"the quaternion of row {row} has length {lengths[row]:.6g}; an orientation has length 1")
+        grows = row > 0 and bool((np.diff(lengths[: row + 1]) > -UNIT_TOLERANCE / 10.0).all())
+        cause = ": it grows as the body turns, because it is not normalised after each step" if grows else ""
+        raise BuildMismatch(f"the quaternion of row {row} has length {lengths[row]:.6g}; an orientation has length 1{cause}")
     return record
 
 

@@ -1,0 +1,232 @@
+"""Mistakes in an impact: the velocities after it, predicted from those before it with each mistake, compared with the engine's.
+
+With u = v + ω × r at the contact point, u_n and u_t its parts along the normal N and along the floor, and K = 1/M - r* I⁻¹ r* (eq 15):
+
+    v + j/M,  ω + I⁻¹ (r × j),  K j = -(1 + e) u_n N - s u_t,   s = min(µ (1 + e) |u_n|/|u_t|, 1)
+
+or, as Coulomb's law has it, j = j_n N - min(µ j_n, |u_t|/(t·K t)) t. The inertia may be wrong in K, in the second equation or in both.
+A mistake is stated if it explains the velocities after one step of contact and no law of impact does without a mistake.
+
+Source: H. Wang, Rigid Body Dynamics (lecture note), eq 7, 12 and 15 to 17.
+"""
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise, product, takewhile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
+from dropspin.comparisons.conformance.probes import DT, accepted_scene
+from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.faults.mistakes import NOT_INVERTED, NOT_ROTATED, SQUARE
+from dropspin.comparisons.measuring.comparison import Comparison
+from dropspin.comparisons.running.recording import Breakdown, record, try_record
+from dropspin.scenarios import Scenario, Trajectory
+from dropspin.scenarios.loading import from_mapping, read_toml
+from dropspin.scenarios.model import Floor
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from dropspin.scenarios.text import counted, rounded
+from dropspin.scenarios.truths.impact_laws import LAWS, velocities_after
+from dropspin.scenarios.variations import with_height
+
+Array = NDArray[np.float64]
+
+CLOSE = 5e-3
+"""The largest difference of an explained change of the velocities, relative to that change; gravity acts before or after an impact."""
+AGAINST = "friction has the wrong sign: it acts along the slip of the contact point, and has to act against it"
+IN_FRICTION = f"{SQUARE}: in friction, whose impulse is at most µ times that of the normal force, along the slip over its length"
+IN_NORMAL = f"{SQUARE}: the separation speed is e times the approach speed"
+REVERSED = "friction has the wrong sign: it reverses the slip of the contact point, and has to reduce it"
+INTO_FLOOR = "restitution has the wrong sign: the contact point goes on into the floor"
+BY_SLIP = "friction takes at most µ (1 + e) times the approach speed from the slip, which is Coulomb's law for a point mass alone"
+LATER = "restitution decays from one contact to the next"
+FILE, NEAR = Path(__file__).with_name("impacts.toml"), 0.02  # m, above the floor
+CHANGED, SLOWEST, FEWEST, LASTING = 0.05, 0.1, 2, 1.0  # of a restitution; m/s; impacts; s
+
+Inverse = Callable[[Array, Array], NDArray[Any]]
+INVERSES: dict[str, Inverse] = {
+    "": lambda R, inertia: R @ np.linalg.inv(inertia) @ R.T,
+    NOT_ROTATED: lambda R, inertia: np.linalg.inv(inertia),
+    "the inertia is rotated in the wrong direction: in the world frame it is R I Rᵀ, not Rᵀ I R": lambda R, inertia: (
+        R.T @ np.linalg.inv(inertia) @ R
+    ),
+    NOT_INVERTED: lambda R, inertia: R @ inertia @ R.T,
+    f"{NOT_INVERTED}; and {NOT_ROTATED}": lambda R, inertia: inertia,
+}
+"""By the mistake, the inverse inertia in the world frame that an impact uses; R is from body to world."""
+
+
+class Contact(NamedTuple):
+    """A contact point before an impact.
+
+    Attributes:
+        velocities: Of the body, v and ω, shape (6,).
+        point: r, from the centre of mass [m].
+        mass: [kg].
+        inertia: In the body frame [kg m²].
+        axes: R, from body to world.
+        floor: The floor.
+    """
+
+    velocities: Array
+    point: Array
+    mass: float
+    inertia: Array
+    axes: Array
+    floor: Floor
+
+    @property
+    def approach(self) -> Array:
+        """u, the velocity of the contact point [m/s]."""
+        return self.velocities[:3] + np.cross(self.velocities[3:], self.point)
+
+    def response(self, inverse: Array) -> Array:
+        """K of eq 15."""
+        arm = np.cross(np.eye(3), self.point)
+        found: Array = np.eye(3) / self.mass - arm @ inverse @ arm
+        return found
+
+    def after(self, impulse: Array, inverse: Array) -> Array:
+        """The velocities after an impulse, shape (6,)."""
+        return self.velocities + np.concatenate([impulse / self.mass, inverse @ np.cross(self.point, impulse)])
+
+
+def check_impacts(engine: Engine) -> str:
+    """No mistake explains the first impact of bodies that are thrown at a floor; whether the impact is right is for the probes to say."""
+    accepted, refusal = 0, None
+    for name, content in read_toml(FILE, FILE.name).items():
+        scene = with_height(from_mapping({"name": name.replace(" ", "-"), **content}), NEAR)
+        refusal = engine.refusal(scene)
+        if refusal is None:
+            accepted += 1
+            mistake = explain_impact(scene, record(engine, scene, DT, verify=False).motion)
+            if mistake is not None and mistake != BY_SLIP:
+                raise CheckFailed(f"{mistake} ({name})")
+    if not accepted:
+        raise Declined(f"the engine declines all scenes: {refusal}")
+    return f"no known mistake explains an impact in {counted(accepted, 'scene')}"
+
+
+def explain_impact(scene: Scenario, motion: Trajectory) -> str | None:
+    """The mistake, or the rule of its own, that gives the velocities after the first step of contact; None if there is none."""
+    case = Comparison(scene, motion)
+    if scene.floor is None or not case.states.touching.any():
+        return None
+    row = int(np.argmax(case.states.touching))
+    before = motion.states[row].copy()
+    before[VELOCITY] += case.dt * scene.acceleration
+    velocities, found = (np.concatenate([state[VELOCITY], state[SPIN]]) for state in (before, motion.states[row + 1]))
+    axes = rotate(before[ORIENTATION], np.eye(3)).T
+    contact = Contact(velocities, case.contact_point(row), scene.body.mass, scene.body.inertia_tensor, axes, scene.floor)
+    weights = np.array([1.0] * 3 + [scene.body.size] * 3)
+
+    def explains(predicted: Array | None) -> bool:
+        scale = np.linalg.norm(weights * (found - velocities))
+        return predicted is not None and bool(np.linalg.norm(weights * (found - predicted)) <= CLOSE * scale)
+
+    if contact.approach[1] >= 0.0 or any(explains(predicted) for predicted in _without_mistakes(before, contact)):
+        return None
+    return next((message for message, predicted in _predictions(contact) if explains(predicted)), None)
+
+
+def _without_mistakes(before: Array, contact: Contact) -> Iterator[Array | None]:
+    """The velocities after an impact by each law; with a coefficient of friction, without friction too, which is a fault of parameters."""
+    for floor in (contact.floor, contact.floor.model_copy(update={"friction": "none"})):
+        for law in LAWS:
+            yield velocities_after(before, contact.point, contact.mass, contact.inertia, floor, law)
+
+
+def _predictions(contact: Contact) -> Iterator[tuple[str, Array]]:
+    """Mistakes, and the velocities after an impact with each, shape (6,); the rule of the lecture note's laboratory is the first."""
+    right = INVERSES[""](contact.axes, contact.inertia)
+    for message, impulse in _impulses(contact, contact.response(right)):
+        yield message, contact.after(impulse, right)
+    for (in_response, of_response), (in_turn, of_turn) in product(INVERSES.items(), repeat=2):
+        if in_response or in_turn:
+            inverses = [inverse(contact.axes, contact.inertia) for inverse in (of_response, of_turn)]
+            for message, impulse in _impulses(contact, contact.response(inverses[0])):
+                if message == BY_SLIP:
+                    yield "; and ".join(dict.fromkeys(filter(None, (in_response, in_turn)))), contact.after(impulse, inverses[1])
+
+
+def _impulses(contact: Contact, response: Array) -> Iterator[tuple[str, Array]]:
+    """Impulses by the two rules without a mistake, called `BY_SLIP`, and then with one in the friction or the normal velocity."""
+    u_n = float(contact.approach[1])
+    u_t = contact.approach - u_n * UP
+    e, friction, slip = contact.floor.restitution, contact.floor.coefficient, float(np.linalg.norm(u_t))
+    along = u_t / slip if slip > 0.0 else u_t
+    grip = slip / (along @ response @ along) if slip > 0.0 else 0.0
+
+    def by_slip(rebound: float, share: float) -> Array:
+        return np.asarray(np.linalg.solve(response, (rebound - u_n) * UP - share * u_t))
+
+    def by_force(rebound: float, factor: float) -> Array:
+        normal = (rebound - u_n) / float(response[1, 1])
+        return normal * UP - np.sign(factor) * min(abs(factor) * friction * normal, grip) * along
+
+    rebound, speed = -e * u_n, -u_n
+    limit = friction * (1.0 + e) * speed / slip if slip > 0.0 and friction > 0.0 else 0.0
+    share = min(limit, 1.0)
+    yield BY_SLIP, by_slip(rebound, share)
+    if np.isfinite(friction):
+        yield BY_SLIP, by_force(rebound, 1.0)
+    for message, wrong in ((IN_NORMAL, e * speed**2), (IN_NORMAL, (1.0 + e) * speed**2 - speed), (INTO_FLOOR, -e * speed)):
+        yield message, by_slip(wrong, share)
+        if np.isfinite(friction):
+            yield message, by_force(wrong, 1.0)
+    if limit == 0.0:
+        return
+    yield REVERSED, by_slip(rebound, 2.0 - share)
+    for against in {share, limit} - {np.inf}:
+        yield AGAINST, by_slip(rebound, -against)
+    if np.isfinite(friction):
+        yield AGAINST, by_force(rebound, -1.0)
+        for factor in (speed, 1.0 / slip, speed / slip, slip):
+            yield IN_FRICTION, by_slip(rebound, min(factor * limit, 1.0))
+            yield IN_FRICTION, by_force(rebound, factor)
+
+
+def check_later_impacts(engine: Engine) -> str:
+    """Restitution is the same at each contact of a body that bounces."""
+    decay = decaying_restitution(engine)
+    if decay is not None:
+        raise CheckFailed(decay)
+    found = restitutions(engine)
+    if len(found) >= FEWEST and abs(found[1][0] - found[0][0]) > CHANGED * found[0][0]:
+        raise Noted(f"restitution depends on the speed: {', '.join(f'{e:.3g} at {speed:.3g} m/s' for e, speed in found)}")
+    return f"restitution in successive impacts: {', '.join(f'{e:.3g}' for e, _ in found)}"
+
+
+def decaying_restitution(engine: Engine) -> str | None:
+    """That restitution falls from impact to impact, by the same in falls at other speeds, one of them that of the second impact."""
+    found = restitutions(engine)
+    if len(found) < FEWEST or any(later[0] > (1.0 - CHANGED) * one[0] for one, later in pairwise(found)):
+        return None
+    for speed in (found[1][1], 1.2 * found[0][1]):
+        others = restitutions(engine, speed)
+        if not others or any(abs(one[0] - other[0]) > CHANGED * one[0] for one, other in zip(found, others, strict=False)):
+            return None
+    return f"{LATER}: {', '.join(rounded(e, 2) for e, _ in found)} in successive impacts; a scene has one restitution for all of them"
+
+
+def restitutions(engine: Engine, speed: float | None = None) -> list[tuple[float, float]]:
+    """The restitution and the approach speed [m/s] of each impact of a body that bounces, as long as it is faster than `SLOWEST`.
+
+    Args:
+        engine: The engine.
+        speed: The speed at the start, shortly before the first impact [m/s]; that of the probe by default.
+    """
+    scene = accepted_scene(engine, "bouncing ball", "bouncing box")
+    state = scene.initial_state
+    state[VELOCITY] *= 1.0 if speed is None else speed / np.linalg.norm(state[VELOCITY])
+    recording = try_record(engine, scene.starting_at(state).model_copy(update={"duration": LASTING}), DT, verify=False)
+    if isinstance(recording, Breakdown):
+        return []
+    vertical = recording.motion.velocity[:, 1]
+    runs = np.split(vertical, np.flatnonzero(np.diff(vertical > 0.0)) + 1)  # falls and rises in turn
+    pairs = [(float(rise.max()), -float(fall.min())) for fall, rise in zip(runs[::2], runs[1::2], strict=False)]
+    return [(rebound / approach, approach) for rebound, approach in takewhile(lambda pair: pair[1] > SLOWEST, pairs)]

@@ -1,0 +1,126 @@
+"""Mistakes in the equations of flight, which no change of a scene gives: their motions, integrated numerically.
+
+    x' = v,  v' = g - k v,  q' = 1/2 (ω, 0) q,  ω' = I⁻¹ (I ω × ω) - κ ω,  I = R I_body Rᵀ
+
+Each mistake replaces a part of these equations. One of the rotation is made with the gyroscopic term, and without it, as in Wang's method.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import cross, multiply, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
+
+Array = NDArray[np.float64]
+
+NOT_ROTATED = "the inertia is not rotated into the world frame: there it is R I Rᵀ, and its inverse R I⁻¹ Rᵀ"
+NOT_INVERTED = "the inverse of the inertia is not taken: a torque changes the angular velocity by I⁻¹ times it"
+ORDER = "the quaternion product is taken in the wrong order: with the angular velocity in the world frame, q' = 1/2 (ω, 0) q"
+SQUARE = "the square of the speed is used in place of the speed"
+ACCURACY = 1e-9
+FARTHEST = 100.0  # rad
+
+
+def _no_torque(q: Array, w: Array, inertia: Array) -> Array:
+    return np.zeros(3)
+
+
+def _gyroscopic(q: Array, w: Array, inertia: Array) -> Array:
+    return rotate(q, _not_rotated(q, unrotate(q, w), inertia))
+
+
+def _not_rotated(q: Array, w: Array, inertia: Array) -> Array:
+    return np.asarray(np.linalg.solve(inertia, cross(inertia @ w, w)))
+
+
+def _not_inverted(q: Array, w: Array, inertia: Array) -> Array:
+    spin = unrotate(q, w)
+    return rotate(q, inertia @ cross(inertia @ spin, spin))
+
+
+def _opposite(q: Array, w: Array, inertia: Array) -> Array:
+    return -_gyroscopic(q, w, inertia)
+
+
+def _linear(speed: float) -> float:
+    return 1.0
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One mistake.
+
+    Attributes:
+        message: The mistake, and what is right.
+        acceleration: Function of orientation, angular velocity and inertia that returns the angular acceleration.
+        swapped: Whether the factors of the quaternion product are swapped.
+        turning: Function of the angular speed that returns the factor by which the orientation turns too fast.
+        drag: Function of a speed that returns the factor by which damping is too strong, of the velocity and of the angular velocity.
+        is_peculiarity: False: each is a mistake.
+    """
+
+    message: str
+    acceleration: Callable[[Array, Array, Array], Array] = _gyroscopic
+    swapped: bool = False
+    turning: Callable[[float], float] = _linear
+    drag: tuple[Callable[[float], float], Callable[[float], float]] = (_linear, _linear)
+    is_peculiarity: bool = False
+
+    def motion(self, scene: Scenario, times: Array) -> Array | None:
+        """The states of a scene with this mistake at some times [s], shape (n, 13); None with a floor, or if the body turns too often."""
+        spin = float(np.linalg.norm(scene.start.angular_velocity))
+        if scene.floor is not None or self.turning(spin) * spin * times[-1] > FARTHEST:
+            return None
+        return _integrated(self, scene, tuple(times.tolist()))
+
+    def rates(self, scene: Scenario, state: Array) -> Array:
+        """The rates of change of a state, shape (13,)."""
+        q, v, w = state[ORIENTATION], state[VELOCITY], state[SPIN]
+        linear, angular = (scene.damping.linear, scene.damping.angular) if scene.damping else (0.0, 0.0)
+        found, spin = np.empty(13), np.append(0.5 * self.turning(float(np.linalg.norm(w))) * w, 0.0)
+        found[POSITION], found[VELOCITY] = v, scene.acceleration - linear * self.drag[0](float(np.linalg.norm(v))) * v
+        found[ORIENTATION] = multiply(q, spin) if self.swapped else multiply(spin, q)
+        unit = q / np.linalg.norm(q)
+        found[SPIN] = self.acceleration(unit, w, scene.body.inertia_tensor) - angular * self.drag[1](float(np.linalg.norm(w))) * w
+        return found
+
+
+@lru_cache(maxsize=1024)
+def _integrated(mistake: Mistake, scene: Scenario, times: tuple[float, ...]) -> Array:
+    from scipy.integrate import solve_ivp
+
+    def rates(_: float, state: Array) -> Array:
+        return mistake.rates(scene, state)
+
+    found = solve_ivp(rates, (0.0, times[-1]), scene.initial_state, "DOP853", times, rtol=ACCURACY, atol=ACCURACY).y.T
+    found[:, ORIENTATION] /= np.linalg.norm(found[:, ORIENTATION], axis=1, keepdims=True)
+    return np.asarray(found)
+
+
+def _speed(speed: float) -> float:
+    return speed
+
+
+MISTAKES = (
+    *(
+        mistake
+        for torque in (_no_torque, _gyroscopic)
+        for mistake in (
+            Mistake(ORDER, torque, swapped=True),
+            Mistake(f"{SQUARE}: a step turns the body by |ω| dt about ω", torque, turning=_speed),
+            Mistake("the body turns twice as fast as its angular velocity says: q' = 1/2 (ω, 0) q", torque, turning=lambda _: 2.0),
+            Mistake("the body turns half as fast as its angular velocity says: q' = 1/2 (ω, 0) q", torque, turning=lambda _: 0.5),
+            Mistake(f"{SQUARE}: damping is in proportion to the velocity", torque, drag=(_speed, _linear)),
+            Mistake(f"{SQUARE}: damping is in proportion to the angular velocity", torque, drag=(_linear, _speed)),
+            Mistake(f"{SQUARE}: damping is in proportion to the velocity, and to the angular velocity", torque, drag=(_speed, _speed)),
+        )
+    ),
+    Mistake(NOT_ROTATED, _not_rotated),
+    Mistake(NOT_INVERTED, _not_inverted),
+    Mistake("the gyroscopic term has the opposite sign: ω' = I⁻¹ (I ω × ω) without torque", _opposite),
+)

@@ -1,0 +1,154 @@
+"""Eight usual mistakes of students, in several ways: a check of `conform` names each, and none in right engines."""
+
+import re
+
+import numpy as np
+import pytest
+from support.students import Solver, student
+from support.transcription import UP, quaternion_product, rotation_matrix
+
+from dropspin.comparisons.conformance.checks import run_check
+from dropspin.comparisons.conformance.impacts import BY_SLIP
+from dropspin.comparisons.engines.registry import engine
+from dropspin.comparisons.running.inputs import EngineEntry
+
+inv = np.linalg.inv
+
+
+def found(engine_, *checks):
+    """The messages of some checks that did not pass, by check."""
+    results = [run_check(EngineEntry(engine_.label, engine_), check) for check in checks]
+    return {one.check: one.message for one in results if one.outcome not in ("passed", "declined")}
+
+
+def decaying(factor, *, before=False):
+    """A restitution that is multiplied at each contact, after its use or before it."""
+
+    def wanted_normal(self, u_normal):
+        first = factor if before else 1.0
+        wanted = -(1.0 + first * self.restitution) * u_normal
+        self.restitution *= factor
+        return wanted
+
+    return {"wanted_normal": wanted_normal}
+
+
+def coulomb(sign=1.0, factor=lambda approach, slip: 1.0):
+    """Coulomb's law by the impulse, with a sign, and with a factor of the speeds of approach and of slip."""
+
+    def impulse(self, K, u, u_normal):
+        slip = u - u_normal * UP
+        speed = np.linalg.norm(slip)
+        along = slip / speed if speed > 0.0 else slip
+        normal = -(1.0 + self.restitution) * u_normal / K[1, 1]
+        sticking = speed / (along @ K @ along) if speed > 0.0 else 0.0
+        sliding = self.floor.coefficient * normal * factor(-u_normal, speed) if self.floor.coefficient > 0.0 else 0.0
+        return normal * UP - sign * min(sliding, sticking) * along
+
+    return {"impulse": impulse}
+
+
+def gyroscopic(rotated=True, inverted=True, **methods):
+    """Euler's gyroscopic term, which the lecture note leaves out."""
+
+    def advance(self, steps):
+        for _ in range(steps):
+            R = rotation_matrix(self.q)
+            inertia = R @ self.inertia @ R.T if rotated else self.inertia
+            rate = np.cross(inertia @ self.w, self.w)
+            self.w = self.w + self.dt * ((inv(inertia) if inverted else inertia) @ rate)
+            Solver.advance(self, 1)
+
+    return {"advance": advance, **methods}
+
+
+def position_first(self, steps):
+    for _ in range(steps):
+        self.move()
+        self.v = self.v + self.dt * self.gravity
+        if self.floor is not None:
+            self.collide()
+
+
+SWAPPED = {"rate": lambda self: quaternion_product(self.q, np.append(self.w, 0.0))}
+NOT_ROTATED, NOT_INVERTED = "the inertia is not rotated into the world frame", "the inverse of the inertia is not taken"
+SQUARE, AGAINST = "the square of the speed is used in place of the speed", "friction has the wrong sign"
+DECAYS, ORDER = "restitution decays from one contact to the next", "the quaternion product is taken in the wrong order"
+MISTAKES = {
+    "inertia not rotated": (NOT_ROTATED, "corner", {"inverse_inertia": lambda self, R: inv(self.inertia)}),
+    "inertia not rotated in K": (NOT_ROTATED, "impacts", {"inverse_in_k": lambda self, R: inv(self.inertia)}),
+    "inertia not rotated in a gyroscopic term": (NOT_ROTATED, "tumbling", gyroscopic(rotated=False)),
+    "inverse not taken": (NOT_INVERTED, "corner", {"inverse_inertia": lambda self, R: R @ self.inertia @ R.T}),
+    "inverse not taken in K": (NOT_INVERTED, "impacts", {"inverse_in_k": lambda self, R: R @ self.inertia @ R.T}),
+    "neither": (f"{NOT_INVERTED}.*; and {NOT_ROTATED}", "gripping corner", {"inverse_inertia": lambda self, R: self.inertia}),
+    "friction along the slip": (AGAINST, "impacts", {"wanted_slip": lambda self, slip, n: self.share(slip, n) * slip}),
+    "friction along the slip of a ball": (AGAINST, "slippery floor", coulomb(-1.0)),
+    "friction reverses the slip": (AGAINST, "impacts", {"wanted_slip": lambda self, slip, n: (self.share(slip, n) - 2.0) * slip}),
+    "squares of both speeds": (SQUARE, "impacts", {"quotient": lambda self, approach, slip: approach**2 / slip**2}),
+    "square of the slip": (SQUARE, "slippery floor", {"quotient": lambda self, approach, slip: approach / slip**2}),
+    "slip not over its length": (SQUARE, "impacts", coulomb(1.0, lambda approach, slip: slip)),
+    "square of the approach": (SQUARE, "bouncing box", {"wanted_normal": lambda self, u: -u + self.restitution * u * u}),
+    "square of the angular speed": (SQUARE, "turning", {"rate": lambda self: np.linalg.norm(self.w) * Solver.rate(self)}),
+    "restitution halved after each contact": (DECAYS, "later impacts", decaying(0.5)),
+    "restitution halved before each contact": (DECAYS, "bouncing ball", decaying(0.5, before=True)),
+    "restitution a tenth less": (DECAYS, "later impacts", decaying(0.9)),
+    "quaternions swapped": (ORDER, "turning", SWAPPED),
+    "quaternions swapped, with a gyroscopic term": (ORDER, "tumbling", gyroscopic(**SWAPPED)),
+    "not normalised": ("not normalised after each step", "turning", {"normalised": lambda self, q: q}),
+    "not normalised in an impact": ("not normalised after each step", "impacts", {"normalised": lambda self, q: q}),
+    "position before velocity": ("the position is updated before the velocity", "velocity lag", {"advance": position_first}),
+}
+
+
+@pytest.mark.parametrize("title", MISTAKES)
+def test_mistake_is_named(title):
+    message, check, methods = MISTAKES[title]
+    [text] = found(student(title, **methods), check).values()
+    assert re.search(message, text), text
+
+
+def test_right_student_is_not_corrected():
+    """What the method itself has wrong is noted: no gyroscopic term, and the laboratory's rule of friction."""
+    checks = (
+        "tumbling",
+        "turning",
+        "damped",
+        "bouncing box",
+        "slippery floor",
+        "corner",
+        "gripping corner",
+        "impacts",
+        "later impacts",
+        "velocity lag",
+    )
+    assert found(student(), *checks) == {
+        "tumbling": "angular velocity stays constant, as without the gyroscopic term or with the inertia of a ball",
+        "slippery floor": BY_SLIP,
+        "corner": "impacts follow the note law, as the engine states",
+    }
+
+
+@pytest.mark.parametrize("name", ["wang", "mujoco", "mujoco[kappa=0.5]", "pybullet", "pybullet[coordinates=multibody]", "rapier", "dart"])
+def test_no_mistake_is_named_in_a_right_engine(name):
+    """Nor in one whose restitution depends on the phase of the step, as with a penetration that is only partly resolved in each step."""
+    messages = found(engine(name), "impacts", "later impacts").values()
+    assert not [text for text in messages if not text.startswith("restitution depends on the speed")]
+
+
+def test_restitution_that_depends_on_the_speed_does_not_decay():
+    slower = {"wanted_normal": lambda self, u: -(1.0 + self.restitution / (1.0 - 0.5 * u)) * u}
+    [message] = found(student(**slower), "later impacts").values()
+    assert message.startswith("restitution depends on the speed: 0.296 at 2.05 m/s, 0.46")
+
+
+def test_explicit_euler_that_states_its_lag_is_noted():
+    engine_ = student(advance=position_first)
+    solver = type(engine_).simulation
+
+    def prepare(scene, dt):
+        simulation = solver(scene, dt)
+        simulation.velocity_lag = -0.5 * dt
+        return simulation
+
+    type(engine_).simulation = staticmethod(prepare)
+    assert found(engine_, "velocity lag")["velocity lag"].startswith("the position is updated before the velocity, as in explicit Euler")

@@ -32,7 +32,8 @@ from dropspin.scenarios.truths import LAWS, Law
 Array = NDArray[np.float64]
 
 Fault = FaultModel | Mistake
-SINGLY: tuple[Fault, ...] = (*MISTAKES, *(fault for fault in FAULT_MODELS if fault.about != "start"))  # the start has a check of its own
+SINGLY: tuple[Fault, ...] = (*(fault for fault in FAULT_MODELS if fault.about != "start"), *MISTAKES)
+"""The start has a check of its own."""
 QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("angular velocity", "rad/s"))
 """Those of `differences`."""
 CLEAR = 1e-3

@@ -72,8 +72,13 @@ class Mistake:
     is_peculiarity: bool = False
 
     def motion(self, scene: Scenario, times: Array) -> Array | None:
-        """The states of a scene with this mistake at some times [s], shape (n, 13); None with a floor, or if the body turns too often."""
+        """The states of a scene with this mistake at some times [s], shape (n, 13).
+
+        None with a floor, if the body turns too often, and for a mistake of damping without damping, as it then is none.
+        """
         spin = float(np.linalg.norm(scene.start.angular_velocity))
+        if scene.damping is None and self.drag != (_linear, _linear):
+            return None
         if scene.floor is not None or self.turning(spin) * spin * times[-1] > FARTHEST:
             return None
         return _integrated(self, scene, tuple(times.tolist()))

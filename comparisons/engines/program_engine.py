@@ -1,0 +1,118 @@
+"""An engine that is a program in any language: it reads a scene and requests on its standard input, and answers with states.
+
+A line is a word and numbers. The scene comes first, up to `start`, which the program answers with its state; `advance n` asks for n more
+steps, and for the state after them. A state is a line of 13 numbers. The program ends at the end of its input. docs/course.md has examples.
+"""
+
+import hashlib
+import inspect
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from signal import Signals
+from subprocess import PIPE, Popen
+from tempfile import TemporaryFile
+from typing import ClassVar
+
+import numpy as np
+
+from dropspin.comparisons.engines.base import Array, Engine, Simulation
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.validation import shown
+
+
+class ProgramEngine(Engine):
+    """An engine that is a program; a subclass gives its `name` and `program`.
+
+    Attributes:
+        options: The options that differ from the defaults; a program has none unless the subclass declares `choices`.
+        program: The command and its arguments; those that are files beside the module of the class may be given by their names.
+    """
+
+    program: ClassVar[Sequence[str]]
+    shapes, takes_offsets = ("sphere", "box", "capsule", "vertices", "mesh"), True
+
+    def declines(self, scene: Scenario) -> str | None:
+        return "the adapter passes on no floor that ends" if scene.floor is not None and scene.floor.ends else None
+
+    def prepare(self, scene: Scenario, dt: float) -> "ProgramSimulation":
+        folder = Path(inspect.getfile(type(self))).resolve().parent
+        return ProgramSimulation(scene, dt, [str(folder / part) if (folder / part).is_file() else part for part in self.program])
+
+
+class ProgramSimulation(Simulation):
+    """A process of the program, for one scene."""
+
+    def __init__(self, scene: Scenario, dt: float, command: Sequence[str]) -> None:
+        self.velocity_lag = 0.5 * dt  # semi-implicit Euler, as in Algorithm 1
+        files = [Path(part).read_bytes() for part in command if Path(part).is_file()]
+        self.settings = {"program": " ".join(command), "version": hashlib.sha256(b"".join(files)).hexdigest()[:12]}
+        with ExitStack() as opened:
+            self._errors = opened.enter_context(TemporaryFile())
+            try:
+                self._process = opened.enter_context(Popen(command, stdin=PIPE, stdout=PIPE, stderr=self._errors, text=True))
+            except OSError as error:
+                raise RuntimeError(f"{command[0]!r} cannot be started: {error.strerror}; `program` is {list(command)}") from None
+            opened.callback(self._process.kill)
+            self._state = self._ask("start", "\n".join(scene_lines(scene, dt)))
+            self._opened = opened.pop_all()
+
+    def advance(self, steps: int) -> None:
+        if steps:
+            self._state = self._ask(f"advance {steps}", f"advance {steps}")
+
+    def state(self) -> Array:
+        return self._state.copy()
+
+    def close(self) -> None:
+        self._opened.close()
+
+    def _ask(self, asked: str, lines: str) -> Array:
+        """The state that the program answers with, shape (13,)."""
+        requests, answers, answer = self._process.stdin, self._process.stdout, ""
+        assert requests is not None
+        assert answers is not None
+        with suppress(BrokenPipeError):  # the program ended, which the empty answer says
+            requests.write(f"{lines}\n")
+            requests.flush()
+            answer = answers.readline()
+        if not answer:
+            raise RuntimeError(f"the program ended with {self._end()} instead of answering {asked!r}")
+        try:
+            numbers = np.array([float(word) for word in answer.split()])
+        except ValueError:
+            numbers = np.empty(0)
+        if numbers.shape != (13,):
+            raise RuntimeError(f"the program answered {asked!r} with {shown(answer.rstrip())}; a state is a line of 13 numbers")
+        return numbers
+
+    def _end(self) -> str:
+        """How the program ended, and the last line of its standard error."""
+        code = self._process.wait()
+        self._errors.seek(0)
+        lines = self._errors.read().decode(errors="replace").splitlines()
+        how = Signals(-code).name if code < 0 else f"exit code {code}"
+        return how + (f" and the last line {shown(lines[-1])}" if lines else "")
+
+
+def scene_lines(scene: Scenario, dt: float) -> Iterator[str]:
+    """A scene at a time step [s] as the lines that a program reads."""
+    body, rates = scene.body, scene.damping.rates.values() if scene.damping else (0.0, 0.0)
+    yield _line("dt", [dt])
+    yield _line("mass", [body.mass])
+    yield _line("inertia", body.inertia_tensor.ravel())
+    yield _line("gravity", scene.acceleration)
+    yield _line("damping", np.exp(-dt * np.array([*rates])))
+    if scene.floor is not None:
+        yield _line("floor", [scene.floor.restitution, scene.floor.coefficient, scene.floor.rest_speed])
+    for wall in scene.wall or ():
+        yield _line("wall", [*wall.point, *wall.normal, wall.restitution, wall.coefficient, wall.rest_speed])
+    yield _line("radius", body.semi_axes[:1])
+    yield f"vertices {len(body.vertices)}"
+    for vertex in body.vertices:
+        yield _line("vertex", vertex)
+    yield _line("start", scene.initial_state)
+
+
+def _line(word: str, numbers: Sequence[float] | Array) -> str:
+    return " ".join([word, *(repr(float(number)) for number in numbers)])

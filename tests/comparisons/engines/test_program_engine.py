@@ -1,0 +1,107 @@
+"""Programs as engines: the documented one in C compared with `wang`, and programs that end, hang, or answer with something else."""
+
+import re
+import shutil
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dropspin as ds
+from dropspin.comparisons.conformance.checks import run_check
+from dropspin.comparisons.engines.program_engine import scene_lines
+from dropspin.comparisons.running.inputs import EngineEntry
+from dropspin.comparisons.running.recording import Breakdown, divergence, try_record
+
+DOCS = Path(__file__).parents[3] / "docs"
+SPIN, TUMBLE = ds.load("fall-spin"), ds.load("drop-box-tumble")
+STATE = "0 0 0 0 0 0 1 0 0 0 0 0 0"
+LOOP = "import sys\nfor line in sys.stdin:\n    word = line.split()[0]\n    if word in ('start', 'advance'): {}\n"
+
+
+@pytest.fixture(scope="module")
+def solver(tmp_path_factory):
+    """The engine of the documentation, with its program built beside it."""
+    folder = tmp_path_factory.mktemp("course")
+    for name in ("solver.c", "solver.py"):
+        shutil.copy(DOCS / "course" / name, folder)
+    subprocess.run(["cc", "-O2", "-Wall", "-Werror", "-o", folder / "solver", folder / "solver.c", "-lm"], check=True)
+    spec = spec_from_file_location("solver_of_the_course", folder / "solver.py")
+    module = sys.modules[spec.name] = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.Solver()
+
+
+@pytest.mark.parametrize("name", ["drop-box-tumble", "drop-ball-backspin", "drop-box-sticking", "spin-damped"])
+def test_program_in_c_has_the_motion_of_wang(solver, name):
+    """To 1e-9 of the largest number over 200 steps through impacts and damping, as another order of additions allows."""
+    scene = ds.load(name)
+    with solver.prepare(scene, 2e-3) as simulation:
+        found = simulation.record(200)
+    expected = ds.engine("wang").prepare(scene, 2e-3).record(200)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("check", ["repeats", "waiting", "settings", "velocity lag", "gripping corner", "impacts", "later impacts"])
+def test_program_in_c_conforms(solver, check):
+    found = run_check(EngineEntry(solver.label, solver), check)
+    assert found.outcome == "passed", found.message
+
+
+def program(*command):
+    return type("Program", (ds.ProgramEngine,), {"name": "program", "program": command, "__doc__": "A program."})()
+
+
+def python(answer):
+    return program(sys.executable, "-u", "-c", LOOP.format(answer))
+
+
+@pytest.mark.parametrize(
+    ("engine", "verdict", "reason"),
+    [
+        (
+            python("sys.exit('no such body')"),
+            "crashed",
+            r"the program ended with exit code 1 and the last line 'no such body' instead of answering 'start'",
+        ),
+        (python("import os; os.kill(os.getpid(), 11)"), "crashed", "the program ended with SIGSEGV instead of answering 'start'"),
+        (python("print('hello')"), "crashed", "the program answered 'start' with 'hello'; a state is a line of 13 numbers"),
+        (python("print(line[6:].strip() if word == 'start' else '1 2 3')"), "crashed", "the program answered 'advance 1' with '1 2 3'"),
+        (python("print(line[6:].strip() if word == 'start' else 'nan ' * 13)"), "diverged", "the state is not finite"),
+        (python(f"print('{STATE}')"), "crashed", "velocity at the start is"),
+        (program("absent-solver"), "crashed", "'absent-solver' cannot be started: No such file or directory"),
+    ],
+)
+def test_program_that_breaks_costs_its_row(engine, verdict, reason):
+    recorded = try_record(engine, SPIN, 0.01)
+    found = recorded if isinstance(recorded, Breakdown) else divergence(recorded.motion)
+    assert found.verdict == verdict
+    assert re.search(reason, found.reason), found.reason
+
+
+@pytest.mark.usefixtures("engine_processes")
+def test_program_that_hangs_ends_at_the_limit():
+    """And the program ends with its engine's process."""
+    hanging = python("import time; time.sleep(1e3)")
+    found = ds.run(SPIN, [hanging, "pybullet"], 0.01, resources=ds.ResourceLimits(processor_time=0.5)).table
+    assert set(found[found["engine"] == "program"]["verdict"]) == {"timed_out"}
+    assert found[found["engine"] == "pybullet"]["value"].notna().all()
+
+
+def test_lines_of_a_scene_are_those_of_the_page():
+    """Each word has its row in the table of the page, in the order in which it is sent; the numbers are those of the scene."""
+    wall = [{"point": [2.0, 0.0, 0.0], "normal": [-1.0, 0.0, 0.0], "restitution": 0.5, "friction": "infinite"}]
+    scene = ds.load(TUMBLE.model_dump(exclude={"expect", "origin"}, exclude_none=True) | {"wall": wall, "damping": {"linear": 2.0}})
+    lines = [line.split() for line in scene_lines(scene, 0.5)]
+    page = (DOCS / "course.md").read_text(encoding="utf-8")
+    documented = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
+    assert list(dict.fromkeys(words[0] for words in lines if words[0] != "vertex")) == [word for word in documented if word != "advance"]
+    numbers = {words[0]: np.array(words[1:], dtype=float) for words in lines}
+    np.testing.assert_array_equal(numbers["start"], scene.initial_state)
+    np.testing.assert_array_equal(numbers["inertia"], scene.body.inertia_tensor.ravel())
+    np.testing.assert_allclose(numbers["damping"], [np.exp(-1.0), 1.0])
+    np.testing.assert_array_equal(numbers["wall"], [2.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.5, np.inf, 0.0])
+    assert numbers["vertices"] == sum(words[0] == "vertex" for words in lines) == 8

@@ -10,7 +10,7 @@ from dropspin.scenarios import load, truth_for
 from dropspin.scenarios.bodies import SHAPES
 from dropspin.scenarios.rotations import conjugate, multiply, unrotate
 
-EXACT_WANG = "wang[rotation=exact,law=normal]"
+EXACT_WANG = "wang[rotation=exact,law=coulomb]"
 LYING = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
 TURNED = (np.array([0.3, 0.2, 0.5, 0.8]) / np.linalg.norm([0.3, 0.2, 0.5, 0.8])).tolist()
 TETRAHEDRON = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 0.35]]
@@ -90,7 +90,7 @@ def test_a_body_is_the_same_in_another_frame_of_its_own(engine_name):
 
 
 @pytest.mark.filterwarnings("ignore:contacts slip", "ignore:in maximal coordinates")
-@pytest.mark.parametrize("engine_name", ["wang[rotation=exact,law=coulomb]", "mujoco", "pybullet"])
+@pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco", "pybullet"])
 def test_cylinders_and_capsules_roll_on_their_sides(engine_name):
     """Thrown without spin they slide, then roll at (k - 1)/k of their speed, to the order of the time step."""
     for name in ("cylinder", "capsule"):

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from dropspin.comparisons.engines.base import Array, AsBuilt
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies.inertia import is_diagonal, principal_axes
-from dropspin.scenarios.model import Floor
+from dropspin.scenarios.model import Floor, Surface
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.variations import heavy_neighbour
 
@@ -67,7 +67,7 @@ def refusal_of_rest_speed(scene: Scenario, engine: str, instead: str = "") -> st
         engine: The engine's name.
         instead: What the engine always does.
     """
-    if scene.floor is None or scene.floor.rest_speed == 0.0:
+    if not any(surface.rest_speed for surface in scene.surfaces):
         return None
     return f"{engine} has no setting for the speed below which restitution is 0 (floor.rest_speed){instead and f'; {instead}'}"
 
@@ -79,15 +79,28 @@ def refusal_of_floor(scene: Scenario, kind: str) -> str | None:
         scene: The scene.
         kind: What represents the floor, such as `plane` or `box`.
     """
+    if scene.floor is not None and scene.floor.half_extents is not None:
+        return None
     travel = np.linalg.norm(scene.start.position) + np.linalg.norm(scene.start.velocity) * scene.duration + scene.body.size
-    if scene.floor is None or kind == "plane" or travel <= FLOOR_HALF_SIZE:
+    if scene.floor is None or (kind == "plane" and not scene.floor.ends) or travel <= FLOOR_HALF_SIZE:
         return None
     return f"the floor is a {kind} of {2 * FLOOR_HALF_SIZE:g} m, and the body may leave it"
 
 
-def friction_of(floor: Floor, gripping: float) -> float:
-    """The coefficient of friction of a floor; `gripping` stands for that of a floor on which contacts do not slip."""
-    return gripping if floor.friction == "infinite" else floor.coefficient
+def box_of(floor: Floor) -> list[float]:
+    """Half extents along x, y and z [m] of the box that a floor is, or that stands for one without an end; its top is the floor."""
+    x, z = floor.half_extents or (FLOOR_HALF_SIZE, FLOOR_HALF_SIZE)
+    return [x, FLOOR_HALF_SIZE if floor.thickness is None else 0.5 * floor.thickness, z]
+
+
+def refusal_of_neighbour(scene: Scenario, beside: str) -> str | None:
+    """Why a second body is not put beside that of a scene; None if it can be."""
+    return "the second body may be behind a wall, or beyond the end of the floor" if beside != "none" and scene.has_edges_or_walls else None
+
+
+def friction_of(surface: Surface, gripping: float) -> float:
+    """The coefficient of friction of a floor or a wall; `gripping` stands for one on which contacts do not slip."""
+    return gripping if surface.friction == "infinite" else surface.coefficient
 
 
 def bodies_in(scene: Scenario, beside: str) -> list[Scenario]:

@@ -20,10 +20,12 @@ from dropspin.comparisons.engines.mapping import (
     MIDPOINT_GYROSCOPIC,
     PROFILES,
     SEMI_IMPLICIT_EULER,
+    friction_of,
     may_tumble,
     refusal_of_axes,
     refusal_of_floor,
     refusal_of_hull,
+    refusal_of_neighbour,
     refusal_of_rest_speed,
 )
 from dropspin.comparisons.engines.mujoco_model import FORM, IMPEDANCE, INTEGRATORS, calibrated_specification, contact, default_specification
@@ -34,7 +36,7 @@ from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.bodies import SHAPES, Mesh, Sphere, Vertices
-from dropspin.scenarios.model import Floor, differ_in_start_alone
+from dropspin.scenarios.model import differ_in_start_alone
 
 VERSION = numbers_of(mujoco.__version__)
 OLDEST: Version = (3, 2, 4)
@@ -112,7 +114,7 @@ def flight_of(integrator: str, version: Version) -> str:
 class MuJoCo(Engine):
     """MuJoCo with exact restitution: one free body and one explicit contact pair with the floor; or its defaults (profile=default)."""
 
-    name, mixes_scenes, shapes, takes_offsets = "mujoco", True, SHAPES, True
+    name, mixes_scenes, shapes, takes_offsets, takes_walls = "mujoco", True, SHAPES, True, True
     choices: ClassVar = {
         "integrator": tuple(INTEGRATORS),
         "profile": PROFILES,
@@ -181,17 +183,18 @@ class MuJoCo(Engine):
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
         unfit = refusal_of_axes(scene, "damps") if scene.damping is not None else None
         unfit = unfit or (refusal_of_hull(scene, "mesh") if self.option("body") == "mesh" else None)
-        unfit = unfit or refusal_of_floor(scene, self.option("floor"))
+        unfit = unfit or refusal_of_floor(scene, self.option("floor")) or refusal_of_neighbour(scene, self.option("beside"))
         if unfit is not None or floor is None:
             return unfit
         if isinstance(body, Vertices | Mesh) and body.resting_height == 0.0:
             return "the adapter maps a body of vertices on a floor as a mesh, and MuJoCo has no convex hull of a flat mesh"
-        return None if self.is_default else self._refusal_of_contacts(scene, floor)
+        return None if self.is_default else self._refusal_of_contacts(scene)
 
-    def _refusal_of_contacts(self, scene: Scenario, floor: Floor) -> str | None:
+    def _refusal_of_contacts(self, scene: Scenario) -> str | None:
         """Why calibrated contacts cannot reproduce those of a scene."""
-        if not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
-            return f"the adapter takes coefficients of friction up to {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
+        strongest = max(friction_of(surface, gripping=0.0) for surface in scene.surfaces)
+        if strongest > STRONGEST_FRICTION:
+            return f"the adapter takes coefficients of friction up to {STRONGEST_FRICTION:g}; the scene has {strongest:g}"
         since, wrong = CONTACTS_SINCE.get(scene.body.shape, (OLDEST, ""))
         if since > VERSION:
             return f"MuJoCo {formatted(VERSION)} is installed, {wrong}"
@@ -199,7 +202,7 @@ class MuJoCo(Engine):
             return (
                 "with RK4 the adapter's one-step damper acts in all stages, and no body rebounds; use integrator=euler, or spring_steps=20"
             )
-        if floor.restitution < LEAST_OF_A_SPRING and "spring_steps" in self.options:
+        if min(surface.restitution for surface in scene.surfaces) < LEAST_OF_A_SPRING and "spring_steps" in self.options:
             return f"the adapter sets springs for a restitution of at least {LEAST_OF_A_SPRING:g}; leave out spring_steps"
         return refusal_of_rest_speed(scene, "MuJoCo")
 
@@ -207,15 +210,15 @@ class MuJoCo(Engine):
         """The settings of `SOLVER` that the installed version has."""
         return {name: value for name, value in SOLVER.items() if FLAGS_SINCE.get(name, OLDEST) <= VERSION}
 
-    def _pair(self, scene: Scenario, dt: float) -> dict[str, Any]:
-        """Settings of the contact pair; empty without a floor."""
-        return contact(scene.floor, dt, *(float(self.option(name)) for name in self.numbers))
+    def _pairs(self, scene: Scenario, dt: float) -> list[dict[str, Any]]:
+        """Settings of the contact pairs of the floor and each wall."""
+        return [contact(surface, dt, *(float(self.option(name)) for name in self.numbers)) for surface in scene.surfaces]
 
     def programs(self, scene: Scenario, dt: float) -> Mapping[str, str]:
         """The settings as Python and as MJCF."""
         if self.is_default or not can_be_pasted(scene):
             return {}
-        settings = {"integrator": self.option("integrator"), "solver": self._flags(), "pair": self._pair(scene, dt)}
+        settings = {"integrator": self.option("integrator"), "solver": self._flags(), "pair": self._pairs(scene, dt)[0]}
         values = {"engine": "MuJoCo", "dt": dt} | settings
         return {
             "python": rendered("mujoco.py.jinja", scene, why=self.reasons, **values),
@@ -227,9 +230,10 @@ class MuJoCo(Engine):
         settings = {"profile": self.option("profile"), "integrator": integrator} | form
         if self.is_default:
             return MuJoCoSimulation(scene, default_specification(scene, dt, integrator, form), settings)
-        pair = self._pair(scene, dt)
-        flags = self._flags() if pair else {"autoreset": "disable"}
-        return MuJoCoSimulation(scene, calibrated_specification(scene, dt, integrator, form, pair, flags), settings | flags | pair)
+        pairs = self._pairs(scene, dt)
+        flags = self._flags() if pairs else {"autoreset": "disable"}
+        settings |= flags | (pairs[0] if pairs else {}) | ({"walls": pairs[1:]} if scene.wall else {})
+        return MuJoCoSimulation(scene, calibrated_specification(scene, dt, integrator, form, pairs, flags), settings)
 
     def prepare_batch(self, members: Sequence[Scenario], dt: float) -> BatchSimulation | None:
         if VERSION < BATCHES:

@@ -1,4 +1,4 @@
-"""MuJoCo models of a scene: a free body and, where the scene has a floor, one contact pair with it; or MuJoCo's defaults.
+"""MuJoCo models of a scene: a free body and one contact pair with each of the scene's floor and walls; or MuJoCo's defaults.
 
 MuJoCo has no coefficient of restitution. A contact is a damped spring with the reference acceleration a_ref = -b v - k r, and its force
 only pushes. Two settings give a restitution e:
@@ -14,18 +14,19 @@ until x'' = 0.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import chain, product
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, bodies_in, friction_of, principal_frame
+from dropspin.comparisons.engines.mapping import bodies_in, box_of, friction_of, principal_frame
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Capsule, Ellipsoid, Mesh, OnAxis, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal
-from dropspin.scenarios.model import Floor
+from dropspin.scenarios.model import Surface
+from dropspin.scenarios.rotations import conjugate, multiply
 
 IMPEDANCE = 0.9999  # the largest that MuJoCo allows
 MOST_DAMPED = 1e3
@@ -40,29 +41,27 @@ FORM = {"body": "geom", "floor": "plane", "beside": "none"}
 
 The body is a `geom`; a `mesh`, a box as the convex hull of its corners; or a `child`, with mass and shape on a fixed child of the free
 body. A body of vertices is always a mesh. The floor is a `plane`; or a `box` or a `mesh`, the convex hull of its corners, whose top is the
-floor.
+floor. A floor that ends is a box in place of a plane. Walls are planes.
 """
 UPWARD = [np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]  # [w, x, y, z]: rotates the plane's normal from z to y
 
 
-def contact(floor: Floor | None, dt: float, kappa: float = 0.0, spring_steps: float = 0.0) -> dict[str, Any]:
-    """The settings of a contact pair that give a floor's restitution and friction; empty without a floor.
+def contact(surface: Surface, dt: float, kappa: float = 0.0, spring_steps: float = 0.0) -> dict[str, Any]:
+    """The settings of a contact pair that give the restitution and friction of a floor or a wall.
 
     Args:
-        floor: The floor.
+        surface: The floor or the wall.
         dt: Time step [s].
         kappa: The share of the depth that the damper removes in a step.
         spring_steps: N, the steps that a collision takes with the spring; 0 for the damper, with which it takes one.
     """
-    if floor is None:
-        return {}
-    coefficient = friction_of(floor, gripping=1e6)
+    coefficient = friction_of(surface, gripping=1e6)
     if spring_steps:
-        z = damping_ratio(floor.restitution)
+        z = damping_ratio(surface.restitution)
         w = _contact_angle(z) / (spring_steps * dt)
         solref = [-(w**2), -2.0 * z * w]
     else:
-        solref = [0.0 - kappa / dt**2, -(1.0 + floor.restitution) / dt]  # 0.0, not -0.0, without a spring
+        solref = [0.0 - kappa / dt**2, -(1.0 + surface.restitution) / dt]  # 0.0, not -0.0, without a spring
     return {
         "condim": 3 if coefficient else 1,
         "friction": [coefficient, coefficient, 0.0, 0.0, 0.0],
@@ -95,17 +94,19 @@ def _contact_angle(z: float) -> float:
 def default_specification(scene: Scenario, dt: float, integrator: str, form: Mapping[str, str]) -> Any:
     """The specification of a user who sets friction on both surfaces and nothing else: MuJoCo has no restitution to set."""
     spec, bodies = _free_bodies(scene, dt, integrator, form)
-    if scene.floor is not None:
+    if scene.surfaces:
         # With the default's pyramidal cones a coefficient of 1e6 would leave no friction and no contact; torsion and rolling keep theirs.
-        surface = {"friction": [friction_of(scene.floor, gripping=10.0), 0.005, 0.0001]}
+        # A contact has the larger coefficient of the two geoms, so that the body has the smallest.
+        coefficients = [friction_of(surface, gripping=10.0) for surface in scene.surfaces]
         for body in bodies:
-            body.add_geom(**_shape(scene, form), **surface)
-        spec.worldbody.add_geom(**_floor(form), **surface)
+            body.add_geom(**_shape(scene, form), friction=[min(coefficients), 0.005, 0.0001])
+        for plane, coefficient in zip(_planes(scene, form), coefficients, strict=True):
+            spec.worldbody.add_geom(**plane, friction=[coefficient, 0.005, 0.0001])
     return spec
 
 
 def calibrated_specification(
-    scene: Scenario, dt: float, integrator: str, form: Mapping[str, str], pair: Mapping[str, Any], flags: Mapping[str, str]
+    scene: Scenario, dt: float, integrator: str, form: Mapping[str, str], pairs: Sequence[Mapping[str, Any]], flags: Mapping[str, str]
 ) -> Any:
     """The specification of a calibrated simulation.
 
@@ -114,12 +115,12 @@ def calibrated_specification(
         dt: Time step [s].
         integrator: A key of `INTEGRATORS`.
         form: How the scene is written, as `FORM`.
-        pair: Settings of the contact pair; without any, MuJoCo detects neither contacts nor constraints.
+        pairs: Settings of the contact pair of each of the scene's surfaces; without any, MuJoCo detects neither contacts nor constraints.
         flags: Solver settings that the installed version has, by their names in MJCF.
     """
     spec, bodies = _free_bodies(scene, dt, integrator, form)
     option, disable = spec.option, mujoco.mjtDisableBit
-    if not pair:
+    if not pairs:
         option.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT
         return spec
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -129,10 +130,12 @@ def calibrated_specification(
     if "diagexact" in flags:
         option.enableflags = mujoco.mjtEnableBit.mjENBL_DIAGEXACT
     passive = {"contype": 0, "conaffinity": 0}  # the pairs are the only contacts
-    spec.worldbody.add_geom(name="floor", **_floor(form), **passive)
+    for number, plane in enumerate(_planes(scene, form)):
+        spec.worldbody.add_geom(name=f"plane {number}", **plane, **passive)
     for number, body in enumerate(bodies):
         body.add_geom(name=f"shape {number}", **_shape(scene, form), **passive)
-        spec.add_pair(geomname1="floor", geomname2=f"shape {number}", **pair)
+        for plane_number, pair in enumerate(pairs):
+            spec.add_pair(geomname1=f"plane {plane_number}", geomname2=f"shape {number}", **pair)
     return spec
 
 
@@ -149,7 +152,7 @@ def _free_bodies(scene: Scenario, dt: float, integrator: str, form: Mapping[str,
     if scene.floor is not None and _is_mesh(scene, form):
         spec.add_mesh(name="hull", uservert=scene.body.hull.ravel().tolist())
     if scene.floor is not None and form["floor"] == "mesh":
-        spec.add_mesh(name="floor", uservert=list(chain(*product((-FLOOR_HALF_SIZE, FLOOR_HALF_SIZE), repeat=3))))
+        spec.add_mesh(name="floor", uservert=list(chain(*product(*((-half, half) for half in box_of(scene.floor))))))
     bodies = []
     for one in bodies_in(scene, form["beside"]):
         body = spec.worldbody.add_body()
@@ -187,10 +190,16 @@ def _shape(scene: Scenario, form: Mapping[str, str]) -> dict[str, Any]:
     return {"type": kinds.mjGEOM_BOX if isinstance(body, Box) else kinds.mjGEOM_ELLIPSOID, "size": body.half_extents, **at}
 
 
-def _floor(form: Mapping[str, str]) -> dict[str, Any]:
-    """The geom of the floor."""
-    if form["floor"] == "box":
-        return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [FLOOR_HALF_SIZE] * 3, "pos": [0.0, -FLOOR_HALF_SIZE, 0.0]}
+def _planes(scene: Scenario, form: Mapping[str, str]) -> list[dict[str, Any]]:
+    """The geoms of the floor and of the walls."""
+    assert scene.floor is not None
+    plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0]}
+    half = box_of(scene.floor)
+    floor = plane | {"quat": UPWARD}
     if form["floor"] == "mesh":
-        return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "floor", "pos": [0.0, -FLOOR_HALF_SIZE, 0.0]}
-    return {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "quat": UPWARD}
+        floor = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "floor", "pos": [0.0, -half[1], 0.0]}
+    elif form["floor"] == "box" or scene.floor.ends:
+        floor = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": half, "pos": [0.0, -half[1], 0.0]}
+    to_y = np.roll(UPWARD, -1)
+    walls = [plane | {"pos": wall.point, "quat": np.roll(multiply(conjugate(wall.frame), to_y), 1)} for wall in scene.wall or ()]
+    return [floor, *walls]

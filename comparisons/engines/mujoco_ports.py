@@ -48,10 +48,10 @@ class Port(Engine):
 def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -> tuple[Any, dict[str, Any]]:
     """A compiled model without the flags that ports lack (autoreset, diagexact), and its settings."""
     floor = scene.floor
-    pair = contact(floor, dt)
+    pair = {} if floor is None else contact(floor, dt)
     if floor is not None and floor.friction == "infinite" and precision is np.float32:
         pair["friction"][:2] = [STICKING, STICKING]
-    spec = calibrated_specification(scene, dt, integrator, FORM, pair, {})
+    spec = calibrated_specification(scene, dt, integrator, FORM, [pair] if pair else [], {})
     settings: dict[str, Any] = {"mujoco": mujoco.__version__, "precision": np.dtype(precision).name, "integrator": integrator}
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     if pair:

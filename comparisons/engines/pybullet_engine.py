@@ -22,6 +22,7 @@ from dropspin.comparisons.engines.mapping import (
     may_tumble,
     refusal_of_floor,
     refusal_of_hull,
+    refusal_of_neighbour,
 )
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
 from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION, PyBulletSimulation
@@ -80,7 +81,7 @@ REASONS = {name: why for name, (_, why) in WORLD.items()} | {
 class PyBullet(Engine):
     """Bullet's rigid body on a plane, or on a large box (boxes); or with its defaults (profile=default)."""
 
-    name, order, reasons, shapes, takes_offsets = "pybullet", 1.0, REASONS, SHAPES, True
+    name, order, reasons, shapes, takes_offsets, takes_walls = "pybullet", 1.0, REASONS, SHAPES, True, True
     choices: ClassVar = {
         "coordinates": ("maximal", "multibody"),
         "profile": PROFILES,
@@ -132,13 +133,18 @@ class PyBullet(Engine):
             return unfit
         if isinstance(scene.body, Vertices) and not is_hull and len(scene.body.hull) > MOST_BALLS:
             return f"the adapter builds compound shapes of at most {MOST_BALLS} parts; the convex hull has {len(scene.body.hull)} vertices"
-        unfit = refusal_of_floor(scene, self._floor_in(scene))
-        if unfit is None and not isinstance(floor.friction, str) and floor.friction > STRONGEST_FRICTION:
-            return f"Bullet caps friction at {STRONGEST_FRICTION:g}; the floor has {floor.friction:g}"
+        unfit = refusal_of_floor(scene, self._floor_in(scene)) or refusal_of_neighbour(scene, self.option("beside"))
+        strongest = max(friction_of(surface, gripping=0.0) for surface in scene.surfaces)
+        if unfit is None and strongest > STRONGEST_FRICTION:
+            return f"Bullet caps friction at {STRONGEST_FRICTION:g}; the scene has {strongest:g}"
+        if unfit is None and floor.ends and self.option("floor") == "mesh":
+            return "the adapter builds a floor that ends as a box"
+        if unfit is None and not self.is_default and any(surface.rest_speed != floor.rest_speed for surface in scene.surfaces):
+            return "Bullet has one speed below which restitution is 0; those of the floor and the walls differ"
         return unfit
 
     def _floor_in(self, scene: Scenario) -> str:
-        """The floor of a scene: `plane`, `box` or `mesh`; `fitting` is a plane, or, calibrated, a box for what can lie."""
+        """The floor of a scene, and its walls: `plane`, `box` or `mesh`; `fitting` is a plane, or, calibrated, a box for what can lie."""
         if self.option("floor") == "fitting":
             return "box" if isinstance(scene.body, Box | OnAxis) and not self.is_default else "plane"
         return self.option("floor")

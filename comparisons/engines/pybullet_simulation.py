@@ -13,12 +13,22 @@ from typing import Any
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, KnownLimitation, Simulation
-from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, SQUARE, TRIANGLES, bodies_in, built, principal_frame
+from dropspin.comparisons.engines.mapping import (
+    FLOOR_HALF_SIZE,
+    SQUARE,
+    TRIANGLES,
+    bodies_in,
+    box_of,
+    built,
+    friction_of,
+    principal_frame,
+)
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.bodies import Body, Box, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Sphere
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
+from dropspin.scenarios.model import Floor, Surface, Wall
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, UP, VELOCITY
 
@@ -51,7 +61,7 @@ class PyBulletSimulation(Simulation):
             scene: The scene.
             dt: Time step [s].
             form: The profile (`calibrated` or `default`), the coordinates (`maximal` or `multibody`), and how body and floor are built.
-            floor: `plane`, `box`, or `mesh` (two triangles).
+            floor: `plane`, `box`, or `mesh` (two triangles); walls are then boxes if the floor is one, else planes.
             parameters: Of the physics engine.
             dynamics: Properties of the body.
         """
@@ -64,8 +74,14 @@ class PyBulletSimulation(Simulation):
         try:
             self._bullet.setPhysicsEngineParameter(**parameters)
             self._bullet.setGravity(*map(float, scene.acceleration))
-            if scene.floor is not None:
-                self._add_floor(floor, dynamics)
+            # Bullet multiplies the coefficients of the two bodies; with 1 for one of them, the product is the scene's value.
+            if scene.wall is not None:
+                dynamics = dynamics | {"restitution": 1.0, "lateralFriction": 1.0}
+            for surface in scene.surfaces:
+                own = {"restitution": surface.restitution, "lateralFriction": friction_of(surface, STRONGEST_FRICTION)}
+                contact = {name: dynamics[name] for name in CONTACT if name in dynamics}
+                contact |= own if scene.wall is not None else {"restitution": 1.0, "lateralFriction": 1.0}
+                self._bullet.changeDynamics(self._add_plane(surface, floor), -1, **contact)
             self._body, *_ = [self._add_body(one, form["body"], dynamics) for one in bodies_in(scene, form["beside"])]
         except BaseException:
             self._reset()
@@ -109,18 +125,21 @@ class PyBulletSimulation(Simulation):
         balls, radii = [bullet.GEOM_SPHERE] * len(corners), [BALL * body.size] * len(corners)
         return bullet.createCollisionShapeArray(balls, radii=radii, collisionFramePositions=corners)
 
-    def _add_floor(self, kind: str, dynamics: Mapping[str, float]) -> None:
-        bullet, top = self._bullet, 0.0
-        if kind == "plane":
-            shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0, 1, 0])
-        elif kind == "mesh":
+    def _add_plane(self, surface: Surface, kind: str) -> int:
+        """Add the floor, or a wall, and return its number."""
+        bullet, half = self._bullet, [FLOOR_HALF_SIZE] * 3
+        normal, point = (surface.normal, surface.point) if isinstance(surface, Wall) else (UP, np.zeros(3))
+        if isinstance(surface, Floor) and kind == "mesh":
             flags, indices = bullet.GEOM_FORCE_CONCAVE_TRIMESH, list(chain(*TRIANGLES))
-            shape = bullet.createCollisionShape(bullet.GEOM_MESH, flags=flags, vertices=SQUARE, indices=indices)
-        else:  # on a plane, Bullet gives a box one contact point per step
-            shape, top = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[FLOOR_HALF_SIZE] * 3), FLOOR_HALF_SIZE
-        # Bullet multiplies the coefficients of the two bodies; with 1 for the floor, the product is the scene's value.
-        contact = {name: dynamics[name] for name in CONTACT if name in dynamics} | {"restitution": 1.0, "lateralFriction": 1.0}
-        bullet.changeDynamics(self._add(0.0, shape, [0, -top, 0]), -1, **contact)
+            return self._add(0.0, bullet.createCollisionShape(bullet.GEOM_MESH, flags=flags, vertices=SQUARE, indices=indices), [0, 0, 0])
+        if kind != "box" and not (isinstance(surface, Floor) and surface.ends):
+            return self._add(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=list(normal)), list(point))
+        # A box, because on a plane Bullet gives a box one contact point per step.
+        if isinstance(surface, Floor):
+            half = box_of(surface)
+        turn = {"baseOrientation": conjugate(surface.frame).tolist()} if isinstance(surface, Wall) else {}
+        position = (np.array(point) - half[1] * np.array(normal)).tolist()
+        return self._add(0.0, bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half), position, **turn)
 
     def advance(self, steps: int) -> None:
         step, client = self._bullet.module.stepSimulation, self._bullet.client
@@ -206,6 +225,8 @@ def _limitations_met(scene: Scenario, rows: Array, dt: float, is_maximal: bool) 
         yield KnownLimitation(f"Bullet has no ellipsoids: this one is the convex hull of {len(scene.body.outline.vertices)} points")
     if isinstance(scene.body, Cylinder) and _stands(scene.body, rows):
         yield KnownLimitation("Bullet gives a cylinder that lands upright one contact point in the first step, so that it tips")
+    if scene.wall is not None:
+        return  # the impulse of the floor is not known apart from those of walls
     fall, friction = dt * scene.acceleration, scene.floor.coefficient
     pushes = np.diff(rows[:, VELOCITY], axis=0) - fall
     along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]

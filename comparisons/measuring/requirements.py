@@ -24,11 +24,11 @@ def spins(scene: Scenario, truth: Truth | None) -> bool:
 
 
 def has_impact(scene: Scenario, truth: Truth | None) -> bool:
-    """An exact solution with an impact.
+    """An exact solution with an impact, the first one with the floor.
 
     The body starts above the floor.
     """
-    return truth is not None and len(truth.events) > 0 and scene.starts_above_floor
+    return truth is not None and len(truth.events) > 0 and truth.events[0].wall is None and scene.starts_above_floor
 
 
 def has_newton_restitution(scene: Scenario, truth: Truth | None) -> bool:
@@ -42,6 +42,7 @@ def lands(scene: Scenario, truth: Truth | None) -> bool:
         truth is not None
         and not starts_in_flight(scene)
         and len(truth.events) > 0
+        and truth.events[0].wall is None
         and bool(truth.events[0].time > 0.0 and truth.events[0].before[SPIN].any())
     )
 

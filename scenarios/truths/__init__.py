@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from dropspin.scenarios.errors import DropspinError
-from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario
 from dropspin.scenarios.state import VELOCITY
 from dropspin.scenarios.truths.bounce import bounce_ladder
 from dropspin.scenarios.truths.corner_impact import corner_impact
@@ -14,6 +14,7 @@ from dropspin.scenarios.truths.coulomb_slide import coulomb_slide
 from dropspin.scenarios.truths.coulomb_turn import coulomb_turn
 from dropspin.scenarios.truths.flight import flight
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, LAWS, Law, law_of
+from dropspin.scenarios.truths.near import until_near
 from dropspin.scenarios.truths.rocking import rocking
 from dropspin.scenarios.truths.rolling import rolling
 from dropspin.scenarios.truths.slipping import slipping
@@ -50,15 +51,27 @@ def truth_for(scene: Scenario, law: Law | None = None) -> Truth | None:
     if not isinstance(scene, Scenario):
         raise DropspinError(f"scene: got {scene!r} ({type(scene).__name__}); give a Scenario, as load() returns it.")
     floor = scene.floor
-    if scene.has_edges_or_walls:
-        return None
     if floor is None:
         return flight(scene) if law is None else None
     if scene.damping is not None:
         return None
+    if scene.has_edges_or_walls:
+        return _among_planes(scene, floor, law)
     if law is not None:
         return corner_impact(scene, floor, law)
     return next(filter(None, (problem(scene, floor) for problem in ON_FLOOR)), None)
+
+
+def _among_planes(scene: Scenario, floor: Floor, law: Law | None) -> Truth | None:
+    """The solution that holds longest with walls, or on a floor that ends: that of impacts, or one of the floor alone while it is true."""
+    if scene.clearance < -TOUCHING * scene.body.size:
+        return None  # it starts beside or below the floor
+    struck = corner_impact(scene, floor, law)
+    found = [struck and until_near(scene, struck, walls=False)]
+    if law is None:
+        others = (problem(scene, floor) for problem in ON_FLOOR if problem is not corner_impact)
+        found += [until_near(scene, other) for other in others if other is not None]
+    return max(filter(None, found), key=lambda truth: truth.horizon, default=None)
 
 
 def other_laws(scene: Scenario) -> dict[Law, Truth]:
@@ -67,10 +80,10 @@ def other_laws(scene: Scenario) -> dict[Law, Truth]:
     Where the slip turns during an impact these are different models, and none is the error of another.
 
     Returns:
-        By law; empty without an impact with a coefficient of friction, and where the laws agree.
+        By law; empty without an impact with a coefficient of friction, with walls, and where the laws agree.
     """
     truth = truth_for(scene)
-    if truth is None or not truth.events or law_of(scene) not in FRICTION_LAWS:
+    if truth is None or not truth.events or scene.wall is not None or law_of(scene) not in FRICTION_LAWS:
         return {}
     found = {law: truth_for(scene, law) for law in FRICTION_LAWS if law != law_of(scene)}
     return {law: other for law, other in found.items() if other is not None and _has_other_impulses(truth, other)}

@@ -1,4 +1,6 @@
-"""A body falls and strikes the floor repeatedly, as a ball or with a corner or an edge: flight, impulse, flight, and so on.
+"""A body strikes the floor and walls repeatedly, as a ball or with a corner or an edge: flight, impulse, flight, and so on.
+
+A wall is the floor in its own frame: the search for its impacts, and their laws, are those of the floor.
 
 The impulse is that of `impact_laws`: normal without friction, eq 17 of Wang's lecture note with infinite friction, else that of the floor's
 `impact_law`; or that of a given law.
@@ -8,17 +10,18 @@ Valid for: impacts of one corner, or of the two corners of an edge that strike t
 a ball with any spin; no damping. The solution ends, and gives the reason, at the first of these events: the hundredth impact; an impact
 that is not of this kind, or for which the law has no solution or several, or in which the floor would have to pull (as eq 17 may demand of
 a corner that slides fast), or after which the body stays on the floor; a flight that is short relative to the longest, as before impacts
-accumulate; a time at which rounding determines whether the body touches the floor or when it turns over; growth of an initial disturbance
-of 1e-10 rad/s to 1e-6.
+accumulate or where two planes are struck at once; a time at which rounding determines whether the body touches a plane or when it turns
+over; growth of an initial disturbance of 1e-10 rad/s to 1e-6.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Floor, Scenario, Surface, Wall
+from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.contact_search import Contact, ContactSearch
 from dropspin.scenarios.truths.flight import TURNS_OVER, Flight, flight_states
@@ -52,10 +55,10 @@ def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Trut
     Args:
         scene: The scene, without damping.
         floor: Its floor.
-        law: The impact law; by default the floor's.
+        law: The impact law; by default that of each surface.
     """
-    law = law or law_of(scene)
-    flights = _until_sensitive(scene, floor, law)
+    planes = [_Plane(surface, law or law_of(scene, surface), number) for number, surface in enumerate(scene.surfaces)]
+    flights = _until_sensitive(scene, planes)
     events = tuple(flight.impact for flight in flights if flight.impact is not None)
     begins, last = np.array([0.0, *(event.time for event in events)]), flights[-1]
     if last.end == 0.0 or (not events and last.is_other_impact):
@@ -70,14 +73,48 @@ def corner_impact(scene: Scenario, floor: Floor, law: Law | None = None) -> Trut
 
     if not events:
         return Truth("flight", "free flight above the floor", states, horizon=last.end, ends=last.reason)
-    impulse = LAW_NAMES[law] if law != "note" else "eq 15" if floor.friction == "none" else "sticking impulse, eq 17"
-    points = len(_touching(scene, events[0].before))
+    struck = [planes[0 if event.wall is None else 1 + event.wall] for event in events]
+    impulse = ", ".join(dict.fromkeys(plane.law_name for plane in struck))
+    points = len(_touching(scene, struck[0].seen(events[0].before)))
     where = {1: "corner", 2: "edge"}.get(points, "face")
     if scene.body.semi_axes.any():
         where = "ball" if scene.body.is_ball else "point"
     count = "one" if len(events) == 1 else str(len(events))
     statement = f"free rotor and parabola, {count} {where} impact{'s' if len(events) > 1 else ''} ({impulse})"
     return Truth(f"{where}-impact", statement, states, events, last.end, last.reason)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """The floor, which is number 0, or a wall, and its impact law."""
+
+    surface: Surface
+    law: Law
+    number: int
+
+    @property
+    def name(self) -> str:
+        return f"wall[{self.number - 1}]" if self.number else "floor"
+
+    @property
+    def law_name(self) -> str:
+        if self.law != "note":
+            return LAW_NAMES[self.law]
+        return "eq 15" if self.surface.friction == "none" else "sticking impulse, eq 17"
+
+    def seen(self, state: Array) -> Array:
+        """A state in the frame in which the plane is the floor."""
+        return self.surface.as_floor(state) if isinstance(self.surface, Wall) else state
+
+    def seen_flight(self, flight: Flight, inertia: Array) -> Flight:
+        """A flight in this frame."""
+        if not isinstance(self.surface, Wall):
+            return flight
+        return flight_states(self.seen(flight.start), inertia, rotate(self.surface.frame, flight.acceleration))
+
+    def unseen(self, rates: Array) -> Array:
+        """Velocity and angular velocity in the world, from those in this frame, shape (6,)."""
+        return unrotate(self.surface.frame, rates.reshape(2, 3)).ravel() if isinstance(self.surface, Wall) else rates
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,20 +128,24 @@ class _Flight:
     is_other_impact: bool = False  # one that the formula does not cover
 
 
-def _flights(scene: Scenario, floor: Floor, start: Array, law: Law) -> Iterator[_Flight]:
-    """The flights from a state, until the scene ends, the body stays on the floor, or an impact is not covered by the formula."""
+def _flights(scene: Scenario, planes: Sequence[_Plane], start: Array) -> Iterator[_Flight]:
+    """The flights from a state, until the scene ends, the body stays on a plane, or an impact is not covered by the formula."""
     inertia, g = scene.body.inertia_tensor, scene.acceleration
-    motion, now, longest = flight_states(start, inertia, g), 0.0, 0.0
+    motion, now, longest, left = flight_states(start, inertia, g), 0.0, 0.0, None
     for number in range(MAX_IMPACTS + 1):
         until = min(scene.duration, now + motion.horizon)
-        contact = _next_impact(scene, motion, until - now, leaves=number > 0)
-        if contact is None:
+        found = [(plane, _next_impact(scene, plane.seen_flight(motion, inertia), until - now, leaves=plane is left)) for plane in planes]
+        contacts = sorted(((plane, contact) for plane, contact in found if contact is not None), key=lambda one: one[1].time)
+        if not contacts:
             yield _Flight(motion, until, reason="" if until == scene.duration else TURNS_OVER)
             return
+        plane, contact = contacts[0]
         now += contact.time
         reason = ""
         if not contact.is_decided:
-            reason = "rounding determines whether the body touches the floor"
+            reason = f"rounding determines whether the body touches the {plane.name}"
+        elif len(contacts) > 1 and contacts[1][1].time - contact.time <= SHORTEST_FLIGHT * max(longest, contact.time):
+            reason = "the body strikes two planes at once"
         elif contact.time < SHORTEST_FLIGHT * longest:
             reason = "impacts follow one another ever faster"
         elif number == MAX_IMPACTS:
@@ -113,39 +154,40 @@ def _flights(scene: Scenario, floor: Floor, start: Array, law: Law) -> Iterator[
             yield _Flight(motion, now, reason=reason)
             return
         longest, before = max(longest, contact.time), motion(np.array([contact.time]))[0]
-        touching = _touching(scene, before)
-        impact = _impact(scene, floor, law, touching, now, before)
+        touching = _touching(scene, plane.seen(before))
+        impact = _impact(scene, plane, touching, now, before)
         if isinstance(impact, str):
             yield _Flight(motion, now, reason=impact, is_other_impact=True)
             return
         yield _Flight(motion, now, impact)
-        motion = flight_states(impact.after, inertia, g)
-        if not _leave(touching, impact.after):
-            yield _Flight(motion, now, reason="the body stays on the floor")
+        motion, left = flight_states(impact.after, inertia, g), plane
+        if not _leave(touching, plane.seen(impact.after)):
+            yield _Flight(motion, now, reason=f"the body stays on the {plane.name}")
             return
 
 
-def _impact(scene: Scenario, floor: Floor, law: Law, touching: Array, time: float, before: Array) -> Impact | str:
+def _impact(scene: Scenario, plane: _Plane, touching: Array, time: float, before: Array) -> Impact | str:
     """The impact of the touching points, or why the formula does not cover it."""
-    rates = velocities_after(before, touching.mean(axis=0), scene.body.mass, scene.body.inertia_tensor, floor, law)
+    seen = plane.seen(before)
+    rates = velocities_after(seen, touching.mean(axis=0), scene.body.mass, scene.body.inertia_tensor, plane.surface, plane.law)
     if rates is None:
         return "the impact law has no solution, or several"
-    after = before.copy()
-    after[RATES] = rates
-    if after[VELOCITY] @ UP <= before[VELOCITY] @ UP:
-        return "the impact law would have the floor pull"
-    if not (_have_one_velocity(touching, before) and _have_one_velocity(touching, after)):
-        return "several points strike the floor at once"
-    return Impact(time, before, after)
+    seen_after, after = seen.copy(), before.copy()
+    seen_after[RATES], after[RATES] = rates, plane.unseen(rates)
+    if seen_after[VELOCITY] @ UP <= seen[VELOCITY] @ UP:
+        return f"the impact law would have the {plane.name} pull"
+    if not (_have_one_velocity(touching, seen) and _have_one_velocity(touching, seen_after)):
+        return f"several points strike the {plane.name} at once"
+    return Impact(time, before, after, plane.number - 1 if plane.number else None)
 
 
-def _until_sensitive(scene: Scenario, floor: Floor, law: Law) -> list[_Flight]:
+def _until_sensitive(scene: Scenario, planes: Sequence[_Plane]) -> list[_Flight]:
     """The flights up to the impact after which a disturbance of the initial state has grown by more than `MAX_GROWTH`."""
     per_radian = np.array([scene.body.size] * 3 + [1.0] * 3)  # speeds, m/s, to rates of rotation
     flights: list[_Flight] = []
-    disturbed = _flights(scene, floor, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION, law)
+    disturbed = _flights(scene, planes, scene.initial_state + DISTURBANCE * DISTURBED_DIRECTION)
     others: list[_Flight] = []
-    for number, flight in enumerate(_flights(scene, floor, scene.initial_state, law)):
+    for number, flight in enumerate(_flights(scene, planes, scene.initial_state)):
         flights.append(flight)
         if number == 0 or flight.impact is None:
             continue
@@ -162,21 +204,21 @@ def _next_impact(scene: Scenario, flight: Flight, duration: float, leaves: bool)
 
     Args:
         scene: The scene.
-        flight: A flight that starts at or above the floor.
+        flight: A flight that starts at or above the floor, which is the plane in its frame.
         duration: Length of the search [s].
         leaves: Whether the body leaves the floor at the beginning of the flight, after an impact.
     """
     body, start = scene.body, flight.start
     is_on_floor = start[1] + body.lowest(start[ORIENTATION], 0.0)[0, 1] <= TOUCHING * body.size
-    if is_on_floor and not leaves and _descends(scene, start):
+    if is_on_floor and not leaves and _descends(scene, start, flight.acceleration):
         return Contact(0.0, True)
     return ContactSearch(flight, body.hull, body.semi_axes).next_contact(duration)
 
 
-def _descends(scene: Scenario, state: Array) -> bool:
+def _descends(scene: Scenario, state: Array, gravity: Array) -> bool:
     """Whether a point on the floor descends, or rests and is not pulled upwards."""
     slowest = float(_rising(_touching(scene, state), state).min())
-    return slowest < -_no_speed(scene, state) or (abs(slowest) <= _no_speed(scene, state) and scene.acceleration[1] <= 0.0)
+    return slowest < -_no_speed(scene, state) or (abs(slowest) <= _no_speed(scene, state) and gravity[1] <= 0.0)
 
 
 def _touching(scene: Scenario, state: Array) -> Array:

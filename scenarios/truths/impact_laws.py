@@ -21,7 +21,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.model import Scenario, Surface
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY, Array
 from dropspin.scenarios.truths.friction_impact import Restitution, cone_impulse, integrated_impulse
@@ -32,21 +32,24 @@ FRICTION_LAWS: tuple[Law, ...] = ("cone", "integrated-newton", "integrated-poiss
 ENDS: dict[str, Restitution] = {"integrated-newton": "newton", "integrated-poisson": "poisson", "integrated-energy": "energy"}
 
 
-def law_of(scene: Scenario) -> Law:
-    """The impact law of the exact solution: the normal impulse without friction, eq 17 with infinite friction, else that of the floor.
+def law_of(scene: Scenario, surface: Surface | None = None) -> Law:
+    """The impact law of the exact solution: the normal impulse without friction, eq 17 with infinite friction, else that of the surface.
 
-    All laws with a coefficient of friction are Coulomb's for a ball of equal moments, whose slip does not turn in an impact.
+    The surface is by default the floor. All laws with a coefficient of friction are Coulomb's for a ball of equal moments, whose slip does
+    not turn in an impact.
     """
-    assert scene.floor is not None
-    if isinstance(scene.floor.friction, str):
-        return "normal" if scene.floor.friction == "none" else "note"
+    surface = surface or scene.floor
+    assert surface is not None
+    if isinstance(surface.friction, str):
+        return "normal" if surface.friction == "none" else "note"
     is_round = scene.body.is_ball and float(np.ptp(np.linalg.eigvalsh(scene.body.inertia_tensor))) == 0.0
-    return "coulomb" if is_round else scene.floor.impact_law
+    return "coulomb" if is_round else surface.impact_law
 
 
-def velocities_after(state: Array, point: Array, mass: float, inertia: Array, floor: Floor, law: Law) -> Array | None:
+def velocities_after(state: Array, point: Array, mass: float, inertia: Array, surface: Surface, law: Law) -> Array | None:
     """Velocity and angular velocity, shape (6,), after the impact of one point, offset `point` from the centre in the world frame [m].
 
+    A state in the frame of a wall gives them in that frame.
     None if the law has no solution, or several.
     """
     q, v, w = state[ORIENTATION], state[VELOCITY], state[SPIN]
@@ -55,8 +58,8 @@ def velocities_after(state: Array, point: Array, mass: float, inertia: Array, fl
     arm = np.cross(np.eye(3), point)  # as a matrix: arm @ j = point × j
     response = np.eye(3) / mass - arm @ inverse @ arm
     approach = v + np.cross(w, point)
-    e = 0.0 if abs(approach[1]) < floor.rest_speed else floor.restitution
-    impulse = _impulse(law, response, approach, e, floor.friction)
+    e = 0.0 if abs(approach[1]) < surface.rest_speed else surface.restitution
+    impulse = _impulse(law, response, approach, e, surface.friction)
     return None if impulse is None else np.concatenate([v + impulse / mass, w + inverse @ np.cross(point, impulse)])
 
 

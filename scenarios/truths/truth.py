@@ -15,17 +15,19 @@ States = Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Impact:
-    """One collision with the floor.
+    """One collision with the floor or a wall.
 
     Attributes:
         time: Time of the collision [s].
         before: State just before, shape (13,).
         after: State just after, shape (13,).
+        wall: The number of the wall; None for the floor.
     """
 
     time: float
     before: Array
     after: Array
+    wall: int | None = None
 
 
 def impacts_of(times: Array, before: Array, after: Array) -> tuple[Impact, ...]:

@@ -202,7 +202,7 @@ def public_members(kind):
 
 def test_page_on_adapters_documents_every_attribute_of_a_scene():
     """And no other; each once."""
-    tables = {"start": [model.Start], "gravity": [model.Gravity], "floor": [model.Floor], "damping": [model.Damping]}
+    tables = {"start": [model.Start], "gravity": [model.Gravity], "floor": [model.Floor], "wall": [model.Wall], "damping": [model.Damping]}
     tables["body"] = list(get_args(bodies.Shapes))
     parts = {f"{table}.{name}" for table, kinds in tables.items() for kind in kinds for name in public_members(kind)}
     [names] = rows_of("What a scene holds").values()

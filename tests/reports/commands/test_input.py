@@ -69,7 +69,7 @@ CASES = [
     (("tradeoff", "ball.toml", "-e", "wang", "--within", "nan"), "nan is not a finite number"),
     (("tradeoff", "ball.toml", "-e", "wang", "--within", "inf"), "inf is not a finite number"),
     (("replay", "out", "--speed", "inf"), "inf is not a finite number"),
-    (("calibrate", "--restitution", "0.5", "--dt", "0.002", "--friction", "1e30"), "friction up to 1e+09; the floor has 1e+30"),
+    (("calibrate", "--restitution", "0.5", "--dt", "0.002", "--friction", "1e30"), "friction up to 1e+09; the scene has 1e+30"),
     (("show", "bracket.toml"), "a[b: unknown key. Allowed: "),
     (("show", "member.toml"), "constrained-x: unknown key. Allowed: "),
     (("show", "two\nlines.toml"), r"the argument 'two\nlines.toml' is not printable text"),

@@ -23,14 +23,15 @@ def bounce_ladder(results: Results, scene_name: str) -> Chart:
 
     Args:
         results: The run.
-        scene_name: One of its scenes; its exact solution must have an impact.
+        scene_name: One of its scenes; its exact solution must have impacts, all of them with the floor.
 
     Raises:
         DropspinError: The exact solution of the scene has no impact, or there is no exact solution.
     """
     scene = results.scenes[scene_name]
     truth = truth_for(scene)
-    if truth is None or not truth.events or not scene.starts_above_floor:
+    strikes = [] if truth is None else [event.wall is None for event in truth.events]
+    if truth is None or not strikes or not all(strikes) or not scene.starts_above_floor:
         raise DropspinError(f"{scene_name}: the exact solution has no bounces; choose a scene that has some, such as drop-ball.")
     exact, lasting = _exact_apexes(scene, truth, SHORTEST_FLIGHT * step_of(results.trajectories, scene_name, min))
     lines = []

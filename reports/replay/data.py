@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.replay.motions import Motion, Replay, axis_and_angle
-from dropspin.scenarios.rotations import about
+from dropspin.scenarios import Scenario
+from dropspin.scenarios.rotations import about, unrotate
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ def as_data(replay: Replay) -> dict[str, Any]:
         "dt": replay.dt,
         "interval": replay.interval,
         "sight": replay.sight,
-        "hasFloor": replay.scene.floor is not None,
+        "planes": _planes(replay.scene),
         "size": replay.scene.body.size,
         "spin": replay.spin,
         "body": {
@@ -41,6 +42,18 @@ def as_data(replay: Replay) -> dict[str, Any]:
         },
         "motions": [_motion(motion, replay.interval, POSITION_ERROR * replay.scene.body.size) for motion in replay.motions],
     }
+
+
+def _planes(scene: Scenario) -> list[dict[str, Any]]:
+    """The floor and the walls: a point, two unit vectors along the plane, and how far it extends along them, null without an end."""
+    if scene.floor is None:
+        return []
+    ends = scene.floor.half_extents
+    planes: list[dict[str, Any]] = [{"point": [0, 0, 0], "along": [[1, 0, 0], [0, 0, 1]], "ends": ends}]
+    for wall in scene.wall or ():
+        along = unrotate(wall.frame, np.eye(3)[[0, 2]])
+        planes.append({"point": wall.point, "along": along.round(9).tolist(), "ends": None})
+    return planes
 
 
 def _motion(motion: Motion, interval: float, tolerance: float) -> dict[str, Any]:

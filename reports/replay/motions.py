@@ -188,12 +188,13 @@ def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motio
 
 
 def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
-    events = truth.events
-    states = np.array([[event.before, event.after] for event in events]).reshape(-1, 13)
-    pairs = Trajectory.from_states(np.repeat([event.time for event in events], 2), states)
+    times = np.union1d(times, [event.time for event in truth.events])
+    on_floor = [event for event in truth.events if event.wall is None]
+    states = np.array([[event.before, event.after] for event in on_floor]).reshape(-1, 13)
+    pairs = Trajectory.from_states(np.repeat([event.time for event in on_floor], 2), states)
     before = np.arange(0, len(states), 2)
     impacts = Impacts(pairs.t[before], *floor_impulses(scene, pairs, before, before + 1))
-    return Motion(EXACT, "", exactly(truth, np.union1d(times, impacts.times)), None, impacts)
+    return Motion(EXACT, "", exactly(truth, times), None, impacts)
 
 
 def _errors(motion: Trajectory, exact: Trajectory) -> Array:

@@ -18,7 +18,8 @@ from dropspin.reports.html.replay import replay_page
 from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.replay import replay_of
 from dropspin.reports.replay.clip import write_clip
-from dropspin.reports.replay.motions import MOST_FRAMES, _stride, floor_impulses, impact_rows
+from dropspin.reports.replay.data import as_data
+from dropspin.reports.replay.motions import MOST_FRAMES, _stride, floor_impulses, impact_rows, replay_together
 from dropspin.scenarios import DropspinError, Trajectory, truth_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import about, angle_between_orientations, multiply, rotate
@@ -276,3 +277,20 @@ def test_damaged_run_is_refused(folder, tmp_path, damage):
     damage(copied)
     for verb in ("report", "replay"):
         assert_refused(dropspin(verb, copied, cwd=tmp_path), "not the folder of a run, or damaged")
+
+
+def test_planes_of_a_scene_are_drawn_and_impulses_are_those_of_the_floor():
+    surface = {"restitution": 0.8, "friction": "none"}
+    wall = surface | {"point": [1.0, 0.0, 0.0], "normal": [-0.6, 0.0, 0.8]}
+    start = {"position": [0.0, 0.5, 0.0], "velocity": [4.0, 1.0, 0.0]}
+    body, floor = {"shape": "sphere", "radius": 0.1, "mass": 1.0}, surface | {"half_extents": [4.0, 2.0]}
+    gravity = {"acceleration": [0.0, -9.8, 0.0]}
+    scene = ds.load({"duration": 0.6, "body": body, "start": start, "gravity": gravity, "floor": floor, "wall": [wall]})
+    replay = replay_together(scene, 1e-3, {"wang": ds.simulate(scene, "wang", 1e-3)})
+    floor_drawn, wall_drawn = as_data(replay)["planes"]
+    assert floor_drawn["ends"] == (4.0, 2.0)
+    np.testing.assert_allclose(np.array(wall_drawn["along"]) @ wall["normal"], 0.0, atol=1e-9)
+    exact = replay.motions[-1]
+    assert [event.wall for event in truth_for(scene).events] == [0, None]
+    np.testing.assert_allclose(exact.impacts.times, [truth_for(scene).events[1].time])
+    np.testing.assert_allclose(exact.impacts.impulses[:, [0, 2]], 0.0, atol=1e-12)

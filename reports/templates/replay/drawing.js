@@ -15,16 +15,19 @@
 
   const gridSpacing = (reach) => 10 ** Math.floor(Math.log10(reach / 2));
 
-  const drawFloor = (pen, { seen, target, reach }, ink) => {
+  // A grid on a plane, about the point of it that is nearest to the target.
+  const drawPlane = (pen, { seen, target, reach }, ink, { point, along, ends }) => {
     const spacing = gridSpacing(reach), lines = Math.ceil(reach / spacing);
-    const [x, z] = [Math.round(target[0] / spacing), Math.round(target[2] / spacing)];
+    const [x, z] = along.map((axis) => Math.round(axis.reduce((sum, share, i) => sum + share * (target[i] - point[i]), 0) / spacing));
+    const within = (u, i) => (ends ? Math.max(-ends[i], Math.min(ends[i], u)) : u);
+    const at = ([u, v]) => seen(point.map((start, i) => start + within(u * spacing, 0) * along[0][i] + within(v * spacing, 1) * along[1][i]));
     pen.strokeStyle = ink;
     pen.lineWidth = 1;
     pen.globalAlpha = 0.18;
     pen.beginPath();
     for (let n = -lines; n <= lines; n++) {
-      path(pen, [[(x + n) * spacing, 0, (z - lines) * spacing], [(x + n) * spacing, 0, (z + lines) * spacing]].map(seen));
-      path(pen, [[(x - lines) * spacing, 0, (z + n) * spacing], [(x + lines) * spacing, 0, (z + n) * spacing]].map(seen));
+      path(pen, [[x + n, z - lines], [x + n, z + lines]].map(at));
+      path(pen, [[x - lines, z + n], [x + lines, z + n]].map(at));
     }
     pen.stroke();
     pen.globalAlpha = 1;

@@ -5,7 +5,8 @@
       this.body = new Body(data.body, data.size);
       this.dt = data.dt;
       this.interval = data.interval;
-      this.hasFloor = data.hasFloor;
+      this.planes = data.planes;
+      this.hasFloor = this.planes.length > 0;
       this.sight = data.sight;
       this.spin = data.spin;
       this.scene = data.scene;
@@ -224,8 +225,8 @@
       const leading = motions.includes(filled) ? filled : motions[0] ?? exact;
       const view = this.camera.view(box, this.follow.checked && leading ? leading.at(this.time).position : null);
       const all = [...motions, ...(exact ? [exact] : [])], others = all.filter((motion) => motion !== filled);
+      for (const plane of this.planes) drawPlane(pen, view, ink, plane);
       if (this.hasFloor) {
-        drawFloor(pen, view, ink);
         pen.fillStyle = ink;
         pen.globalAlpha = 0.12;
         if (motions.includes(filled)) this.body.drawShadow(pen, view, filled.at(this.time));

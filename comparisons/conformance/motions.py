@@ -38,6 +38,8 @@ QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("ang
 """Those of `differences`."""
 CLEAR = 1e-3
 """Share of a speed, and ratio of a friction impulse, from which a difference is stated."""
+ELSEWHERE = 0.1
+"""Change of angular momentum about the contact point, over M r v, from which an impulse is stated to act elsewhere."""
 TURNED = math.radians(1.0)
 """Angle from which the direction of friction is stated to be wrong."""
 
@@ -224,6 +226,12 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
         wrong, right = (METRICS["restitution_error"].value_or_nan([one]) for one in (case, sampled))
         if abs(wrong - right) > CLEAR:
             yield f"restitution is {_instead(scene.floor.restitution + wrong - right, scene.floor.restitution)}"
+    moment = METRICS["contact_momentum_error"]
+    if moment.applies(scene, exact_solution(scene)) and (turned := moment.value_or_nan([case])) > ELSEWHERE:
+        yield (
+            f"the impulse of the first contact does not act at the contact point, about which it changes the angular momentum by {turned:.2g} "
+            "of mass × distance from the centre × speed"
+        )
     if float(np.linalg.norm((found - exact)[[0, 2]])) > allowed:
         yield from _of_friction(found, exact)
 

@@ -118,6 +118,7 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
             "the impulse of friction over that of the normal force is 0.24 instead of",
         ),
         ("friction pyramid in impacts", "slippery floor", "friction acts 14° from its exact direction"),
+        ("impulse at another vertex", "corner", "the impulse of the first contact does not act at the contact point, about which"),
         ("velocity left from earlier simulations", "repeats", "keeps state between simulations"),
     ],
 )

@@ -229,8 +229,8 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
     moment = METRICS["contact_momentum_error"]
     if moment.applies(scene, exact_solution(scene)) and (turned := moment.value_or_nan([case])) > ELSEWHERE:
         yield (
-            f"the impulse of the first contact does not act at the contact point, about which it changes the angular momentum by {turned:.2g} "
-            "of mass × distance from the centre × speed"
+            "the impulse of the first contact does not act at the contact point, about which it changes the angular momentum by "
+            f"{turned:.2g} of mass × distance from the centre × speed"
         )
     if float(np.linalg.norm((found - exact)[[0, 2]])) > allowed:
         yield from _of_friction(found, exact)

@@ -1,5 +1,6 @@
 """Moments and tensors of inertia, of any shape."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
@@ -55,6 +56,14 @@ def tensor(moments: tuple[Any, ...]) -> Array:
     """The tensor of moments as a table has them, shape (3, 3)."""
     given = np.array(moments)
     return np.diag(given) if given.ndim == 1 else given
+
+
+def second_moments(points: Array, masses: Array | float) -> Array:
+    """Σ m x xᵀ of masses [kg] at points [m], shape (3, 3).
+
+    Summed exactly, because the rounding of ten thousand terms would show in a comparison to the last digits.
+    """
+    return np.array([[math.fsum(masses * a * b) for b in points.T] for a in points.T])
 
 
 def is_diagonal(tensor: Array) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
 
 from dropspin.scenarios.bodies.hull import Outline, hull_corners, lowest_face, outline
-from dropspin.scenarios.bodies.inertia import Moments
+from dropspin.scenarios.bodies.inertia import Moments, second_moments
 from dropspin.scenarios.bodies.mesh_files import Faces
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
@@ -124,7 +124,7 @@ class Mesh(Shape):
         """
         if distribution in ("vertices", "note"):
             centre = self.points.mean(axis=0)
-            return float(len(self.points)), centre, (self.points - centre).T @ (self.points - centre)
+            return float(len(self.points)), centre, second_moments(self.points - centre, 1.0)
         n, centre = 4 if distribution == "solid" else 3, self.points.mean(axis=0)
         for _ in range(2):
             corners = (self.points - centre)[self.faces]

@@ -1,6 +1,5 @@
 """A body that is given by points, which are its only parts or the corners of a body with given moments of inertia."""
 
-import math
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -8,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dropspin.scenarios.bodies.hull import hull_corners, lowest_face
-from dropspin.scenarios.bodies.inertia import Moments
+from dropspin.scenarios.bodies.inertia import Moments, second_moments
 from dropspin.scenarios.bodies.shape import Shape, times
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import Positive, Vector
@@ -71,8 +70,7 @@ class Vertices(Shape):
 
     def tensor_of(self, distribution: str) -> Array:
         masses = self._point_masses if distribution == "vertices" else np.ones(len(self.points))
-        # Summed exactly, because the rounding of ten thousand terms would show in a comparison to the last digits.
-        spread = np.array([[math.fsum(masses * a * b) for b in self.vertices.T] for a in self.vertices.T])
+        spread = second_moments(self.vertices, masses)
         return np.trace(spread) * np.eye(3) - spread
 
     @property

@@ -14,7 +14,7 @@ from itertools import chain, combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.comparisons.conformance.impacts import BY_SLIP, decaying_restitution, explain_impact
+from dropspin.comparisons.conformance.impacts import PECULIARITIES, decaying_restitution, explain_impact
 from dropspin.comparisons.conformance.outcomes import CheckFailed, Declined, Noted
 from dropspin.comparisons.conformance.probes import DT, PROBES, Probe, differences, exact_solution
 from dropspin.comparisons.engines.base import Engine, KnownLimitation
@@ -73,7 +73,7 @@ def _in_impacts(engine: Engine, probe: Probe, motion: Trajectory) -> CheckFailed
     """A mistake in an impact, or that restitution decays, by which another fault could seem to explain the motion."""
     mistake = explain_impact(probe.scene, motion)
     if mistake is not None:
-        return Noted(mistake) if mistake == BY_SLIP else CheckFailed(mistake)
+        return Noted(mistake) if mistake in PECULIARITIES else CheckFailed(mistake)
     decay = decaying_restitution(engine) if probe.scene.floor is not None and probe.scene.floor.friction == "none" else None
     return None if decay is None else CheckFailed(decay)
 

@@ -19,6 +19,7 @@ from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 Array = NDArray[np.float64]
 
 NOT_ROTATED = "the inertia is not rotated into the world frame: there it is R I Rᵀ, and its inverse R I⁻¹ Rᵀ"
+ROTATED_BACK = "the inertia is rotated in the wrong direction: in the world frame it is R I Rᵀ, not Rᵀ I R"
 NOT_INVERTED = "the inverse of the inertia is not taken: a torque changes the angular velocity by I⁻¹ times it"
 ORDER = "the quaternion product is taken in the wrong order: with the angular velocity in the world frame, q' = 1/2 (ω, 0) q"
 SQUARE = "the square of the speed is used in place of the speed"
@@ -36,6 +37,10 @@ def _gyroscopic(q: Array, w: Array, inertia: Array) -> Array:
 
 def _not_rotated(q: Array, w: Array, inertia: Array) -> Array:
     return np.asarray(np.linalg.solve(inertia, cross(inertia @ w, w)))
+
+
+def _rotated_back(q: Array, w: Array, inertia: Array) -> Array:
+    return unrotate(q, _not_rotated(q, rotate(q, w), inertia))
 
 
 def _not_inverted(q: Array, w: Array, inertia: Array) -> Array:
@@ -126,6 +131,7 @@ MISTAKES = (
         )
     ),
     Mistake(NOT_ROTATED, _not_rotated),
+    Mistake(ROTATED_BACK, _rotated_back),
     Mistake(NOT_INVERTED, _not_inverted),
     Mistake("the gyroscopic term has the opposite sign: ω' = I⁻¹ (I ω × ω) without torque", _opposite),
 )

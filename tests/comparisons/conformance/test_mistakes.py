@@ -8,7 +8,7 @@ from support.students import Solver, student
 from support.transcription import UP, quaternion_product, rotation_matrix
 
 from dropspin.comparisons.conformance.checks import run_check
-from dropspin.comparisons.conformance.impacts import BY_SLIP
+from dropspin.comparisons.conformance.impacts import BY_SLIP, OF_NOTE
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.inputs import EngineEntry
 
@@ -78,6 +78,7 @@ MISTAKES = {
     "inertia not rotated": (NOT_ROTATED, "corner", {"inverse_inertia": lambda self, R: inv(self.inertia)}),
     "inertia not rotated in K": (NOT_ROTATED, "impacts", {"inverse_in_k": lambda self, R: inv(self.inertia)}),
     "inertia not rotated in a gyroscopic term": (NOT_ROTATED, "tumbling", gyroscopic(rotated=False)),
+    "inertia rotated back": ("rotated in the wrong direction", "impacts", {"inverse_inertia": lambda self, R: R.T @ inv(self.inertia) @ R}),
     "inverse not taken": (NOT_INVERTED, "corner", {"inverse_inertia": lambda self, R: R @ self.inertia @ R.T}),
     "inverse not taken in K": (NOT_INVERTED, "impacts", {"inverse_in_k": lambda self, R: R @ self.inertia @ R.T}),
     "neither": (f"{NOT_INVERTED}.*; and {NOT_ROTATED}", "gripping corner", {"inverse_inertia": lambda self, R: self.inertia}),
@@ -92,6 +93,7 @@ MISTAKES = {
     "restitution halved after each contact": (DECAYS, "later impacts", decaying(0.5)),
     "restitution halved before each contact": (DECAYS, "bouncing ball", decaying(0.5, before=True)),
     "restitution a tenth less": (DECAYS, "later impacts", decaying(0.9)),
+    "restitution a thirtieth less": (DECAYS, "later impacts", decaying(0.97)),
     "quaternions swapped": (ORDER, "turning", SWAPPED),
     "quaternions swapped, with a gyroscopic term": (ORDER, "tumbling", gyroscopic(**SWAPPED)),
     "not normalised": ("not normalised after each step", "turning", {"normalised": lambda self, q: q}),
@@ -126,6 +128,12 @@ def test_right_student_is_not_corrected():
         "slippery floor": BY_SLIP,
         "corner": "impacts follow the note law, as the engine states",
     }
+
+
+def test_law_of_the_note_is_recognised_where_it_is_not_stated():
+    engine_ = student()
+    type(engine_).discretisation = lambda self, scene: None
+    assert found(engine_, "corner") == {"corner": OF_NOTE}
 
 
 @pytest.mark.parametrize("name", ["wang", "mujoco", "mujoco[kappa=0.5]", "pybullet", "pybullet[coordinates=multibody]", "rapier", "dart"])

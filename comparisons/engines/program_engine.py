@@ -9,6 +9,7 @@ import inspect
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from select import select
 from signal import Signals
 from subprocess import PIPE, Popen
 from tempfile import TemporaryFile
@@ -19,6 +20,11 @@ import numpy as np
 from dropspin.comparisons.engines.base import Array, Engine, Simulation
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.validation import shown
+
+PATIENCE, PATIENCE_OF_A_STEP = (
+    10.0,
+    0.01,
+)  # s; without it, a program that keeps its answer in a buffer would wait for ever, as dropspin would
 
 
 class ProgramEngine(Engine):
@@ -54,12 +60,13 @@ class ProgramSimulation(Simulation):
             except OSError as error:
                 raise RuntimeError(f"{command[0]!r} cannot be started: {error.strerror}; `program` is {list(command)}") from None
             opened.callback(self._process.kill)
-            self._state = self._ask("start", "\n".join(scene_lines(scene, dt)))
+            self._state = self._ask("start", "\n".join(scene_lines(scene, dt)), PATIENCE)
             self._opened = opened.pop_all()
 
     def advance(self, steps: int) -> None:
         if steps:
-            self._state = self._ask(f"advance {steps}", f"advance {steps}")
+            request = f"advance {steps}"
+            self._state = self._ask(request, request, PATIENCE + steps * PATIENCE_OF_A_STEP)
 
     def state(self) -> Array:
         return self._state.copy()
@@ -67,14 +74,16 @@ class ProgramSimulation(Simulation):
     def close(self) -> None:
         self._opened.close()
 
-    def _ask(self, asked: str, lines: str) -> Array:
-        """The state that the program answers with, shape (13,)."""
+    def _ask(self, asked: str, lines: str, patience: float) -> Array:
+        """The state that the program answers with, within a wall time [s], shape (13,)."""
         requests, answers, answer = self._process.stdin, self._process.stdout, ""
         assert requests is not None
         assert answers is not None
         with suppress(BrokenPipeError):  # the program ended, which the empty answer says
             requests.write(f"{lines}\n")
             requests.flush()
+            if not select([answers], [], [], patience)[0]:
+                raise RuntimeError(f"the program did not answer {asked!r} within {patience:g} s; does it flush its output?")
             answer = answers.readline()
         if not answer:
             raise RuntimeError(f"the program ended with {self._end()} instead of answering {asked!r}")

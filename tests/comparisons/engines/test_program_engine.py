@@ -1,4 +1,4 @@
-"""Programs as engines: the documented one in C compared with `wang`, and programs that end, hang, or answer with something else."""
+"""Programs as engines: the documented one in C compared with `wang`, and programs that end, are silent, or answer with something else."""
 
 import re
 import shutil
@@ -12,6 +12,7 @@ import pytest
 
 import dropspin as ds
 from dropspin.comparisons.conformance.checks import run_check
+from dropspin.comparisons.engines import program_engine
 from dropspin.comparisons.engines.program_engine import scene_lines
 from dropspin.comparisons.running.inputs import EngineEntry
 from dropspin.comparisons.running.recording import Breakdown, divergence, try_record
@@ -82,13 +83,11 @@ def test_program_that_breaks_costs_its_row(engine, verdict, reason):
     assert re.search(reason, found.reason), found.reason
 
 
-@pytest.mark.usefixtures("engine_processes")
-def test_program_that_hangs_ends_at_the_limit():
-    """And the program ends with its engine's process."""
-    hanging = python("import time; time.sleep(1e3)")
-    found = ds.run(SPIN, [hanging, "pybullet"], 0.01, resources=ds.ResourceLimits(processor_time=0.5)).table
-    assert set(found[found["engine"] == "program"]["verdict"]) == {"timed_out"}
-    assert found[found["engine"] == "pybullet"]["value"].notna().all()
+def test_program_that_does_not_answer_is_ended(monkeypatch):
+    """It waits for its input, and dropspin for its answer, as when that stays in a buffer."""
+    monkeypatch.setattr(program_engine, "PATIENCE", 1.0)
+    found = try_record(python("pass"), SPIN, 0.01)
+    assert found.reason == "RuntimeError: the program did not answer 'start' within 1 s; does it flush its output?"
 
 
 def test_lines_of_a_scene_are_those_of_the_page():

@@ -39,7 +39,7 @@ QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("ang
 CLEAR = 1e-3
 """Share of a speed, and ratio of a friction impulse, from which a difference is stated."""
 ELSEWHERE = 0.1
-"""Change of angular momentum about the contact point, over M r v, from which an impulse is stated to act elsewhere."""
+"""Change of angular momentum about the contact point, over M r v, from which it is stated."""
 TURNED = math.radians(1.0)
 """Angle from which the direction of friction is stated to be wrong."""
 
@@ -230,8 +230,8 @@ def _of_first_contact(probe: Probe, case: Comparison) -> Iterator[str]:
     moment = METRICS["contact_momentum_error"]
     if moment.applies(scene, exact_solution(scene)) and (turned := moment.value_or_nan([case])) > ELSEWHERE:
         yield (
-            "the impulse of the first contact does not act at the contact point, about which it changes the angular momentum by "
-            f"{turned:.2g} of mass × distance from the centre × speed"
+            "the velocities change in the first contact otherwise than by an impulse at the contact point: the angular momentum about it "
+            f"changes by {turned:.2g} of mass × distance from the centre × speed"
         )
     if float(np.linalg.norm((found - exact)[[0, 2]])) > allowed:
         yield from _of_friction(found, exact)
@@ -252,6 +252,8 @@ def _instead(found: float, expected: float, unit: str = "") -> str:
     value = f"{found:.{_digits(found, expected)}g}{f' {unit}' if unit else ''} instead of {rounded(expected, 6)}"
     if expected == 0.0:
         return value
+    if found * expected < 0.0:
+        return f"{value} (of the opposite sign)"
     return f"{value} ({rounded(100.0 * abs(found / expected - 1.0), 2)} % too {'high' if abs(found) > abs(expected) else 'low'})"
 
 

@@ -5,6 +5,7 @@ import pytest
 from support import engines as made
 from support.bouncing import Bouncing, coulomb, pyramid, with_restitution
 from support.fault_suite import FAULTS
+from support.students import Solver, student
 
 from dropspin.comparisons.conformance.checks import run_check
 from dropspin.comparisons.conformance.probes import PROBES
@@ -77,6 +78,17 @@ def test_ball_whose_rebounds_end_early_is_not_said_to_sleep():
     assert "restitution is 0" not in message
 
 
+def test_restitution_of_the_opposite_sign_is_not_too_high():
+    """A turn the wrong way in the first impact drives the corner into the floor."""
+
+    def reversed_turn(self):
+        before = self.w
+        Solver.collide(self)
+        self.w = 2.0 * before - self.w
+
+    assert "restitution is -3 instead of 0.6 (of the opposite sign)" in failed(student(collide=reversed_turn), "corner")["corner"]
+
+
 def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
     """A floor 5 mm too high."""
     ball = next(probe for probe in PROBES if probe.name == "bouncing ball")
@@ -118,7 +130,11 @@ def test_height_of_the_first_contact_is_stated_only_if_it_is_wrong():
             "the impulse of friction over that of the normal force is 0.24 instead of",
         ),
         ("friction pyramid in impacts", "slippery floor", "friction acts 14° from its exact direction"),
-        ("impulse at another vertex", "corner", "the impulse of the first contact does not act at the contact point, about which"),
+        (
+            "impulse at another vertex",
+            "corner",
+            "the velocities change in the first contact otherwise than by an impulse at the contact point",
+        ),
         ("velocity left from earlier simulations", "repeats", "keeps state between simulations"),
     ],
 )

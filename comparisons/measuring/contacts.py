@@ -127,7 +127,7 @@ def contacts(scene: Scenario, motion: Trajectory) -> "pd.DataFrame":
 
     if scene.floor is None or scene.damping is not None or scene.has_edges_or_walls:
         raise DropspinError(
-            f"{scene.name}: the forces of the floor need a scene with a floor that does not end, without walls and damping."
+            f"{scene.name}: the forces of the floor need a scene with a floor that does not end, without walls and without damping."
         )
     motions = Motions.of(scene, motion)
     found = contact_residuals(scene, motion.states, motions)

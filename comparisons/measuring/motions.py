@@ -38,7 +38,8 @@ class Setup:
         damping: Decay rate of the velocity [1/s], shape (...); None if damping is not modelled.
         factor_dt: Time step that the factors of damping are meant at, which a step of another size may apply too [s]; 0 for rates.
         floor: Whether there is a floor.
-        edges_or_walls: Whether the floor ends, or there are walls, whose contacts are not those of `Motions.contacts`.
+        ends: Whether the floor ends, so that a body below y = 0 may be beside it.
+        walls: Whether there are walls, whose contacts are not those of `Motions.contacts`.
     """
 
     mass: Array
@@ -52,7 +53,8 @@ class Setup:
     damping: Array | None
     factor_dt: float
     floor: bool
-    edges_or_walls: bool = False
+    ends: bool = False
+    walls: bool = False
 
     @classmethod
     def of(cls, scene: Scenario) -> "Setup":
@@ -70,7 +72,8 @@ class Setup:
             damping=None if scene.damping is None else np.asarray(scene.damping.linear),
             factor_dt=0.0 if scene.damping is None else scene.damping.factor_dt or 0.0,
             floor=scene.floor is not None,
-            edges_or_walls=scene.has_edges_or_walls,
+            ends=scene.floor is not None and scene.floor.ends,
+            walls=scene.wall is not None,
         )
 
     @classmethod

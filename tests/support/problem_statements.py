@@ -89,6 +89,10 @@ KINDS = {
 """The kind of each exact solution, by its name."""
 
 
+WALLS = """An impact with a wall is one with the floor in axes whose y axis is the wall's normal n: the point that strikes is the one
+behind the wall, and e and the friction are the wall's."""
+
+
 def laws(scene, truth):
     """The laws of the motion of a scene, sentences."""
     found = list(LAWS.get(truth.name, ()))
@@ -99,6 +103,8 @@ def laws(scene, truth):
         found.append({"none": SMOOTH, "infinite": STICKING}.get(scene.floor.friction, CONE))
     if truth.name == "bounce-ladder":
         found.append(_bounces(scene, truth))
+    if scene.wall is not None:
+        found.append(WALLS)
     return [" ".join(one.split()) for one in found]
 
 
@@ -129,6 +135,11 @@ def statement(scene):
         rows[f"{name} at t = 0"] = f"{vector(value)} {unit}".strip()
     rows["gravity"] = "none" if scene.gravity is None else f"g = {vector(scene.gravity.acceleration)} m/s²"
     rows["floor"] = "none" if scene.floor is None else _floor(scene.floor)
+    for number_of_wall, wall in enumerate(scene.wall or ()):
+        surface = _floor(wall).partition(", fixed")[2]
+        rows[f"wall {number_of_wall}"] = (
+            f"the plane through {vector(wall.point)} m with the normal n = {vector(wall.normal)}, fixed{surface}"
+        )
     rows["duration"] = f"{number(scene.duration)} s"
     if scene.ensemble is not None:
         rows["ensemble"] = _ensemble(scene)

@@ -139,7 +139,9 @@ def test_motion_without_a_contact_has_an_empty_list():
 
 
 def test_contacts_without_a_floor_are_refused():
-    with pytest.raises(ds.DropspinError, match="spin-principal: the forces of the floor need a scene with a floor and without damping"):
+    with pytest.raises(
+        ds.DropspinError, match="spin-principal: the forces of the floor need a scene with a floor that does not end, without walls"
+    ):
         ds.contacts(ds.load("spin-principal"), ds.simulate("spin-principal", "mujoco", dt=1e-2))
 
 

@@ -32,6 +32,7 @@ def metrics_of_a_run(scene, motion):
     values = [metric.value_or_nan([case]) if metric.applies(scene, None) else np.nan for metric in by_name]
     contact = case.first_contact
     rebound = 0.0 if contact is None else motion.position[contact[1] :, 1].max() / motion.position[0, 1]
+    rebound = np.nan if scene.has_edges_or_walls else rebound
     return [*values, rebound, float(motion.t[Motions.of(scene, motion).last_row_in_motion])]
 
 

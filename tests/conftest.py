@@ -48,11 +48,41 @@ def _timed_briefly():
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _shared_functions():
+def _few_start_phases():
+    """Eight start phases instead of 32: a test of what the mean over all of them is uses `all_start_phases`."""
+    from support.brief_runs import FEW
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", FEW)
+        yield
+
+
+@pytest.fixture
+def all_start_phases():
+    """As many start phases as outside tests."""
+    from support.brief_runs import all_starts
+
+    with all_starts():
+        yield
+
+
+@pytest.fixture(autouse=True)
+def _all_start_phases_in_slow_tests(request):
+    """Slow tests are studies as users make them."""
+    if request.node.get_closest_marker("slow"):
+        request.getfixturevalue("all_start_phases")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _shared_functions(shared):
     """Compile what all kernels of Wang's method share, 5 s without numba's cache: engine processes, which are forked, have it then."""
     from dropspin.comparisons.running.recording import simulate
 
-    simulate("drop-box-corner", "wang", 1e-2)
+    def compiled(folder: Path | None = None) -> None:
+        simulate("drop-box-corner", "wang", 1e-2)
+
+    shared("kernels", compiled)  # by one of the workers of pytest-xdist, for numba's cache
+    compiled()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -75,7 +105,7 @@ def engine_processes():
 
 @pytest.fixture
 def few_start_phases(monkeypatch):
-    """Four start phases instead of 32, for engines made for tests: they solve each start anew, and are as exact from each."""
+    """Four start phases instead of eight, for engines made for tests: they solve each start anew, and are as exact from each."""
     monkeypatch.setattr("dropspin.comparisons.running.start_phases.START_PHASES", 4)
 
 

@@ -35,5 +35,5 @@ def pytest_generate_tests(metafunc):
 
 
 @pytest.fixture(autouse=True)
-def _isolated(engine_processes):
+def _isolated(engine_processes, all_start_phases):
     """Engines of this folder load libraries of hundreds of MB, which disturb one another."""

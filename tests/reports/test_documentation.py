@@ -18,6 +18,7 @@ from dropspin.reports.commands.main import dropspin
 from dropspin.scenarios import bodies, model
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.usefixtures("all_start_phases")
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "reference_impl" / "README.md"]
 BLOCK = re.compile(r"^```(?P<kind>python|sh|text|diff)(?: title=\"(?P<file>[\w.]+)\")?\n(?P<content>.*?)^```$", re.DOTALL | re.MULTILINE)
 

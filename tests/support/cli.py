@@ -10,6 +10,7 @@ import os
 import signal
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -61,6 +62,44 @@ def forked(*arguments: object, cwd: Path | str, timeout: float = 60.0) -> Done:
     """As `dropspin`, in a fork of this process, which is killed after a time [s]; it costs no imports, as `spawn` does."""
     with ProcessPool(max_workers=1, context=get_context("fork")) as pool:
         return pool.schedule(dropspin, args=arguments, kwargs={"cwd": cwd}, timeout=timeout).result()
+
+
+class Started:
+    """A command in a fork of this process, to be interrupted: its errors can be read while it works. It costs no imports."""
+
+    def __init__(self, *arguments: object, cwd: Path | str) -> None:
+        reader, writer = os.pipe()
+        self._process = get_context("fork").Process(target=_as_in_a_shell, args=(arguments, cwd, writer))
+        self._process.start()
+        os.close(writer)
+        self.stderr = os.fdopen(reader)
+        assert self._process.pid is not None
+        self.pid = self._process.pid
+
+    def is_alive(self) -> bool:
+        """Whether it still works."""
+        return self._process.is_alive()
+
+    def end(self, how: int | None = None, timeout: float = 60.0) -> tuple[int | None, str]:
+        """Send it a signal, if one is given, and wait for its end: its exit code, and the errors that were not read."""
+        if how is not None:
+            os.kill(self.pid, how)
+        with self.stderr:
+            errors = self.stderr.read()
+        self._process.join(timeout)
+        return self._process.exitcode, errors
+
+
+def _as_in_a_shell(arguments: tuple[object, ...], cwd: Path | str, errors: int) -> None:
+    """Run a command with its errors written to a file descriptor and without its output."""
+    from dropspin.reports.commands.main import main
+
+    warnings.simplefilter("ignore", ResourceWarning)  # as outside tests: earlier ones may have left files open, which end here
+    os.chdir(cwd)
+    os.dup2(errors, 2)
+    sys.stdout, sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"), os.fdopen(2, "w", buffering=1, closefd=False)
+    sys.argv = ["dropspin", *map(str, arguments)]
+    main()
 
 
 def assert_refused(done: Done, words: str) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
+from support.brief_runs import all_starts
 from support.releases import DTS, RELEASES, SCENES, TODAY, Candidate, longer, part, relabelled
 
 from dropspin.comparisons.engines.registry import engine
@@ -22,13 +23,21 @@ def _compiled():
                 simulation.record(2)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _whole_runs():
+    """Tolerances of accepted results follow from the spread over all start phases."""
+    with all_starts():
+        yield
+
+
 @pytest.fixture(scope="session")
 def kept(shared):
     """Call it with a name and the arguments of a run: its table and provenance, from one run for all workers."""
 
     def load(name, *asked):
         # Motions are not compared, and take longer to compress than to compute.
-        folder = shared(name, lambda folder: save(replace(run(*asked), trajectories={}, ensembles={}), folder))
+        with all_starts():
+            folder = shared(name, lambda folder: save(replace(run(*asked), trajectories={}, ensembles={}), folder))
         return load_results(folder, arrays=False)
 
     return load

@@ -35,6 +35,11 @@ def lasting(name, seconds=2.0):
     return scene.model_copy(update={"duration": min(scene.duration, seconds)})
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _whole_runs():
+    """In place of the fixture of the folder: a parameter shows from few starts."""
+
+
 @pytest.fixture(autouse=True)
 def _few_starts(request):
     """Four start phases, for engines that are exact but for their fault."""

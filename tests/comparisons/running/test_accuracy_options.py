@@ -33,8 +33,12 @@ def test_sound_engine_raises_no_alarm(engine):
     assert failures(table).empty
 
 
-@pytest.mark.parametrize("engine", SOUND)
-def test_restitution_fault_is_detected_in_an_engine_with_an_accuracy_option(engine):
+@pytest.mark.parametrize(
+    ("engine", "starts"), [(Adaptive, "few_start_phases"), *((one, "all_start_phases") for one in (InnerStep, Substeps))]
+)
+def test_restitution_fault_is_detected_in_an_engine_with_an_accuracy_option(engine, starts, request):
+    """The adaptive integrator is as exact from each start."""
+    request.getfixturevalue(starts)
     faulty = type("Faulty", (engine,), {"restitution_factor": 1.01})()
     found = failures(run("drop-ball", faulty).table)
     assert "asymptotic_error" in set(found["kind"])

@@ -31,6 +31,7 @@ def test_simulations_are_those_that_a_run_does(name, quick):
     assert simulations(own, entry, DT) == totals[-1] + (0 if done.outcome is None else len(done.outcome.rebound))
 
 
+@pytest.mark.usefixtures("all_start_phases")
 def test_forecast_follows_from_the_times_of_the_steps():
     """A ball of 33 simulations and a spin of 5, or of 9 and 1 in a quick run; an engine that is absent takes no time."""
     scenes = [prepared("drop-ball"), prepared("spin-principal")]

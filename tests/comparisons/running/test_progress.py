@@ -3,13 +3,14 @@
 import time
 from itertools import pairwise
 
+import pytest
 from support import engines as made
 
 import dropspin as ds
 from dropspin.comparisons.running import processes
 from dropspin.comparisons.running.engine_run import run_engine
 from dropspin.comparisons.running.entries import engine_entry
-from dropspin.comparisons.running.start_phases import start_phases
+from dropspin.comparisons.running.start_phases import START_PHASES, start_phases
 
 DT = 0.01
 BALL = ds.load("drop-ball")
@@ -17,9 +18,9 @@ STARTS = [phase.scene for phase in start_phases(BALL, ds.truth_for(BALL), DT)]
 
 
 def test_every_simulation_is_reported():
-    """The scene's own start, and its 32 start phases, one by one or as a batch."""
-    total = 1 + 32
-    for engine, done in ((made.Exact(), range(1, 34)), ("wang", (1, 33))):
+    """The scene's own start, and its start phases, one by one or as a batch."""
+    total = 1 + START_PHASES
+    for engine, done in ((made.Exact(), range(1, 1 + total)), ("wang", (1, total))):
         reported = []
         run_engine(engine_entry(engine), BALL, DT, STARTS, False, lambda *counts, reported=reported: reported.append(counts))
         assert reported == [(number, total) for number in done]
@@ -38,6 +39,7 @@ class Slow(made.Exact):
         return SlowSimulation(scene, dt)
 
 
+@pytest.mark.usefixtures("all_start_phases")
 def test_a_slow_engine_reports_progress_within_a_scene(monkeypatch):
     """Between the beginning and the end of a time step the numbers grow, and each time step is finished once."""
     monkeypatch.setattr(processes, "POLL", 0.01)

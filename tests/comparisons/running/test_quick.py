@@ -43,6 +43,7 @@ class Single(made.Exact):
     precision = np.float32
 
 
+@pytest.mark.usefixtures("all_start_phases")
 @pytest.mark.parametrize(
     ("scene", "engine", "full", "quick"),
     [

@@ -19,6 +19,7 @@ from dropspin.scenarios import load
 ENGINE, LABEL = "my_engine:MyEngine", "my-engine"
 RUN = ("run", "spin-principal", "drop-ball", "-e", ENGINE, "--dt", "0.008", "--dt", "0.004", "--dt", "0.002")
 BASELINE = ("--baseline", "dropspin-baseline.toml")
+pytestmark = pytest.mark.usefixtures("all_start_phases")  # results are compared with those of `repository`
 
 
 @pytest.mark.parametrize("release", ["good", "failing", "crashing"])

@@ -11,7 +11,7 @@ from unittest import mock
 
 import pytest
 import yaml
-from support.cli import DROPSPIN, dropspin, spawn
+from support.cli import Started, dropspin, spawn
 
 import dropspin as ds
 from dropspin.comparisons.robustness import study
@@ -57,10 +57,13 @@ reason = "no engine is that stiff"
     ids=[0, 1, 2, 3],
 )
 def test_exit_codes_of_the_installed_command(arguments, code, output, error, tmp_path):
-    """In a process of its own, where an exit code is what a shell sees; output and errors on their own streams."""
+    """In a process of its own, where an exit code is what a shell sees; output and errors on their own streams.
+
+    A failed check, which is measured, is in this process.
+    """
     (tmp_path / "harsh.toml").write_text(HARSH)
     (tmp_path / "my_engine.py").write_text("import no_such_engine")
-    done = spawn(*arguments, cwd=tmp_path)
+    done = (dropspin if code == 1 else spawn)(*arguments, cwd=tmp_path)
     assert done.returncode == code, done.stderr
     assert output in done.stdout
     assert done.stderr.startswith(error)
@@ -174,18 +177,17 @@ def test_a_terminal_without_utf_8_in_a_process_of_its_own(tmp_path):
     assert "?" in done.stdout
 
 
+@pytest.mark.usefixtures("engine_processes")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_nothing(how, tmp_path):
     """Ctrl-C, or SIGTERM from a CI server: exit code 130, no folder, no traceback."""
     (tmp_path / "long.toml").write_text('duration = 10.0\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n')
-    command = [DROPSPIN, "run", "long.toml", "-e", "mujoco", "--dt", "0.01", "--dt", "0.00001"]
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
+    process = Started("run", "long.toml", "-e", "mujoco", "--dt", "0.01", "--dt", "0.00001", cwd=tmp_path)
     assert process.stderr.readline() == "timing the steps of each engine\n"
-    process.send_signal(how)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert errors.lstrip() == "dropspin: interrupted; nothing was written.\n"
+    code, errors = process.end(how)
+    assert code == 130
+    assert errors.splitlines()[-1] == "dropspin: interrupted; nothing was written."
+    assert "Traceback" not in errors
     assert os.listdir(tmp_path) == ["long.toml"]
 
 

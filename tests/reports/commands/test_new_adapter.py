@@ -1,24 +1,25 @@
 """`dropspin new-adapter`: the files that it writes work as they are, and names that cannot work are refused."""
 
-import subprocess
-import sys
-
 import pytest
 from support.cli import assert_refused, dropspin
 
+from dropspin import pytest_plugin
 
-def test_written_adapter_passes_the_written_tests(tmp_path):
+pytest_plugins = ["pytester"]
+
+
+def test_written_adapter_passes_the_written_tests(pytester, monkeypatch):
     """They check conformance and that errors vanish as dt → 0, also in another folder and under a name with several words."""
-    done = dropspin("new-adapter", "wobbly_Top2", "-o", "deep/er", cwd=tmp_path)
+    done = dropspin("new-adapter", "wobbly_Top2", "-o", "deep/er", cwd=pytester.path)
     assert done.returncode == 0, done.stderr
     assert "in deep/er: dropspin conform wobbly_Top2:WobblyTop2; pytest test_wobbly_Top2.py\n" in done.stdout
-    folder = tmp_path / "deep" / "er"
+    folder = pytester.path / "deep" / "er"
     assert sorted(path.name for path in folder.iterdir()) == ["test_wobbly_Top2.py", "wobbly_Top2.py"]
-    command = [sys.executable, "-m", "pytest", "-q", "-k", "conforms or drop-ball-wobbly", "test_wobbly_Top2.py"]
-    tested = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert tested.returncode == 0, tested.stdout
-    assert "2 passed, 2 deselected" in tested.stdout
-    [row] = [line for line in tested.stdout.splitlines() if line.startswith("wobbly-Top2")]
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(pytest_plugin.Runs, "_dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=folder))
+    tested = pytester.runpytest_inprocess("-q", "-k", "conforms or drop-ball-wobbly", "test_wobbly_Top2.py")
+    tested.assert_outcomes(passed=2, deselected=2)
+    [row] = [line for line in tested.outlines if line.startswith("wobbly-Top2")]
     assert row.split()[1] == "drop-ball"
 
 

@@ -5,12 +5,12 @@ import json
 import re
 import shlex
 import signal
-import subprocess
 from unittest import mock
 
 import numpy as np
 import pytest
-from support.cli import DROPSPIN, dropspin
+from support.brief_runs import all_starts
+from support.cli import Started, dropspin
 
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo
 from dropspin.comparisons.running import run as running
@@ -161,23 +161,21 @@ def whole(shared):
     """The folder of the run that is interrupted below, uninterrupted."""
 
     def make(folder):
-        assert dropspin(*INTERRUPTED, "-o", "whole", cwd=folder).returncode == 0
+        with all_starts():
+            assert dropspin(*INTERRUPTED, "-o", "whole", cwd=folder).returncode == 0
 
     return shared("whole-run", make) / "whole"
 
 
+@pytest.mark.usefixtures("engine_processes", "all_start_phases")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_interrupted_run_is_resumed(how, whole, tmp_path):
     """Measured scenes are kept; with --resume only the others are run, and the table is that of an uninterrupted run."""
-    process = subprocess.Popen(
-        [DROPSPIN, *INTERRUPTED, "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stderr is not None
+    process = Started(*INTERRUPTED, "-o", "part", cwd=tmp_path)
     assert any("drop-ball" in line for line in process.stderr)
-    process.send_signal(how)
-    _, errors = process.communicate(timeout=60)
+    code, errors = process.end(how)
     if how == signal.SIGINT:
-        assert process.returncode == 130
+        assert code == 130
         assert errors.lstrip() == "dropspin: interrupted; 2 of 3 scenes are kept; --resume continues the run.\n"
     kept = tmp_path / ".part-measured"
     assert len(list(kept.glob("[0-9]*"))) == 2

@@ -3,12 +3,11 @@
 import json
 import os
 import signal
-import subprocess
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from support.cli import DROPSPIN, dropspin
+from support.cli import Started, dropspin
 
 from dropspin.comparisons.sweeps.folder import read_sweep
 
@@ -106,18 +105,15 @@ def whole(shared):
     return read_sweep(str(shared("long-sweep", make) / "whole")).drop(columns="time_per_step")
 
 
+@pytest.mark.usefixtures("engine_processes")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_sweep_is_resumed(how, whole, tmp_path):
     """Exit code 130 at once; written jobs are counted; no process is left; resumed, the table is that of an uninterrupted sweep."""
     (tmp_path / "spec.toml").write_text(LONG)
-    process = subprocess.Popen(
-        [DROPSPIN, "sweep", "spec.toml", "-o", "part"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stderr is not None
+    process = Started("sweep", "spec.toml", "-o", "part", cwd=tmp_path)
     assert any("per second" in line for line in process.stderr)
-    process.send_signal(how)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
+    code, errors = process.end(how)
+    assert code == 130
     assert "Traceback" not in errors
     kept = len(read_sweep(str(tmp_path / "part")))
     assert f"dropspin: interrupted; {kept} of 16 jobs are kept; --resume continues the sweep." in errors

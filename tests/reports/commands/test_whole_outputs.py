@@ -8,7 +8,7 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from support.cli import DROPSPIN, dropspin
+from support.cli import DROPSPIN, Started, dropspin
 
 BALL = 'duration = 0.2\n[body]\nshape = "sphere"\nradius = 0.1\nmass = 1.0\n'
 LONG = [
@@ -112,15 +112,15 @@ def test_full_disk_says_that_a_sweep_can_be_resumed(outputs):
     assert dropspin("sweep", "spec.toml", "-o", "new", "--resume", cwd=outputs).returncode == 0
 
 
+@pytest.mark.usefixtures("engine_processes", "all_start_phases")
 @pytest.mark.parametrize(("command", "kind"), LONG, ids=[command[0] for command, _ in LONG])
 def test_interrupted_commands_leave_the_old_output(command, kind, outputs):
     before = contents(outputs)
-    process = subprocess.Popen([DROPSPIN, *command], cwd=outputs, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while process.poll() is None and not any(outputs.rglob(".*unfinished-*")):
+    process = Started(*command, cwd=outputs)
+    while process.is_alive() and not any(outputs.rglob(".*unfinished-*")):
         time.sleep(0.01)
-    process.send_signal(kind)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130, errors
+    code, errors = process.end(kind)
+    assert code == 130, errors
     assert errors.splitlines()[-1] == "dropspin: interrupted; nothing was written."
     assert "Traceback" not in errors
     assert contents(outputs) == before

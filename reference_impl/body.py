@@ -41,7 +41,7 @@ class Floor(NamedTuple):
     rest_speed: float | Array = 0.0
     """Normal speed [m/s] below which restitution is 0 (section 3.2); 0 disables this rule."""
     half_extents: Any = None
-    """Largest |x| and |z| of a point that the floor carries [m], shape (2,) or (B, 2). None: no limit."""
+    """Largest magnitudes of x and z of a point that the floor carries [m], shape (2,) or (B, 2). None: no limit."""
     thickness: Any = None
     """Depth down to which the floor carries a point [m]. None: no limit."""
 

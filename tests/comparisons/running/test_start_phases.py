@@ -53,6 +53,7 @@ def test_quantities_of_all_motions_at_once_are_those_of_each(name):
     assert not set(AT_ONCE) & vars(states_at_once(scenes, motions)[-1]).keys()
 
 
+@pytest.mark.usefixtures("all_start_phases")
 def test_long_scenes_have_fewer_start_phases():
     """All steps together stay within `MOST_ROWS`, unless a single start takes more."""
     scene = ds.load("drop-ball-lively")

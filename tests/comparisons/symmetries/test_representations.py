@@ -178,7 +178,7 @@ def test_mujoco_builds_the_floor_and_the_heavy_body_that_its_options_name():
 
     with engine("mujoco[beside=heavy,floor=mesh]").prepare(load("drop-box-edge"), DT) as simulation:
         model = simulation.model
-    floor = model.geom("floor")
+    floor = model.geom("plane 0")
     assert floor.type[0] == mjtGeom.mjGEOM_MESH
     np.testing.assert_allclose(floor.pos, [0.0, -1e3, 0.0], atol=1e-9)
     assert model.body_mass.tolist() == [0.0, 1.0, 1000.0]

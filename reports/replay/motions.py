@@ -1,4 +1,4 @@
-"""The motions of a replay: the poses of the body in each engine and in the exact solution, and the impulses of the floor."""
+"""The motions of a replay: the poses of the body in each engine and in the exact solution, and the impulses of floor and walls."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from dropspin.reports.plots.colours import EXACT, engine_colours
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, Truth, truth_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import about, angle_between_orientations, conjugate, cross, dot, multiply
+from dropspin.scenarios.state import UP
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -31,12 +32,12 @@ or two.
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """Impacts on the floor.
+    """Impacts on the floor and on walls.
 
     Attributes:
         times: Times of the impacts [s], shape (k,).
-        impulses: Impulse of the floor on the body [N s], shape (k, 3).
-        points: Point of the floor through which each impulse acts [m], shape (k, 3).
+        impulses: Impulse on the body [N s], shape (k, 3).
+        points: Point through which each impulse acts [m], shape (k, 3).
     """
 
     times: Array
@@ -180,7 +181,7 @@ def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motio
     impacts = Impacts(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
     if scene.floor is not None and len(motion) > 1:
         before, after, main = impact_rows(scene, motion)
-        impacts = Impacts(motion.t[main], *floor_impulses(scene, motion, before, after))
+        impacts = Impacts(motion.t[main], *contact_impulses(scene, motion, before, after))
         # A body bounces between two states: interpolated over a longer time, it would turn back above the floor.
         rows = np.union1d(rows, np.concatenate([main - 1, main]))
     frames = motion[rows]
@@ -193,7 +194,7 @@ def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
     states = np.array([[event.before, event.after] for event in on_floor]).reshape(-1, 13)
     pairs = Trajectory.from_states(np.repeat([event.time for event in on_floor], 2), states)
     before = np.arange(0, len(states), 2)
-    impacts = Impacts(pairs.t[before], *floor_impulses(scene, pairs, before, before + 1))
+    impacts = Impacts(pairs.t[before], *contact_impulses(scene, pairs, before, before + 1))
     return Motion(EXACT, "", exactly(truth, times), None, impacts)
 
 
@@ -206,7 +207,7 @@ def _errors(motion: Trajectory, exact: Trajectory) -> Array:
 
 
 def impact_rows(scene: Scenario, motion: Trajectory) -> tuple[Rows, Rows, Rows]:
-    """The impacts of a motion: time steps in which the impulse of the floor is that of an impact; adjacent steps are one impact.
+    """The impacts of a motion: time steps in which the impulse is that of an impact; adjacent steps are one impact.
 
     Args:
         scene: The scene, which has a floor.
@@ -216,7 +217,7 @@ def impact_rows(scene: Scenario, motion: Trajectory) -> tuple[Rows, Rows, Rows]:
         The row before each impact, the row after it, and the row after the step with the largest impulse in it, each of shape (k,).
     """
     steps = np.flatnonzero(Comparison(scene, motion).motions.in_contact)
-    impulses = np.linalg.norm(floor_impulses(scene, motion, steps, steps + 1)[0], axis=1)
+    impulses = np.linalg.norm(contact_impulses(scene, motion, steps, steps + 1)[0], axis=1)
     weight = scene.body.mass * float(np.linalg.norm(scene.acceleration))
     is_impact = impulses > RESOLVED_HOP * weight * (motion.t[1] - motion.t[0])
     steps, impulses = steps[is_impact], impulses[is_impact]
@@ -226,8 +227,8 @@ def impact_rows(scene: Scenario, motion: Trajectory) -> tuple[Rows, Rows, Rows]:
     return steps[first], steps[last] + 1, steps[largest] + 1
 
 
-def floor_impulses(scene: Scenario, motion: Trajectory, before: Rows, after: Rows) -> tuple[Array, Array]:
-    """The impulse of the floor on a body between given rows.
+def contact_impulses(scene: Scenario, motion: Trajectory, before: Rows, after: Rows) -> tuple[Array, Array]:
+    """The impulse of the floor, or of a wall, on a body between given rows.
 
     Args:
         scene: The scene.
@@ -236,10 +237,10 @@ def floor_impulses(scene: Scenario, motion: Trajectory, before: Rows, after: Row
         after: The rows after, shape (k,).
 
     Returns:
-        The impulse J [N s], which is the change of momentum without the changes by gravity and damping, and the point of the floor through
-        which it
-        acts [m], both of shape (k, 3). r × J = ΔL determines r except along J; the floor at y = 0 determines the rest. If that point is not
-        near the body (an impulse along the floor, an engine that does not conserve L), it is the point below the centre of mass.
+        The impulse J [N s], which is the change of momentum without the changes by gravity and damping, and the point through which it acts
+        [m], both of shape (k, 3). r × J = ΔL determines r except along J; the plane, floor or wall, for which it is nearest to the body
+        determines the rest. If that point is not near (an impulse along the floor, an engine that does not conserve L), it is the point
+        of the floor below the centre of mass.
     """
     interval = (motion.t[after] - motion.t[before])[:, None]
     linear, angular = (0.0, 0.0) if scene.damping is None else (scene.damping.linear, scene.damping.angular)
@@ -247,7 +248,10 @@ def floor_impulses(scene: Scenario, motion: Trajectory, before: Rows, after: Row
     J = scene.body.mass * (v[after] - np.exp(-linear * interval) * v[before] - interval * scene.acceleration)
     turned = L[after] - np.exp(-angular * interval) * L[before]
     with np.errstate(divide="ignore", invalid="ignore"):
-        r = cross(J, turned) / dot(J, J)[:, None]
-        r = r - ((x + r)[:, 1] / J[:, 1])[:, None] * J
-        is_near = dot(r, r) <= (1.5 * scene.body.size) ** 2
-    return J, np.where(is_near[:, None], x + r, x * [1.0, 0.0, 1.0])
+        line = cross(J, turned) / dot(J, J)[:, None]
+        planes = [(np.zeros(3), UP), *((np.array(wall.point), np.array(wall.normal)) for wall in scene.wall or ())]
+        arms = np.array([line - ((x + line - point) @ normal / (J @ normal))[:, None] * J for point, normal in planes])
+        distances = np.linalg.norm(arms, axis=2)
+    nearest = np.nan_to_num(distances, nan=np.inf).argmin(axis=0), np.arange(len(J))
+    is_near = distances[nearest] <= 1.5 * scene.body.size
+    return J, np.where(is_near[:, None], x + arms[nearest], x * [1.0, 0.0, 1.0])

@@ -19,7 +19,7 @@ from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.replay import replay_of
 from dropspin.reports.replay.clip import write_clip
 from dropspin.reports.replay.data import as_data
-from dropspin.reports.replay.motions import MOST_FRAMES, _stride, floor_impulses, impact_rows, replay_together
+from dropspin.reports.replay.motions import MOST_FRAMES, _stride, contact_impulses, impact_rows, replay_together
 from dropspin.scenarios import DropspinError, Trajectory, truth_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import about, angle_between_orientations, multiply, rotate
@@ -80,7 +80,7 @@ def test_impulse_and_its_point_are_those_of_the_exact_impact(results):
     [impact] = truth_for(scene).events
     motion = Trajectory.from_states(np.array([0.0, 1e-9]), np.array([impact.before, impact.after]))
     weightless = scene.model_copy(update={"gravity": None})
-    J, point = floor_impulses(weightless, motion, np.array([0]), np.array([1]))
+    J, point = contact_impulses(weightless, motion, np.array([0]), np.array([1]))
     expected = scene.body.mass * (impact.after - impact.before)[7:10]
     np.testing.assert_allclose(J[0], expected, atol=1e-14)
     turned = np.diff(angular_momentum(scene, motion), axis=0)[0]
@@ -95,10 +95,23 @@ def test_impulses_and_gravity_add_up_to_the_change_of_momentum(results):
     for engine in results.engines:
         motion = results.trajectories["drop-ball", engine, 4e-3]
         rows = np.arange(len(motion) - 1)
-        J, points = floor_impulses(scene, motion, rows, rows + 1)
+        J, points = contact_impulses(scene, motion, rows, rows + 1)
         gained = J.sum(axis=0) + scene.body.mass * scene.acceleration * motion.t[-1]
         np.testing.assert_allclose(gained, scene.body.mass * (motion.velocity[-1] - motion.velocity[0]), atol=1e-9)
         np.testing.assert_allclose(points, motion.position[:-1] * [1.0, 0.0, 1.0], atol=1e-9)
+
+
+def test_impulse_of_a_wall_acts_at_the_wall():
+    """A ball of radius 0.15 m between a floor and a wall at x = 1.5 m: at the wall first, then on the floor."""
+    scene = ds.load("bounce-wall-ball")
+    motion = ds.simulate(scene, "wang", 1e-3)
+    rows = np.flatnonzero(np.linalg.norm(np.diff(motion.velocity, axis=0), axis=1) > 1.0)
+    J, points = contact_impulses(scene, motion, rows, rows + 1)
+    assert len(rows) == 2
+    np.testing.assert_allclose(points[0, [0, 2]], [scene.wall[0].point[0], 0.0], rtol=1e-12)
+    np.testing.assert_allclose(points[0, 1], motion.position[rows[0], 1], rtol=1e-12)
+    np.testing.assert_allclose(points[1, 1], 0.0, atol=1e-12)
+    assert J[0, 0] < 0.0 < J[1, 1]
 
 
 def test_impacts_are_the_steps_with_large_impulses(results):
@@ -135,7 +148,7 @@ def test_contact_over_adjacent_steps_is_one_impact(results):
     motion = Trajectory.from_states(1e-3 * np.arange(len(v)), states)
     before, after, main = impact_rows(scene, motion)
     assert [before.tolist(), after.tolist(), main.tolist()] == [[20], [23], [22]]
-    np.testing.assert_allclose(floor_impulses(scene, motion, before, after)[0][:, 1], [6.0], rtol=1e-12)
+    np.testing.assert_allclose(contact_impulses(scene, motion, before, after)[0][:, 1], [6.0], rtol=1e-12)
 
 
 def test_scene_without_floor_has_no_impulses(results):

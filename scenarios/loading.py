@@ -14,10 +14,12 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from dropspin.scenarios.bodies.mesh_files import read_mesh
+from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.errors import DropspinError, SceneError, SceneWarning, did_you_mean
 from dropspin.scenarios.files import read_file
-from dropspin.scenarios.model import Damping, Ensemble, Expectation, Floor, Gravity, Scenario, Start, Wall
+from dropspin.scenarios.model import Ensemble, Expectation, Gravity, Scenario, Start
 from dropspin.scenarios.problems import scene_name
+from dropspin.scenarios.surfaces import Floor, Wall
 from dropspin.scenarios.tables import LARGEST
 from dropspin.scenarios.validation import Alternatives, first_problem, shown
 

@@ -3,34 +3,24 @@
 import hashlib
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from dropspin.scenarios.bodies import Body
 from dropspin.scenarios.bodies.surface import depth_below_centre
-from dropspin.scenarios.rotations import rotate, turned_states
-from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, Array
-from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector
+from dropspin.scenarios.damping import Damping
+from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.state import ORIENTATION, PARTS, Array
+from dropspin.scenarios.surfaces import Floor, Surface, Wall
+from dropspin.scenarios.tables import NotNegative, Number, Positive, Table, Vector, unit
 from dropspin.scenarios.text import Prose, Text, joined, verify_line
 
 TOUCHING = 1e-9
 """Height above the floor, relative to the size of the body, up to which the body counts as touching the floor."""
 
 
-def unit(vector: tuple[float, ...]) -> tuple[float, ...]:
-    """The vector or quaternion normalised to length 1; one whose length is 1 up to rounding is returned unchanged."""
-    length = math.hypot(*vector)
-    if length == 0.0:
-        raise ValueError("must not be all zeros")
-    if abs(length - 1.0) < 4e-16:  # a saved scene loads with the same digits
-        return vector
-    return tuple(component / length for component in vector)
-
-
-MOTIONS = ("linear", "angular")
-Share = Annotated[Number, Field(gt=0, le=1)]
 Orientation = Annotated[tuple[Number, ...], Field(min_length=4, max_length=4), AfterValidator(unit)]
 
 
@@ -47,104 +37,6 @@ class Gravity(Table):
     """Uniform gravity [m/s²]."""
 
     acceleration: Vector
-
-
-class Surface(Table):
-    """What the contacts of a floor or a wall depend on.
-
-    `impact_law` is the model of an impact with a coefficient of friction: see `dropspin.scenarios.truths.friction_impact`.
-    """
-
-    restitution: Annotated[Number, Field(ge=0, le=1)]
-    friction: Literal["none", "infinite"] | NotNegative
-    rest_speed: NotNegative = 0.0
-    impact_law: Literal["cone", "integrated-newton", "integrated-poisson", "integrated-energy"] = "cone"
-
-    @property
-    def coefficient(self) -> float:
-        """The Coulomb coefficient: 0 without friction, inf for infinite friction."""
-        return {"none": 0.0, "infinite": math.inf}[self.friction] if isinstance(self.friction, str) else self.friction
-
-    @model_validator(mode="after")
-    def _no_friction_is_none(self) -> Self:
-        if self.friction == 0.0:
-            object.__setattr__(self, "friction", "none")
-        return self
-
-    @model_validator(mode="after")
-    def _law_has_friction(self) -> Self:
-        if self.impact_law != "cone" and isinstance(self.friction, str):
-            raise ValueError(f"impact_law is {self.impact_law!r}, which needs a coefficient of friction; friction is {self.friction!r}")
-        return self
-
-
-class Floor(Surface):
-    """The plane y = 0, facing up, or, with an end, the box below it: |x| and |z| up to `half_extents` [m], y down to -`thickness` [m]."""
-
-    half_extents: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=2)] | None = None
-    thickness: Positive | None = None
-
-    @property
-    def ends(self) -> bool:
-        """Whether a body can pass by the floor."""
-        return self.half_extents is not None or self.thickness is not None
-
-
-class Wall(Surface):
-    """The plane through a point [m], with a normal, of length 1, into the space that the body can be in."""
-
-    point: Vector
-    normal: Annotated[Vector, AfterValidator(unit)]
-
-    @property
-    def frame(self) -> Array:
-        """The rotation that takes the normal to the y axis, a quaternion, shape (4,)."""
-        x, y, z = self.normal
-        return np.array(unit((-z, 0.0, x, 1.0 + y))) if y > -1.0 else np.array([1.0, 0.0, 0.0, 0.0])
-
-    def as_floor(self, states: Array) -> Array:
-        """States, shape (..., 13), in the frame in which the wall is the plane y = 0, facing up."""
-        moved = states.copy()
-        moved[..., POSITION] -= self.point
-        return turned_states(moved, self.frame)
-
-
-class Damping(Table):
-    """Exponential decay of velocity and angular velocity.
-
-    `linear` and `angular` are rates [1/s]. `linear_factor` and `angular_factor` are given in their place: what one step of `factor_dt` [s]
-    leaves of a velocity, as Algorithm 1 of Wang's lecture note has it. The rates are then -ln(factor) / factor_dt.
-    """
-
-    linear: NotNegative = 0.0
-    angular: NotNegative = 0.0
-    linear_factor: Share | None = Field(default=None, exclude=True)
-    angular_factor: Share | None = Field(default=None, exclude=True)
-    factor_dt: Positive | None = None
-
-    @model_validator(mode="after")
-    def _factors_give_rates(self) -> Self:
-        given = {name: factor for name in MOTIONS if (factor := getattr(self, f"{name}_factor")) is not None}
-        step = self.factor_dt
-        if given and step is None:
-            raise ValueError("a factor needs factor_dt, the time step that it is meant at, in s")
-        if given and self.model_fields_set & {*MOTIONS}:
-            raise ValueError("has rates (linear, angular) and factors (linear_factor, angular_factor); give one kind")
-        for name, factor in given.items():
-            assert step is not None
-            object.__setattr__(self, name, -math.log(factor) / step)
-            object.__setattr__(self, f"{name}_factor", None)
-        return self
-
-    @property
-    def rates(self) -> dict[str, float]:
-        """`linear` and `angular` [1/s]."""
-        return {name: getattr(self, name) for name in MOTIONS}
-
-    @property
-    def factors(self) -> dict[str, float]:
-        """`linear_factor` and `angular_factor` for one step of `factor_dt`; empty without it."""
-        return {f"{name}_factor": math.exp(-rate * self.factor_dt) for name, rate in self.rates.items()} if self.factor_dt else {}
 
 
 class Ensemble(Table):

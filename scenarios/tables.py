@@ -1,5 +1,6 @@
 """Types of the numbers and the tables of a scene's file."""
 
+import math
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -18,3 +19,13 @@ class Table(BaseModel):
     """A table of a file: immutable, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def unit(vector: tuple[float, ...]) -> tuple[float, ...]:
+    """The vector or quaternion normalised to length 1; one whose length is 1 up to rounding is returned unchanged."""
+    length = math.hypot(*vector)
+    if length == 0.0:
+        raise ValueError("must not be all zeros")
+    if abs(length - 1.0) < 4e-16:  # a saved scene loads with the same digits
+        return vector
+    return tuple(component / length for component in vector)

@@ -14,9 +14,10 @@ import numpy as np
 from dropspin.scenarios.bodies.shape import times
 from dropspin.scenarios.errors import DropspinError, did_you_mean
 from dropspin.scenarios.loading import FEATURES, from_mapping, from_table
-from dropspin.scenarios.model import Scenario, Surface, Wall
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, turned_states
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.surfaces import Surface, Wall
 from dropspin.scenarios.validation import key_of
 
 TABLES = ("body", *(name for name in FEATURES if name != "expect"))

@@ -26,9 +26,9 @@ from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.running.recording import Breakdown, record, try_record
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.loading import from_mapping, read_toml
-from dropspin.scenarios.model import Floor
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.text import counted, rounded
 from dropspin.scenarios.truths.impact_laws import LAWS, velocities_after
 from dropspin.scenarios.variations import with_height

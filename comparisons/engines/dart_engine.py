@@ -10,9 +10,10 @@ from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, KnownLi
 from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.bodies import Box
-from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import cross, rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, Array
+from dropspin.scenarios.surfaces import Floor
 
 REASONS = {
     "deactivation": "never falls asleep; else a block that tips over more slowly than 0.05 rad/s stops halfway",

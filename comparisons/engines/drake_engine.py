@@ -15,8 +15,9 @@ from pydrake.systems.framework import DiagramBuilder
 from dropspin.comparisons.engines import mapping
 from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulation
 from dropspin.comparisons.engines.packages import version
-from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import ORIENTATION, Array
+from dropspin.scenarios.surfaces import Floor
 
 logging.getLogger("drake").addFilter(lambda record: "half spaces" not in record.getMessage())  # a warning about deformable bodies
 

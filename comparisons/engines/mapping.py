@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from dropspin.comparisons.engines.base import Array, AsBuilt
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies.inertia import is_diagonal, principal_axes
-from dropspin.scenarios.model import Floor, Surface
 from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.surfaces import Floor, Surface
 from dropspin.scenarios.variations import heavy_neighbour
 
 PROFILES = ("calibrated", "default")

@@ -25,8 +25,8 @@ from dropspin.comparisons.engines.mapping import bodies_in, box_of, friction_of,
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Capsule, Ellipsoid, Mesh, OnAxis, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal
-from dropspin.scenarios.model import Surface
 from dropspin.scenarios.rotations import conjugate, multiply
+from dropspin.scenarios.surfaces import Surface
 
 IMPEDANCE = 0.9999  # the largest that MuJoCo allows
 MOST_DAMPED = 1e3

@@ -28,9 +28,9 @@ from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.bodies import Body, Box, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Sphere
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
-from dropspin.scenarios.model import Floor, Surface, Wall
 from dropspin.scenarios.rotations import conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, UP, VELOCITY
+from dropspin.scenarios.surfaces import Floor, Surface, Wall
 
 ALMOST = 0.999
 NO_PUSH = 1e-6  # relative to what gravity adds in a step

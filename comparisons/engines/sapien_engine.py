@@ -13,8 +13,9 @@ from dropspin.comparisons.engines.base import AsBuilt, Diverged, Engine, Simulat
 from dropspin.comparisons.engines.mapping import SEMI_IMPLICIT_EULER, built, friction_of, may_tumble, principal_frame
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios.bodies import Body, Sphere
-from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.surfaces import Floor
 
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message="Failed to find system libvulkan")  # of the renderer, which is not used

@@ -16,7 +16,8 @@ from dropspin.comparisons.measuring.predictions import bounce_error, flight_erro
 from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.bodies import SHAPES, Body, Box, Sphere, Vertices
-from dropspin.scenarios.model import Floor, Surface, differ_in_start_alone, initial_states
+from dropspin.scenarios.model import differ_in_start_alone, initial_states
+from dropspin.scenarios.surfaces import Floor, Surface
 
 
 class Wang(Engine):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dropspin.scenarios import DropspinError, Scenario
 from dropspin.scenarios.bodies.inertia import is_diagonal
-from dropspin.scenarios.model import Damping
+from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.rotations import about, rotate
 from dropspin.scenarios.variations import with_values
 

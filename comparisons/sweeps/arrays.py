@@ -24,9 +24,11 @@ from dropspin.comparisons.sweeps.jobs import OPTION, Jobs, scene_of
 from dropspin.comparisons.sweeps.outcomes import Outcomes, not_run, requested_metrics, standard_metrics
 from dropspin.scenarios import Scenario, SceneError, Trajectory
 from dropspin.scenarios.bodies import Body
+from dropspin.scenarios.damping import MOTIONS
 from dropspin.scenarios.ensemble import clearances, spread_starts
-from dropspin.scenarios.model import MOTIONS, TOUCHING, unit
+from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.state import ORIENTATION, PARTS, POSITION, UP
+from dropspin.scenarios.tables import unit
 from dropspin.scenarios.variations import Path, path_of, set_field, with_fields
 
 Array = NDArray[np.float64]

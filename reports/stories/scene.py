@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from dropspin.scenarios.model import Scenario, Surface
+from dropspin.scenarios.model import Scenario
+from dropspin.scenarios.surfaces import Surface
 
 
 def modelled(scene: Scenario) -> list[str]:

@@ -6,8 +6,9 @@ from functools import lru_cache
 import numpy as np
 
 from dropspin.scenarios.errors import DropspinError
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.state import VELOCITY
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.bounce import bounce_ladder
 from dropspin.scenarios.truths.corner_impact import corner_impact
 from dropspin.scenarios.truths.coulomb_slide import coulomb_slide

@@ -17,9 +17,10 @@ import math
 
 import numpy as np
 
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate, unrotate
 from dropspin.scenarios.state import Array
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.flight import TURNS_OVER, flight_states
 from dropspin.scenarios.truths.truth import Truth, impacts_of, piece
 

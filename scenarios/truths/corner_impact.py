@@ -20,9 +20,10 @@ from itertools import islice
 
 import numpy as np
 
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario, Surface, Wall
+from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, RATES, SPIN, UP, VELOCITY, Array
+from dropspin.scenarios.surfaces import Floor, Surface, Wall
 from dropspin.scenarios.truths.contact_search import Contact, ContactSearch
 from dropspin.scenarios.truths.flight import TURNS_OVER, Flight, flight_states
 from dropspin.scenarios.truths.impact_laws import Law, law_of, velocities_after

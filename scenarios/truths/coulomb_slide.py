@@ -17,8 +17,9 @@ import math
 import numpy as np
 
 from dropspin.scenarios.bodies.hull import convex_hull
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.state import POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.dry_friction import dry_friction
 from dropspin.scenarios.truths.truth import Truth
 

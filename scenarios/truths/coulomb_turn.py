@@ -26,9 +26,10 @@ import math
 import numpy as np
 
 from dropspin.scenarios.bodies import Box
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply, unrotate
 from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.truth import Truth
 
 

@@ -21,7 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropspin.scenarios.model import Damping, Scenario
+from dropspin.scenarios.damping import Damping
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import ORIENTATION, PARTS, SPIN, Array
 from dropspin.scenarios.truths.free_rotor import FreeRotor, free_rotor
 from dropspin.scenarios.truths.truth import Truth

@@ -21,9 +21,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from dropspin.scenarios.model import Scenario, Surface
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY, Array
+from dropspin.scenarios.surfaces import Surface
 from dropspin.scenarios.truths.friction_impact import Restitution, cone_impulse, integrated_impulse
 
 Law = Literal["note", "normal", "poisson", "clamped", "coulomb", "cone", "integrated-newton", "integrated-poisson", "integrated-energy"]

@@ -31,9 +31,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, UP, VELOCITY, Array
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.elliptic import argument, jacobi
 from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.truth import Impact, Truth, impacts_of, piece

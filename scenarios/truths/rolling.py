@@ -24,9 +24,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dropspin.scenarios.bodies import OnAxis
-from dropspin.scenarios.model import Floor, Scenario
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.coulomb_slide import LEVEL
 from dropspin.scenarios.truths.dry_friction import Motion, dry_friction
 from dropspin.scenarios.truths.truth import Truth, piece

@@ -22,9 +22,10 @@ from functools import partial
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-from dropspin.scenarios.model import TOUCHING, Floor, Scenario
+from dropspin.scenarios.model import TOUCHING, Scenario
 from dropspin.scenarios.rotations import about, multiply
 from dropspin.scenarios.state import ORIENTATION, POSITION, UP, VELOCITY, Array
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths.stand import MIN_LEVEL, Stand, on_one_edge
 from dropspin.scenarios.truths.truth import Truth
 

@@ -10,8 +10,8 @@ from mpmath import mp, mpf
 from support.taylor import free_rotor as taylor_rotor
 
 from dropspin.scenarios import load, truth_for
-from dropspin.scenarios.model import Floor
 from dropspin.scenarios.state import ORIENTATION, POSITION, RATES
+from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.truths import LAWS
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, law_of, velocities_after
 

@@ -19,7 +19,8 @@ from dropspin.comparisons.engines.base import Engine, Simulation
 from dropspin.comparisons.engines.registry import engine
 from dropspin.comparisons.running.run import DEFAULT_DTS, run
 from dropspin.scenarios import load
-from dropspin.scenarios.model import Damping, Scenario
+from dropspin.scenarios.damping import Damping
+from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.state import VELOCITY
 from support.fault_suite import (
     Made,

@@ -25,7 +25,7 @@ from dropspin import scenarios
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.running.run import run
 from dropspin.scenarios.bodies import Box
-from dropspin.scenarios.model import Damping
+from dropspin.scenarios.damping import Damping
 from dropspin.scenarios.rotations import about, conjugate, multiply, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, RATES, SPIN, VELOCITY
 from support.bouncing import Bouncing, bounced, coulomb, pyramid

@@ -223,6 +223,11 @@ class Scenario(Table):
         return np.zeros(3) if self.gravity is None else np.array(self.gravity.acceleration)
 
     @property
+    def factor_dt(self) -> float:
+        """Time step that factors of damping are meant at, which other steps may apply too [s]; 0 for rates, and without damping."""
+        return 0.0 if self.damping is None else self.damping.factor_dt or 0.0
+
+    @property
     def falls_straight_down(self) -> bool:
         """Whether gravity acts along -y."""
         x, y, z = self.acceleration.tolist()

@@ -30,7 +30,7 @@ from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
 from dropspin.scenarios.surfaces import Floor
 from dropspin.scenarios.text import counted, rounded
-from dropspin.scenarios.truths.impact_laws import LAWS, velocities_after
+from dropspin.scenarios.truths.impact_laws import LAWS, response_of, velocities_after
 from dropspin.scenarios.variations import with_height
 
 Array = NDArray[np.float64]
@@ -90,9 +90,7 @@ class Contact(NamedTuple):
 
     def response(self, inverse: Array) -> Array:
         """K of eq 15."""
-        arm = np.cross(np.eye(3), self.point)
-        found: Array = np.eye(3) / self.mass - arm @ inverse @ arm
-        return found
+        return response_of(self.point, self.mass, inverse)
 
     def after(self, impulse: Array, inverse: Array) -> Array:
         """The velocities after an impulse, shape (6,)."""
@@ -217,7 +215,7 @@ def decaying_restitution(engine: Engine) -> str | None:
 
 
 def restitutions(engine: Engine, speed: float | None = None) -> list[tuple[float, float]]:
-    """The restitution and the approach speed [m/s] of each impact of a body that bounces, as long as it is faster than `SLOWEST`.
+    """The restitution and the approach speed [m/s] of each impact of a bouncing body, up to the first one slower than `SLOWEST`.
 
     Args:
         engine: The engine.

@@ -168,7 +168,7 @@ def _inertia(body: Body) -> Array:
 
 def _limitations_met(scene: Scenario, dt: float) -> list[str | KnownLimitation]:
     """That factors of a step act in steps of another size, as Algorithm 1 has it."""
-    meant = dt if scene.damping is None else scene.damping.factor_dt or dt
+    meant = scene.factor_dt or dt
     if math.isclose(meant, dt, rel_tol=1e-9):
         return []
     return [

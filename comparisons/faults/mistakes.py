@@ -8,6 +8,7 @@ Each mistake replaces a part of these equations. One of the rotation is made wit
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ class Mistake:
         swapped: Whether the factors of the quaternion product are swapped.
         turning: Function of the angular speed that returns the factor by which the orientation turns too fast.
         drag: Function of a speed that returns the factor by which damping is too strong, of the velocity and of the angular velocity.
-        is_peculiarity: False: each is a mistake.
+        is_peculiarity: Never, as in a `FaultModel` of an adapter.
     """
 
     message: str
@@ -74,7 +75,7 @@ class Mistake:
     swapped: bool = False
     turning: Callable[[float], float] = _linear
     drag: tuple[Callable[[float], float], Callable[[float], float]] = (_linear, _linear)
-    is_peculiarity: bool = False
+    is_peculiarity: ClassVar[bool] = False
 
     def motion(self, scene: Scenario, times: Array) -> Array | None:
         """The states of a scene with this mistake at some times [s], shape (n, 13).

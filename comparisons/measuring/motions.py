@@ -70,7 +70,7 @@ class Setup:
             clearance=np.asarray(scene.clearance),
             gravity=scene.acceleration,
             damping=None if scene.damping is None else np.asarray(scene.damping.linear),
-            factor_dt=0.0 if scene.damping is None else scene.damping.factor_dt or 0.0,
+            factor_dt=scene.factor_dt,
             floor=scene.floor is not None,
             ends=scene.floor is not None and scene.floor.ends,
             walls=scene.wall is not None,

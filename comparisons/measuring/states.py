@@ -89,7 +89,7 @@ class States:
         dt, gravity, damping = float(self.motion.t[1] - self.motion.t[0]), tuple(self.scene.acceleration), self.scene.damping
         before, after = (tuple(self.motion.velocity[rows].T) for rows in (slice(None, -1), slice(1, None)))
         strength = float(np.sqrt(scalar_product(gravity, gravity)))
-        damping_share = 0.0 if damping is None else max(dt, damping.factor_dt or 0.0) * damping.linear
+        damping_share = 0.0 if damping is None else max(dt, self.scene.factor_dt) * damping.linear
         found: Mask = is_touching(before, after, dt, gravity, strength, damping_share)
         return found
 

@@ -24,7 +24,7 @@ from dropspin.comparisons.robustness.operating_point import OperatingPoint, in_n
 from dropspin.comparisons.running.inputs import EngineEntry, ignore
 from dropspin.comparisons.running.processes import EngineProcesses
 from dropspin.comparisons.running.recording import Breakdown, record, verify_accepted
-from dropspin.comparisons.running.start_phases import start_phases
+from dropspin.comparisons.running.start_phases import MOST_ROWS, start_phases
 from dropspin.scenarios import DropspinError, Scenario, Trajectory, truth_for
 from dropspin.scenarios.state import RATES
 
@@ -36,8 +36,6 @@ BROKEN = frozenset({"declined", "diverged", "crashed", "timed_out"})
 """Failure modes without a motion to compare."""
 MOST_STEPS_PER_START = 20_000
 """A longer run has one start phase only."""
-MOST_ROWS = 400_000
-"""Of a longer run, only evenly spaced states are recorded."""
 STARTS = 4
 """Number of start phases of a scene with an impact, evenly spaced within a step, because a single one may be accurate by chance."""
 OTHER_START = 1.25
@@ -155,7 +153,10 @@ class Runner:
 
 
 def _recorded(entry: EngineEntry, scenes: Sequence[Scenario], dt: float, extend: bool) -> list[Trajectory]:
-    """The engine's motions of scenes, beyond their end if `extend`; runs in the engine's process."""
+    """The engine's motions of scenes, beyond their end if `extend`; runs in the engine's process.
+
+    Of more than `MOST_ROWS` steps, only evenly spaced states are recorded.
+    """
     found = []
     for scene in scenes:
         verify_accepted(entry.adapter, scene)

@@ -160,7 +160,7 @@ def _parameters(jobs: Jobs, scene: Scenario) -> tuple[reference_impl.Body, refer
         clearance=clearances(starts, vertices, semi_axes),
         gravity=np.zeros((1, 3)) if world.gravity is None else world.gravity,
         damping=None if world.damping is None else np.asarray(world.damping[0]),
-        factor_dt=0.0 if scene.damping is None else scene.damping.factor_dt or 0.0,
+        factor_dt=scene.factor_dt,
         floor=scene.floor is not None,
     )
     if scene.floor is not None:  # a start nearer to the limit is left to the scene's own check

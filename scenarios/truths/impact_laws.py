@@ -56,12 +56,24 @@ def velocities_after(state: Array, point: Array, mass: float, inertia: Array, su
     q, v, w = state[ORIENTATION], state[VELOCITY], state[SPIN]
     axes = rotate(q, np.eye(3))  # rows: the body's axes in the world
     inverse = axes.T @ np.linalg.inv(inertia) @ axes
-    arm = np.cross(np.eye(3), point)  # as a matrix: arm @ j = point × j
-    response = np.eye(3) / mass - arm @ inverse @ arm
+    response = response_of(point, mass, inverse)
     approach = v + np.cross(w, point)
     e = 0.0 if abs(approach[1]) < surface.rest_speed else surface.restitution
     impulse = _impulse(law, response, approach, e, surface.friction)
     return None if impulse is None else np.concatenate([v + impulse / mass, w + inverse @ np.cross(point, impulse)])
+
+
+def response_of(point: Array, mass: float, inverse: Array) -> Array:
+    """K of eq 15, the change of a point's velocity by an impulse there [1/kg], shape (3, 3).
+
+    Args:
+        point: The point, from the centre of mass [m], shape (3,).
+        mass: Mass [kg].
+        inverse: The inverse inertia in the world frame [1/(kg m²)], shape (3, 3).
+    """
+    arm = np.cross(np.eye(3), point)  # as a matrix: arm @ j = point × j
+    response: Array = np.eye(3) / mass - arm @ inverse @ arm
+    return response
 
 
 def _impulse(law: Law, response: Array, u: Array, e: float, friction: str | float) -> Array | None:

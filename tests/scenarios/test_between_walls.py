@@ -34,8 +34,13 @@ def events(own, count):
     x, v, w, g = (
         mp.matrix(list(map(float, a))) for a in (own.start.position, own.start.velocity, own.start.angular_velocity, own.acceleration)
     )
-    dot = lambda a, b: mp.fsum(p * q for p, q in zip(a, b, strict=True))  # noqa: E731
-    cross = lambda a, b: mp.matrix([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])  # noqa: E731
+
+    def dot(a, b):
+        return mp.fsum(p * q for p, q in zip(a, b, strict=True))
+
+    def cross(a, b):
+        return mp.matrix([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
     time, struck, found = mp.mpf(0), None, []
     for _ in range(count):
         nearest = (mp.inf, None)
@@ -118,8 +123,11 @@ def test_corner_that_strikes_a_wall_has_the_impact_of_a_floor_there(shape):
     surface = {"restitution": 0.6, "friction": 0.3}
     start = {"orientation": [0.3, 0.2, 0.1, 0.9], "angular_velocity": [3.0, 1.0, 2.0]}
     at_wall = scene([RIGHT | surface], body=body, gravity=[1.0, -2.0, 0.5], **start)
+
     # The rotation that takes -x to y takes (x, y, z) to (y, -x, z).
-    turned = lambda a: [a[1], -a[0], a[2]]  # noqa: E731
+    def turned(a):
+        return [a[1], -a[0], a[2]]
+
     q = np.sqrt(0.5) * np.array([0.0, 0.0, -1.0, 1.0])
     (x, y, z), w = np.array(at_wall.start.orientation[:3]), at_wall.start.orientation[3]
     orientation = [q[3] * x - q[2] * y, q[3] * y + q[2] * x, q[3] * z + q[2] * w, q[3] * w - q[2] * z]

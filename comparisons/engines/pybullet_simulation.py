@@ -42,7 +42,7 @@ CONTACT = ("restitution", "lateralFriction", "contactProcessingThreshold")
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 Z_TO_Y = np.array([-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
 """The rotation that takes the z axis, along which Bullet has capsules and cylinders, to the y axis."""
-UPRIGHT = 0.01  # rad
+UPRIGHT, LEVEL = 0.01, 1e-6  # rad; a difference of heights of corners, relative to the size of the body
 CHUNK = 512  # states that are read before they are stored as numbers of an array
 MOST_USES = 50
 """Simulations after which a connection is reset, which takes as long as 500 steps; until then the shapes of removed bodies take memory."""
@@ -106,7 +106,7 @@ class PyBulletSimulation(Simulation):
         """The shape in the frame of the body's principal axes, a quaternion."""
         bullet, is_turned = self._bullet, axes[3] != 1.0
         corners = (unrotate(axes, body.hull) if is_turned else body.hull).tolist()
-        if kind == "hull" or isinstance(body, Mesh):
+        if kind == "hull" or _is_hull(body):
             return bullet.createCollisionShape(bullet.GEOM_MESH, vertices=corners)
         at = {"collisionFramePosition": unrotate(axes, -body.centre).tolist()} if body.centre.any() else {}
         along_z = isinstance(body, OnAxis)
@@ -230,6 +230,8 @@ def _limitations_met(scene: Scenario, rows: Array, dt: float, is_maximal: bool) 
     fall, friction = dt * scene.acceleration, scene.floor.coefficient
     pushes = np.diff(rows[:, VELOCITY], axis=0) - fall
     along, up = np.hypot(pushes[:, 0], pushes[:, 2]), pushes[:, 1]
+    if _is_hull(scene.body) and _lands_flat(scene.body, rows[int(np.argmax(up > NO_PUSH * np.linalg.norm(fall)))]):
+        yield KnownLimitation("Bullet gives a convex hull one contact point in a step: one that lands on a face or an edge tips")
     if np.isinf(friction) and bool(np.any((up > NO_PUSH * np.linalg.norm(fall)) & (along > ALMOST * STRONGEST_FRICTION * up))):
         yield KnownLimitation(
             f"a contact needs more than {STRONGEST_FRICTION:g} times its normal force to stick; Bullet clamps friction there, so it slips"
@@ -241,10 +243,20 @@ def _limitations_met(scene: Scenario, rows: Array, dt: float, is_maximal: bool) 
             yield _turning_slip(scene, rows, dt, ratio, friction * float(up[struck].max()))
 
 
+def _is_hull(body: Body) -> bool:
+    """Whether a body is Bullet's convex hull of its corners, because these are too many for a compound shape."""
+    return isinstance(body, Mesh) and len(body.hull) > MOST_BALLS
+
+
 def _stands(body: Cylinder, rows: Array) -> bool:
     """Whether a cylinder comes to the floor with its axis within `UPRIGHT` of the vertical, in states of shape (n, 13)."""
     is_upright = np.abs(rotate(rows[:, ORIENTATION], np.broadcast_to(UP, (len(rows), 3)))[:, 1]) > np.cos(UPRIGHT)
     return bool(np.any(is_upright & (rows[:, 1] <= body.size)))
+
+
+def _lands_flat(body: Body, state: Array) -> bool:
+    """Whether several corners are lowest in a state, shape (13,)."""
+    return bool(np.ptp(body.lowest(state[ORIENTATION], LEVEL), axis=0).max() > UPRIGHT * body.size)
 
 
 def _turning_slip(scene: Scenario, rows: Array, dt: float, ratio: float, wrong: float) -> KnownLimitation:

@@ -1,4 +1,4 @@
-"""A ball, or a cylinder on its side, on a rough floor, level or sloped: it slides until its contact is at rest, and rolls from then on.
+"""A ball, or a round body on its side, on a rough floor, level or sloped: it slides until its contact is at rest, and rolls from then on.
 
 With r the radius, I the moment of inertia, k = 1 + M r²/I, and s = v + ω × (-r Y) the velocity of the contact point:
 
@@ -12,10 +12,10 @@ k = 3, a hollow one k = 2. The component of ω along Y is constant. The angle of
 constant; else the orientation is integrated numerically.
 
 Source: G. G. de Coriolis, Théorie mathématique des effets du jeu de billard (1835); `dry_friction` for the velocity of the contact point.
-Valid for: a ball of equal moments that touches the floor at the start, with any velocity along the floor and any spin; a capsule or a
-cylinder on its side, if its axis is principal, velocity and slope are across it, and the spin is about it; any friction, but
-infinite friction only without slip; gravity into the floor, which may be sloped, no damping. Restitution has no effect, because the
-contact does not separate.
+Valid for: a ball of equal moments that touches the floor at the start, with any velocity along the floor and any spin; a capsule, a
+cylinder or an ellipsoid with two equal shorter axes on its side, if its axis is principal, velocity and slope are across it, and the spin
+is about it; any friction, but infinite friction only without slip; gravity into the floor, which may be sloped, no damping. Restitution
+has no effect, because the contact does not separate.
 """
 
 import math
@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from dropspin.scenarios.bodies import OnAxis
+from dropspin.scenarios.bodies import Shape
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, VELOCITY, Array
@@ -93,23 +93,33 @@ def _ball(scene: Scenario) -> tuple[float, float] | None:
 
 
 def _on_its_side(scene: Scenario, along: Sequence[Array]) -> tuple[float, float] | None:
-    """The radius of a capsule or a cylinder that lies on its side, and its moment about its axis; None if it leaves its course.
+    """The radius of a body of revolution that lies on its side, and its moment about its axis; None if it leaves its course.
 
     It keeps it if the axis is a principal axis, the spin is about it, and what is along the floor is across it.
     """
     body, orientation, spin = scene.body, np.array(scene.start.orientation), np.array(scene.start.angular_velocity)
-    if not isinstance(body, OnAxis):
+    number = _axis_of_revolution(body)
+    if number is None:
         return None
-    is_balanced = np.abs(body.vertices[:, [0, 2]]).max() <= ACROSS * body.size and np.prod(body.vertices[:, 1]) < 0.0
-    axis, moment = rotate(orientation, UP), float(body.inertia_tensor[1, 1])
+    axis, inertia = rotate(orientation, np.eye(3)[number]), body.inertia_tensor[number]
     keeps = (
-        is_balanced
-        and abs(axis[1]) <= ACROSS
-        and np.abs(body.inertia_tensor[1, [0, 2]]).max() <= ACROSS * moment
+        abs(axis[1]) <= ACROSS
+        and np.abs(np.delete(inertia, number)).max() <= ACROSS * inertia[number]
         and np.linalg.norm(np.cross(spin, axis)) <= ACROSS * np.linalg.norm(spin)
         and all(abs(vector @ axis) <= ACROSS * np.linalg.norm(vector) for vector in along)
     )
-    return (body.radius, moment) if keeps else None
+    return (float(np.delete(body.semi_axes, number)[0]), float(inertia[number])) if keeps else None
+
+
+def _axis_of_revolution(body: Shape) -> int | None:
+    """The number of the axis of the body frame about which a body is round, if it can lie with this axis level."""
+    for number in range(3):
+        (radius, other), ends = np.delete(body.semi_axes, number), body.vertices[:, number]
+        is_on_axis = np.abs(np.delete(body.vertices, number, axis=1)).max() <= ACROSS * body.size
+        lies = ends.min() < 0.0 < ends.max() or (not ends.any() and body.semi_axes[number] > radius)
+        if radius == other > 0.0 and is_on_axis and lies:
+            return number
+    return None
 
 
 def _orientations(scene: Scenario, spins: Motion, kink: float) -> Callable[[Array], Array]:

@@ -213,15 +213,34 @@ def test_a_body_that_lands_where_it_falls_over_is_no_ladder():
         assert found is None or found.name != "bounce-ladder"
 
 
-@pytest.mark.parametrize(("inertia", "k"), [("solid", 3.0), ([0.05, 2.0 * R**2, 0.05], 2.0), ([0.05, 0.5 * R**2, 0.05], 5.0)])
-def test_cylinders_roll_by_their_moment(inertia, k):
-    """Thrown without spin a cylinder rolls at (k - 1)/k of its speed, k = 1 + M R²/I; on a slope it then gains (k - 1)/k of g sin."""
-    body = CYLINDER | {"inertia": inertia}
+PROLATE = {"shape": "ellipsoid", "half_extents": [R, H, R], "mass": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("body", "k"),
+    [
+        (CYLINDER, 3.0),
+        (CYLINDER | {"inertia": [0.05, 2.0 * R**2, 0.05]}, 2.0),
+        (CYLINDER | {"inertia": [0.05, 0.5 * R**2, 0.05]}, 5.0),
+        (PROLATE, 3.5),
+    ],
+)
+def test_round_bodies_on_their_sides_roll_by_their_moment(body, k):
+    """Thrown without spin one rolls at (k - 1)/k of its speed, k = 1 + M R²/I; on a slope it then gains (k - 1)/k of g sin."""
     rolled = truth_for(scene(body, 0.3, position=[0.0, R, 0.0], orientation=LYING, velocity=[1.0, 0.0, 0.0]))([0.9])
     assert rolled.velocity[0, 0] == pytest.approx(1.0 - 1.0 / k, rel=1e-13)
     assert rolled.angular_velocity[0, 2] == pytest.approx(-(1.0 - 1.0 / k) / R, rel=1e-13)
     sloped = truth_for(scene(body, 0.9, position=[0.0, R, 0.0], orientation=LYING, gravity=(1.0, -G, 0.0)))([0.8])
     assert sloped.velocity[0, 0] == pytest.approx(0.8 * (1.0 - 1.0 / k), rel=1e-13)
+
+
+def test_an_ellipsoid_rolls_about_whichever_axis_is_the_long_one_and_not_about_a_short_one():
+    """Axes of the body frame in another order do not change the motion; a flat ellipsoid would fall over."""
+    along_z = scene(PROLATE | {"half_extents": [R, R, H]}, 0.3, position=[0.0, R, 0.0], velocity=[1.0, 0.0, 0.0])
+    along_y = scene(PROLATE, 0.3, position=[0.0, R, 0.0], orientation=LYING, velocity=[1.0, 0.0, 0.0])
+    np.testing.assert_allclose(truth_for(along_z)([0.9]).states[:, 7:], truth_for(along_y)([0.9]).states[:, 7:], rtol=1e-13, atol=1e-15)
+    flat = truth_for(scene(PROLATE | {"half_extents": [H, H, R]}, 0.3, position=[0.0, H, 0.0], velocity=[1.0, 0.0, 0.0]))
+    assert flat is None or flat.name != "rolling"
 
 
 @pytest.mark.parametrize(

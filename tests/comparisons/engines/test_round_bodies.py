@@ -6,7 +6,7 @@ import pytest
 import dropspin as ds
 from dropspin.comparisons.engines.base import Engine
 from dropspin.comparisons.engines.registry import engine
-from dropspin.scenarios import load, truth_for
+from dropspin.scenarios import load
 from dropspin.scenarios.bodies import SHAPES
 from dropspin.scenarios.rotations import conjugate, multiply, unrotate
 
@@ -30,50 +30,6 @@ def scene(body, start, friction="none", restitution=0.5, duration=0.6):
     return load({"duration": duration, "body": body, "start": start, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "floor": floor})
 
 
-def errors_after_impact(one, name, dts):
-    """The largest errors of velocity and angular velocity 10 ms after the first impact, at each time step."""
-    truth = truth_for(one)
-    found = []
-    for dt in dts:
-        row = round((truth.events[0].time + 0.01) / dt)
-        motion, exact = ds.simulate(one, name, dt=dt), truth([row * dt])
-        found.append(np.abs(motion.states[row, 7:] - exact.states[0, 7:]).max())
-    return found
-
-
-@pytest.mark.parametrize("name", BODIES)
-@pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco"])
-def test_an_oblique_impact_converges_to_the_exact_one(name, engine_name):
-    """To less than a percent of the change at the impact, and by about four times in two quarterings of the step."""
-    one = scene(BODIES[name], TUMBLING, duration=0.45)
-    coarse, fine = errors_after_impact(one, engine_name, (1.6e-3, 1e-4))
-    impact = truth_for(one).events[0]
-    assert fine < 0.01 * np.abs(impact.after[7:] - impact.before[7:]).max()
-    assert fine < 0.25 * coarse
-
-
-@pytest.mark.parametrize("name", ["capsule", "cylinder", "offset", "tensor"])
-def test_pybullet_converges_where_it_has_the_shape(name):
-    """Its cylinder has a margin, whose error remains."""
-    one = scene(BODIES[name], TUMBLING, duration=0.45)
-    impact = truth_for(one).events[0]
-    (error,) = errors_after_impact(one, "pybullet", (1e-4,))
-    assert error < 0.02 * np.abs(impact.after[7:] - impact.before[7:]).max()
-
-
-@pytest.mark.parametrize(
-    ("name", "start", "message"),
-    [
-        ("ellipsoid", TUMBLING, "Bullet has no ellipsoids: this one is the convex hull of"),
-        ("cylinder", {"position": [0.0, 0.4, 0.0]}, "a cylinder that lands upright one contact point"),
-    ],
-)
-def test_pybullet_says_what_it_cannot_build_and_carry(name, start, message):
-    """In the limitations of the run."""
-    with pytest.warns(UserWarning, match=message):
-        ds.simulate(scene(BODIES[name], start), "pybullet", dt=4e-3)
-
-
 @pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco", "pybullet"])
 def test_a_body_is_the_same_in_another_frame_of_its_own(engine_name):
     """Vertices and tensor turned in the body, and the orientation turned back: the same motion, but for what a contact solver leaves."""
@@ -87,19 +43,6 @@ def test_a_body_is_the_same_in_another_frame_of_its_own(engine_name):
     np.testing.assert_allclose(one.angular_velocity, another.angular_velocity, atol=1e-6)
     difference = multiply(multiply(one.orientation, turn), conjugate(another.orientation))
     np.testing.assert_allclose(np.abs(difference[:, 3]), 1.0, atol=1e-7)
-
-
-@pytest.mark.filterwarnings("ignore:contacts slip", "ignore:in maximal coordinates")
-@pytest.mark.parametrize("engine_name", [EXACT_WANG, "mujoco", "pybullet"])
-def test_cylinders_and_capsules_roll_on_their_sides(engine_name):
-    """Thrown without spin they slide, then roll at (k - 1)/k of their speed, to the order of the time step."""
-    for name in ("cylinder", "capsule"):
-        one = scene(
-            BODIES[name], {"position": [0.0, 0.1, 0.0], "orientation": LYING, "velocity": [1.0, 0.0, 0.0]}, friction=0.3, duration=1.0
-        )
-        motion, truth = ds.simulate(one, engine_name, dt=1e-3), truth_for(one)
-        assert truth.name == "rolling"
-        assert motion.velocity[-1, 0] == pytest.approx(truth([1.0]).velocity[0, 0], abs=0.02)
 
 
 @pytest.mark.parametrize("options", ["", "contact=sequential,law=normal"])

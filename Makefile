@@ -42,6 +42,7 @@ coverage: $(VENV)/.installed-dev      ## how often the intervals of asymptotic e
 bench: $(VENV)/.installed             ## speed beside the engines, as ratios: out/bench.json, out/bench.svg
 	$(BIN)/python benchmarks/speed.py
 	$(BIN)/python benchmarks/batch.py
+	$(BIN)/python benchmarks/vertices.py
 	$(BIN)/python benchmarks/run_cost.py
 
 examples: $(VENV)/.installed         ## the pictures of docs/examples.md, each by its own lines

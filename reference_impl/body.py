@@ -94,6 +94,8 @@ class KernelBody(NamedTuple):
     """Of the ellipsoid about each vertex [m]; None if it is a ball."""
     has_rims: bool
     """Whether this ellipsoid is a disc across y, so that a rim is about each vertex."""
+    many_points: Array | None
+    """Their coordinates, shape (3, n), if there are so many that they are compared with a floor in blocks; else None."""
 
 
 class KernelWall(NamedTuple):

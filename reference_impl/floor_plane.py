@@ -6,6 +6,8 @@ from dropspin.reference_impl.vectors import Vec3, compiled, dot, row, select
 
 N = Vec3(0.0, 1.0, 0.0)
 """The floor's unit normal, upwards."""
+BLOCK = 64
+"""Number of vertices that are compared with the floor together, where there are as many: whole registers of any processor."""
 RIM_POINTS = 3
 PLACES = ((1.0, 0.0), (-0.5, math.sqrt(0.75)), (-0.5, -math.sqrt(0.75)))
 """Cosine and sine of the angles around a rim from its lowest point."""
@@ -39,6 +41,27 @@ def _is_below(x, r, half_extents, thickness):
 def contact_count(body):
     """The number of points at which the body can touch the floor."""
     return body.points.shape[0] * (RIM_POINTS if body.has_rims else 1)
+
+
+@compiled
+def block_count(many_points):
+    """The number of blocks of contact points: one of all, or many of at most `BLOCK` vertices."""
+    return 1 if many_points is None else (many_points.shape[1] + BLOCK - 1) // BLOCK
+
+
+@compiled
+def block_range(x, R, body, many_points, block):
+    """The numbers of a block's contact points, as the first and the end of a range; it is empty if none of many is below the floor."""
+    if many_points is None:
+        return 0, contact_count(body)
+    first, end = block * BLOCK, min(block * BLOCK + BLOCK, many_points.shape[1])
+    if end - first < BLOCK:
+        return first, end
+    x_of, y_of, z_of = many_points[0, first:end], many_points[1, first:end], many_points[2, first:end]
+    below = 0
+    for i in range(BLOCK):  # of constant length and without a branch, so that the compiler computes it in SIMD registers
+        below += x.y + (dot(R.row2, Vec3(x_of[i], y_of[i], z_of[i])) - body.radius) < 0.0  # as `is_below` does, to the last bit
+    return first, end if below > 0 else first
 
 
 @compiled

@@ -58,6 +58,7 @@ class Parts:
     rims: bool = False
     edges: bool = False
     walls: int = 0
+    many_points: bool = False
 
 
 @cache
@@ -76,14 +77,15 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
     correct = None if correction is None else correction.correct
     walls_of, wall_count = _walls_of if parts.walls else _no_walls, parts.walls
     load, rows_of, record = (_load, _rows_of, _record) if width == 1 else (lanes.load, lanes.rows_of, lanes.record)
-    forces_of = rows_of if parts.forces else _no_forces
+    forces_of = rows_of if parts.forces else _no_rows
+    many_points_of = _columns_of if parts.many_points else _no_rows
     semi_axes_of, has_rims = read_semi_axes if parts.ellipsoids else read_nothing, parts.rims
 
     def fill(recorded, states, columns, points, forces, every, first, last):
         unsolved = 0
         for block in range(first, last):
             own = min(block, columns.shape[0] - 1)
-            body = read_body(load, columns, rows_of(points, block), own, semi_axes_of, has_rims)
+            body = read_body(load, columns, rows_of(points, block), own, semi_axes_of, has_rims, many_points_of(points, block))
             dt = load(columns, own, STEP_SIZE)
             gravity = gravity_of(load, columns, own)
             damping = damping_of(load, columns, own)
@@ -128,11 +130,16 @@ def _load(array, block, column):
 
 @compiled
 def _rows_of(array, block):
+    return array[min(block, array.shape[0] - 1)].T
+
+
+@compiled
+def _columns_of(array, block):
     return array[min(block, array.shape[0] - 1)]
 
 
 @compiled
-def _no_forces(array, block):
+def _no_rows(array, block):
     return None
 
 
@@ -146,8 +153,8 @@ def _record(recorded, block, row, x, q, v, w):
 
 
 def blocks(array: Array, width: int) -> Array:
-    """An array of shape (B, …), arranged for a kernel of the given width."""
-    return np.ascontiguousarray(array) if width == 1 else lanes.side_by_side(array)
+    """An array of shape (B, …), arranged for a kernel of the given width; each column of (n, 3) rows of one body is contiguous."""
+    return np.ascontiguousarray(np.swapaxes(array, 1, -1)) if width == 1 else lanes.side_by_side(array)
 
 
 def compile_cached(function: Callable[..., Any], *other_sources: Path) -> Callable[..., Any]:

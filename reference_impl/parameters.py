@@ -247,7 +247,7 @@ def _frames(normals: Array) -> Array:
 
 
 @compiled
-def read_body(load, columns, points, block, semi_axes_of, has_rims):
+def read_body(load, columns, points, block, semi_axes_of, has_rims, many_points):
     """The body, or the bodies, of a block."""
     return KernelBody(
         load(columns, block, MASS),
@@ -260,6 +260,7 @@ def read_body(load, columns, points, block, semi_axes_of, has_rims):
         load(columns, block, REACH),
         semi_axes_of(load, columns, block),
         has_rims,
+        many_points,
     )
 
 

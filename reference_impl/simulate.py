@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dropspin.reference_impl import lanes
 from dropspin.reference_impl.body import Body, World
+from dropspin.reference_impl.floor_plane import BLOCK
 from dropspin.reference_impl.kernels import Parts, blocks, config, recording_kernel
 from dropspin.reference_impl.methods import Methods
 from dropspin.reference_impl.parameters import SEMI_AXES, checked, ensemble_size, frictions, is_finite, pack
@@ -135,8 +136,9 @@ class Simulator:
         world = self._world
         modelled = (world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning)
         edges = world.floor is not None and not (world.floor.half_extents is None and world.floor.thickness is None)
-        parts = Parts(*modelled, *self._surface, edges, len(world.walls))
         width = lanes.WIDTH if size > 1 and self._methods.runs_in_lanes and not config.DISABLE_JIT else 1
+        many_points = width == 1 and points.shape[1] >= BLOCK and not self._surface[0]
+        parts = Parts(*modelled, *self._surface, edges, len(world.walls), many_points)
         recorded = np.empty((size, 1 + steps // every, 13))
         if width not in self._packed:
             self._packed[width] = [blocks(columns, width), blocks(points, width)]

@@ -8,7 +8,7 @@ Source: H. Wang, Rigid Body Dynamics, Algorithm 2, eq 10, 12 and section 3.2.
 """
 
 from dropspin.reference_impl.contacts.response import impulse_response
-from dropspin.reference_impl.floor_plane import along_normal, contact_count, contact_offset, is_below
+from dropspin.reference_impl.floor_plane import along_normal, block_count, block_range, contact_offset, is_below
 from dropspin.reference_impl.quaternion import rotation_matrix
 from dropspin.reference_impl.vectors import Vec3, any_, compiled, cross, select, transpose
 
@@ -32,13 +32,14 @@ def contact_point(R, x, v, w, body, floor):
     """Eq 10 and section 3.2: the mean offset r of the vertices that are below the floor and descending, and whether there are any."""
     total = Vec3(0.0, 0.0, 0.0)
     count = 0.0
-    for i in range(contact_count(body)):
-        below = is_below(x, contact_offset(R, body, i), floor)
-        if any_(below):
-            r = contact_offset(R, body, i)
-            descends = along_normal(v + cross(w, r)) < 0.0
-            total = select(below & descends, total + r, total)
-            count = select(below & descends, count + 1.0, count)
+    for block in range(block_count(body.many_points)):
+        for i in range(*block_range(x, R, body, body.many_points, block)):
+            below = is_below(x, contact_offset(R, body, i), floor)
+            if any_(below):
+                r = contact_offset(R, body, i)
+                descends = along_normal(v + cross(w, r)) < 0.0
+                total = select(below & descends, total + r, total)
+                count = select(below & descends, count + 1.0, count)
     return total / select(count > 0.0, count, 1.0), count > 0.0
 
 

@@ -98,7 +98,7 @@ def box_in_the_air(q):
     mass = 1.7
     inertia = reference_impl.solid_box_inertia(mass, half)
     packed = pack(reference_impl.Body(mass, inertia, np.array([half])), World(), 1.0)
-    body = read_body(lambda columns, _, column: float(columns[0, column]), packed.columns, packed.points[0], 0, read_nothing, False)
+    body = read_body(lambda columns, _, column: float(columns[0, column]), packed.columns, packed.points[0], 0, read_nothing, False, None)
     R = Rotation.from_quat(q).as_matrix()
     return body, R, R @ np.linalg.inv(inertia) @ R.T
 

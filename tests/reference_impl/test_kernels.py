@@ -14,6 +14,7 @@ from support.methods import COVERING, FURTHER
 
 from dropspin import reference_impl
 from dropspin.reference_impl import Body, Floor, Methods, World
+from dropspin.reference_impl.floor_plane import BLOCK
 from dropspin.reference_impl.kernels import recording_kernel
 from dropspin.reference_impl.methods import CONTACTS, CORRECTIONS, LAWS, ROTATIONS
 from dropspin.reference_impl.state import ORIENTATION
@@ -84,6 +85,22 @@ def test_interpreted_compiled_and_ensemble_results_agree_to_the_last_bit(choices
             np.testing.assert_array_equal(rows, expected[ALL], err_msg=f"{choice}, ensemble in {threads} threads")
         results.add(expected.tobytes())
     assert len(results) == len(choices)  # no two choices are the same method
+
+
+def test_vertices_in_blocks_collide_as_one_after_the_other():
+    """With many vertices, in no order, to the last bit; those of an ensemble are not in blocks."""
+    rng = np.random.default_rng(4)
+    points = rng.normal(size=(3 * BLOCK + 7, 3))
+    points *= np.array([0.1, 0.2, 0.3]) / np.linalg.norm(points, axis=1)[:, None]
+    body = Body(1.0, reference_impl.vertex_inertia(points, np.full(len(points), 1 / len(points))), points)
+    world = World(np.array([0, -9.8, 0]), Floor(0.5, np.inf))
+    starts = np.tile(np.array([0, 0.4, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.0]), (20, 1))
+    starts[:, 7:] = rng.normal(size=(20, 6)) * [2, 1, 0.3, 5, 5, 5]
+    together = reference_impl.simulate(starts, body, world, 5e-3, 300)
+    turned = np.diff(together[:, :, 10:], axis=1).any(axis=2)
+    assert turned.sum() > 400  # steps with an impulse
+    for start, expected in zip(starts, together, strict=True):
+        np.testing.assert_array_equal(reference_impl.simulate(start, body, world, 5e-3, 300), expected)
 
 
 def in_a_process(program, **environment):

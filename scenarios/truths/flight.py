@@ -65,9 +65,9 @@ class Flight:
             position = x + t_ * v + t_ * t_ * 0.5 * self.acceleration
             return np.hstack([position, orientation, v + t_ * self.acceleration, angular_velocity])
         k = self.damping.linear
-        slowed = t_ * _phi1(k * t_)
-        orientation, angular_velocity = self.rotor(t * _phi1(self.damping.angular * t))
-        position = x + slowed * v + t_ * t_ * _phi2(k * t_) * self.acceleration
+        slowed = t_ * phi1(k * t_)
+        orientation, angular_velocity = self.rotor(t * phi1(self.damping.angular * t))
+        position = x + slowed * v + t_ * t_ * phi2(k * t_) * self.acceleration
         velocity = np.exp(-k * t_) * v + slowed * self.acceleration
         return np.hstack([position, orientation, velocity, np.exp(-self.damping.angular * t_) * angular_velocity])
 
@@ -95,13 +95,13 @@ def flight(scene: Scenario) -> Truth:
     return Truth(name, parabola + turning, states, horizon=states.horizon, ends=TURNS_OVER if states.horizon < scene.duration else "")
 
 
-def _phi1(z: Array) -> Array:
+def phi1(z: Array) -> Array:
     """(1 - e⁻ᶻ)/z, 1 at 0."""
     safe = np.where(z == 0.0, 1.0, z)
     return np.where(z == 0.0, 1.0, -np.expm1(-safe) / safe)
 
 
-def _phi2(z: Array) -> Array:
+def phi2(z: Array) -> Array:
     """(z - 1 + e⁻ᶻ)/z², 1/2 at 0; by its series below 1, where the difference would lose digits."""
     series = np.polynomial.polynomial.polyval(np.minimum(z, 1.0), [(-1.0) ** n / math.factorial(n + 2) for n in range(SERIES_TERMS)])
     safe = np.maximum(z, 1.0)

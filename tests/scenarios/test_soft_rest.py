@@ -1,0 +1,195 @@
+"""Depth at rest and creep on MuJoCo's soft contacts, compared with 25 digits by mpmath and with MuJoCo itself, settled to rest."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from dropspin.scenarios.truths.soft_rest import LEAST_FRICTION, GeomSettings, SoftContact, mixed
+
+G = 9.81
+BALL = 'type="sphere" size=".05"'
+CUBE = 'type="box" size=".025 .025 .025"'
+
+
+def model_of(geom="", floor="", option="", flag="", shape=BALL, joint="<freejoint/>", gravity=(0.0, 0.0, -G)):
+    import mujoco
+
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="1e-3" gravity="{" ".join(map(str, gravity))}" {option}>{flag}</option>'
+        f'<worldbody><geom type="plane" size="1 1 .1" {floor}/><body pos="0 0 .05">{joint}<geom {shape} mass="2" {geom}/></body>'
+        "</worldbody></mujoco>"
+    )
+
+
+def at_rest(model):
+    """The contacts after 1.5 s, in which a body loses 1 % of its velocity in each step, beside the damping of its contacts."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    for _ in range(1500):
+        data.qvel *= 0.99
+        mujoco.mj_step(model, data)
+    assert np.abs(data.qvel).max() <= 1e-9
+    return data.contact
+
+
+def contact_of(model):
+    floor, body = (
+        GeomSettings(
+            solref=tuple(model.geom_solref[geom]),
+            solimp=tuple(model.geom_solimp[geom]),
+            friction=tuple(model.geom_friction[geom]),
+            condim=int(model.geom_condim[geom]),
+            margin=float(model.geom_margin[geom]),
+            priority=int(model.geom_priority[geom]),
+            solmix=float(model.geom_solmix[geom]),
+        )
+        for geom in (0, 1)
+    )
+    return SoftContact(mixed(floor, body), bool(model.opt.cone), float(model.opt.impratio), float(model.opt.timestep))
+
+
+def test_depth_of_the_default_contact_matches_25_digits():
+    with mpmath.workdps(25):
+        d = lambda r: mpmath.mpf("0.9") + mpmath.mpf("0.05") * 2 * (r * 1000) ** 2  # noqa: E731
+        excess = lambda r: r - (1 - d(r)) * mpmath.mpf(G) * (mpmath.mpf("0.95") / 50) ** 2 / d(r) ** 2  # noqa: E731
+        exact = mpmath.findroot(excess, mpmath.mpf("3.6e-4"))
+    assert SoftContact(GeomSettings()).depth(G) == pytest.approx(float(exact), rel=1e-14)
+    assert SoftContact(GeomSettings(condim=4)).depth(G) == pytest.approx(0.00026654, abs=5e-9)
+    assert SoftContact(GeomSettings(condim=6)).depth(G) == pytest.approx(0.00016883, abs=5e-9)
+
+
+SETTINGS = [
+    ("", ""),
+    ('condim="1"', 'condim="1"'),
+    ('condim="4"', ""),
+    ('condim="6" friction=".3"', 'friction=".2"'),
+    ('friction="2"', ""),
+    ('solref="-800 -30"', 'solref="-1000 -20"'),
+    ('solref="-800 -30"', ""),
+    ('solref=".0001 1"', 'solref=".0002 .8"'),
+    ('solref=".05 0"', ""),
+    ('solmix="3" solref=".03 .9" solimp=".8 .97 .002 .3 3"', 'solmix="1"'),
+    ('solmix="0" solref=".03 .9"', ""),
+    ('solmix="0" solref=".03 .9"', 'solmix="0"'),
+    ('priority="1" solref=".03 .9" friction=".4" condim="4" solimp=".95 .9 .0004 .5 1"', 'friction="2"'),
+    ('margin=".001" gap=".0004"', 'margin=".0003" gap=".0002"'),
+    ('solimp=".5 .5 .01 .5 2"', 'solimp=".5 .5 .01 .5 2"'),
+    ('solimp="0 1 .003 .99 5"', 'solimp="0 1 .003 .99 5"'),
+]
+CONES = ["", 'cone="elliptic"', 'impratio="3"', 'cone="elliptic" impratio="10"']
+
+
+@pytest.mark.parametrize("option", CONES)
+@pytest.mark.parametrize(("geom", "floor"), SETTINGS)
+def test_ball_rests_where_mujoco_has_it(geom, floor, option):
+    """The settings of the pair exactly; the depth to 1e-6 of itself."""
+    model = model_of(geom, floor, option)
+    contact, found = contact_of(model), at_rest(model)
+    settings = contact.settings
+    np.testing.assert_allclose(found.solref[0], settings.solref, rtol=1e-15)
+    np.testing.assert_allclose(found.solimp[0], settings.solimp, rtol=1e-15)
+    np.testing.assert_array_equal(found.friction[0], np.array(settings.friction)[[0, 0, 1, 2, 2]])
+    assert (found.dim[0], found.includemargin[0]) == (settings.condim, pytest.approx(settings.margin, rel=1e-15))
+    assert settings.margin - found.dist[0] == pytest.approx(contact.depth(G), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("shape", "contacts"),
+    [
+        (CUBE, 4),
+        ('type="cylinder" size=".05 .05"', 3),
+        ('type="cylinder" size=".05 .08" euler="90 0 0"', 2),
+        ('type="capsule" size=".05 .08" euler="90 0 0"', 2),
+        ('type="ellipsoid" size=".05 .06 .05"', 1),
+    ],
+)
+@pytest.mark.parametrize("option", CONES[:2])
+def test_contacts_share_the_weight(shape, contacts, option):
+    model = model_of(shape=shape, option=option)
+    depths = -at_rest(model).dist
+    assert len(depths) == contacts
+    np.testing.assert_allclose(depths, contact_of(model).depth(G / contacts), rtol=1e-6)
+
+
+def test_armature_adds_to_the_mass_and_not_to_the_load():
+    model = model_of(joint='<joint type="free" armature="1"/>')
+    assert -at_rest(model).dist[0] == pytest.approx(contact_of(model).depth(G * 2.0 / 3.0), rel=1e-6)
+
+
+def test_exact_inverse_mass_includes_rotation():
+    """With the flag diagexact, A of a corner is 1/m (1 + 3/2 + 3/2): a cube's moment of inertia is 2/3 m w², and its corners are w off."""
+    model = model_of(shape=CUBE, option='cone="elliptic"', flag='<flag diagexact="enable"/>')
+    np.testing.assert_allclose(-at_rest(model).dist, contact_of(model).depth(4.0 * G / 4.0), rtol=1e-6)
+
+
+def test_time_constant_is_kept_with_refsafe_disabled():
+    model = model_of('solref=".0018 2"', 'solref=".0018 2"', flag='<flag refsafe="disable"/>')
+    kept = SoftContact(contact_of(model).settings)
+    assert -at_rest(model).dist[0] == pytest.approx(kept.depth(G), rel=1e-6)
+    assert kept.depth(G) == pytest.approx(0.81 * contact_of(model).depth(G), rel=1e-3)
+
+
+@pytest.mark.parametrize("solref", [".03 .9", ".0001 1", "-2500 -90", ".03 -5"])
+def test_stiffness_and_damping_are_those_of_mujoco(solref, tmp_path, monkeypatch):
+    """A solref of mixed signs is replaced with the default; MuJoCo warns of it on the terminal and in a file of the current folder."""
+    import mujoco
+
+    monkeypatch.chdir(tmp_path)
+    model = model_of(f'solref="{solref}"', f'solref="{solref}"')
+    data = mujoco.MjData(model)
+    data.qpos[2] = 0.0499
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.efc_KBIP.reshape(-1, 4)[0, :2], contact_of(model).reference, rtol=1e-14)
+
+
+def test_depth_without_stiffness_is_infinite():
+    assert SoftContact(GeomSettings(solref=(0.0, -5.0))).depth(G) == math.inf
+
+
+@pytest.mark.parametrize("degrees", [10, 20, math.degrees(math.atan(0.5)), 30])
+@pytest.mark.parametrize(("option", "accuracy"), [("", 1e-3), ('cone="elliptic"', 3e-3), ('cone="elliptic" impratio="10"', 3e-3)])
+def test_cube_creeps_down_a_slope_that_holds(degrees, option, accuracy):
+    """What is left is the tilt, which the loads leave out: 7e-4, and of elliptic cones 1e-5 up to 27° and 3e-3 at 30°.
+
+    At 30°, two contacts slip within the hold of the others.
+    """
+    import mujoco
+
+    down, into = G * math.sin(math.radians(degrees)), G * math.cos(math.radians(degrees))
+    model = model_of(shape=CUBE, option=option, gravity=(down, 0.0, -into))
+    data = mujoco.MjData(model)
+    data.qpos[2] = 0.025
+    mujoco.mj_step(model, data, 1500)
+    start = data.qpos[0]
+    mujoco.mj_step(model, data, 500)
+    loads = [(into + side * down) / 4.0 for side in (1.0, 1.0, -1.0, -1.0)]
+    creep = contact_of(model).creep(down, loads)
+    assert (data.qpos[0] - start) / 0.5 == pytest.approx(creep, rel=accuracy)
+
+
+def test_creep_at_a_slope_of_one_half():
+    """The settings of MuJoCo's default, of elliptic cones and of those with impratio 10: 2.85, 1.14 and .114 mm/s."""
+    down, into = G / math.sqrt(5.0), 2.0 * G / math.sqrt(5.0)
+    loads = [(into + side * down) / 4.0 for side in (1.0, 1.0, -1.0, -1.0)]
+    settings = GeomSettings()
+    contacts = SoftContact(settings), SoftContact(settings, elliptic=True), SoftContact(settings, elliptic=True, impratio=10.0)
+    found = [contact.creep(down, loads) for contact in contacts]
+    np.testing.assert_allclose(found, [2.846e-3, 1.143e-3, 1.143e-4], rtol=1e-3)
+
+
+def test_contacts_that_do_not_hold_have_no_creep():
+    contact = SoftContact(GeomSettings(friction=(0.5, 0.005, 0.0001)))
+    assert contact.creep(0.0, [G]) == 0.0
+    assert contact.creep(0.51 * G, [G]) == math.inf
+    assert SoftContact(GeomSettings(condim=1)).creep(1e-9, [G]) == math.inf
+    assert SoftContact(GeomSettings(friction=(0.0, 0.0, 0.0))).creep(2.0 * LEAST_FRICTION * G, [G]) == math.inf
+
+
+def test_body_stops_at_the_first_depth_that_carries_it():
+    """An impedance that falls from .9 to .1 within 1 mm gives three depths; MuJoCo's body sinks to the first."""
+    geom = 'solimp=".9 .1 .001 .5 2" solref="-5000 -50"'
+    model = model_of(geom, geom, 'cone="elliptic"')
+    assert -at_rest(model).dist[0] == pytest.approx(contact_of(model).depth(G), rel=1e-6)

@@ -153,7 +153,7 @@ def free_motion(
     armature: float = 0.0,
     centre: Array | None = None,
 ) -> Array:
-    """The states of a body on a free joint with damping and armature at ascending times, shape (n, 13).
+    """The states of a body on a free joint with damping and armature, shape (n, 13).
 
     The joint's origin O moves with the velocity u, and c is the centre of mass as seen from O. Armature and damping act on u and on ω:
     a force F = -a u' + F_d at O and a torque τ = -a ω' + τ_d, in addition to the laws of Newton and Euler about the centre of mass:
@@ -164,7 +164,7 @@ def free_motion(
     `free_rotor` has it in closed form. Energy and angular momentum of I + a are conserved, and those of I about a principal axis alone.
 
     Args:
-        times: From 0 [s], shape (n,).
+        times: Ascending, none before 0 and the last one after it [s], shape (n,).
         start: State at the time 0, shape (13,); position and velocity are those of the centre of mass.
         mass: Mass [kg].
         inertia: Inertia tensor about the centre of mass in the body frame [kg m²], shape (3, 3).

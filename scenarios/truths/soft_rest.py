@@ -17,7 +17,8 @@ The friction of an elliptic cone has R/impratio and no stiffness, so that a tang
 
 Source: MuJoCo documentation, chapters Computation (constraint model) and Modeling (solver parameters, contact parameters); the
 pyramid's R is that of `efc_R` (tests compare all of this with MuJoCo).
-Valid for: MuJoCo 3 and 4, contacts without adhesion, surface velocity and `solreffriction`.
+Valid for: MuJoCo 4, contacts without adhesion, surface velocity and `solreffriction`, no iterations of the noslip solver; creep along an
+axis of the contact frame (of pyramidal cones, it is up to 3 % faster and up to 3° off the pull in other directions).
 """
 
 import math
@@ -83,8 +84,9 @@ def mixed(first: GeomSettings, second: GeomSettings) -> GeomSettings:
 class SoftContact:
     """A contact with its settings in force.
 
-    Loads are forces of one contact times A, its inverse mass [1/kg]: 1/(m + armature) of a free body on a fixed one, and the sum of both
-    of two free bodies. With the flag `diagexact`, A is that of the normal at the contact point, which includes rotation.
+    Loads are forces of one contact times A, its inverse mass [1/kg]: the sum of `body_invweight0[body, 0]` of both bodies, which is
+    1/(m + armature) for a free body whose centre of mass is the joint's origin, and 0 for a fixed one. With the flag `diagexact` and
+    elliptic cones, A is that of the normal at the contact point, which includes rotation.
 
     Attributes:
         settings: Those of the pair of geometries, such as `mixed` gives them.

@@ -119,6 +119,21 @@ def test_armature_adds_to_the_mass_and_not_to_the_load():
     assert -at_rest(model).dist[0] == pytest.approx(contact_of(model).depth(G * 2.0 / 3.0), rel=1e-6)
 
 
+@pytest.mark.parametrize("option", CONES[:2])
+def test_ball_rests_on_a_free_box(option):
+    """A is 1/2 + 1/3 for the ball of 2 kg on the box of 3 kg, whose corners carry both with A = 1/3."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="1e-3" {option}/><worldbody><geom type="plane" size="1 1 .1"/>'
+        '<body pos="0 0 .05"><freejoint/><geom type="box" size=".05 .05 .05" mass="3"/></body>'
+        '<body pos="0 0 .149"><freejoint/><geom type="sphere" size=".05" mass="2"/></body></worldbody></mujoco>'
+    )
+    contact, found = contact_of(model), at_rest(model)
+    expected = [contact.depth(2.0 * G * (1 / 2 + 1 / 3)) if 2 in pair else contact.depth(5.0 / 4.0 * G / 3.0) for pair in found.geom]
+    np.testing.assert_allclose(-found.dist, expected, rtol=1e-6)
+
+
 def test_exact_inverse_mass_includes_rotation():
     """With the flag diagexact, A of a corner is 1/m (1 + 3/2 + 3/2): a cube's moment of inertia is 2/3 m w², and its corners are w off."""
     model = model_of(shape=CUBE, option='cone="elliptic"', flag='<flag diagexact="enable"/>')

@@ -15,7 +15,7 @@ which is (m + a)/c₂ (log(cosh βt + α/β sinh βt) - αt), written as sums of
 φ₁ and φ₂ are those of `flight`.
 
 Source: J. Bernoulli (1719) for the spin; L. Euler, Mechanica I (1736), chapter 4, for the fall; `free_motion` by numerical integration.
-Valid for: coefficients >= 0.
+Valid for: coefficients >= 0; the closed forms, for a body whose centre of mass is the origin of its joint.
 """
 
 import math

@@ -16,6 +16,7 @@ from dropspin.scenarios.truths.coulomb_turn import coulomb_turn
 from dropspin.scenarios.truths.flight import flight
 from dropspin.scenarios.truths.impact_laws import FRICTION_LAWS, LAWS, Law, law_of
 from dropspin.scenarios.truths.near import until_near
+from dropspin.scenarios.truths.point_contact import point_contact
 from dropspin.scenarios.truths.rocking import rocking
 from dropspin.scenarios.truths.rolling import rolling
 from dropspin.scenarios.truths.slipping import slipping
@@ -25,7 +26,17 @@ from dropspin.scenarios.truths.truth import Impact, Truth
 __all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "truth_for"]
 
 Solution = Callable[[Scenario, Floor], Truth | None]
-ON_FLOOR: tuple[Solution, ...] = (bounce_ladder, rocking, slipping, top, corner_impact, coulomb_slide, rolling, coulomb_turn)
+ON_FLOOR: tuple[Solution, ...] = (
+    bounce_ladder,
+    rocking,
+    slipping,
+    top,
+    corner_impact,
+    coulomb_slide,
+    rolling,
+    coulomb_turn,
+    point_contact,
+)
 """The solutions of scenes with a floor and without damping; each is None for a scene that is not of its kind, and the first that is not
 counts.
 """

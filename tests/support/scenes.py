@@ -88,3 +88,40 @@ def prism(corners, speed=0.0, slope=0.0, lean=0.0, masses=None, heading=0.0, hal
         }
         | more
     )
+
+
+def on_one_point(body, orientation, spin=(0.0, 0.0, 0.0), friction="infinite", duration=1.0, gravity=(0.0, -G, 0.0), slip=(0.0, 0.0, 0.0)):
+    """A body that touches the floor at its lowest point, which moves with the velocity `slip`."""
+    tables = {"duration": duration, "body": body, "gravity": {"acceleration": list(gravity)}}
+    arm = load(tables).body.lowest(np.array(orientation), 1e-12).mean(axis=0)
+    start = {
+        "position": [0.3, -arm[1], -0.2],
+        "orientation": list(orientation),
+        "velocity": (np.array(slip) - np.cross(spin, arm)).tolist(),
+        "angular_velocity": list(spin),
+    }
+    return load(tables | {"start": start, "floor": {"restitution": 0.0, "friction": friction}})
+
+
+def rolling_disc(angle, precession=None, half_length=0.02, centre=0.0, nutation=0.0, radius=0.1, **more):
+    """A cylinder on its rim in steady rolling, with its axis at an angle to the vertical; without a precession, its centre is at rest.
+
+    From the torque about the centre of mass, which is `centre` above the middle of the axis.
+
+    Returns:
+        The scene, the precession and the spin about the axis [rad/s].
+    """
+    mass, d, sine, cosine = 2.0, half_length + centre, math.sin(angle), math.cos(angle)
+    along, across = 0.5 * mass * radius**2, mass * (0.25 * radius**2 + half_length**2 / 3.0)
+    height, lever = radius * sine + d * cosine, radius * cosine - d * sine
+    if precession is None:
+        precession = math.sqrt(mass * G * lever / (sine * (across * cosine - along * d * sine / radius)))
+        spin = precession * d * sine / radius
+    else:
+        torque = precession**2 * sine * (across * cosine + mass * height * d) - mass * G * lever
+        spin = torque / (precession * (along * sine + mass * height * radius))
+    axis, downhill = np.array([sine, cosine, 0.0]), np.array([cosine, -sine, 0.0])
+    omega = spin * axis - precession * sine * downhill + nutation * np.cross(axis, downhill)
+    body = {"shape": "cylinder", "radius": radius, "half_length": half_length, "mass": mass, "inertia": [across, along, across]}
+    body |= {"center_of_mass": [0.0, centre, 0.0]}
+    return on_one_point(body, about(-AXIS, np.array(angle)), omega.tolist(), **more), precession, spin

@@ -1,12 +1,13 @@
 """A box, whose faces are perpendicular to the axes of the body frame."""
 
+import math
 from functools import cached_property
 from itertools import product
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from dropspin.scenarios.bodies.inertia import Moments
+from dropspin.scenarios.bodies.inertia import Moments, is_diagonal
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import PositiveVector
@@ -28,6 +29,12 @@ class Box(Shape):
     @property
     def resting_height(self) -> float:
         return float(np.min(np.array(self.half_extents) - np.abs(self.centre)))
+
+    def possible_multiple(self, squares: Array, enough: float = math.inf) -> float:
+        """By itself along each axis, if the axes of the box are principal axes; a mass between -a and b has a mean square of up to a b."""
+        if is_diagonal(squares):
+            return float(np.min(self.largest_spread / np.maximum(np.diag(squares), 1e-300)).clip(0.0))
+        return super().possible_multiple(squares, enough)
 
     def tensor_of(self, distribution: str) -> Array:
         a, b, c = np.square(self.half_extents)

@@ -56,6 +56,14 @@ class Ellipsoid(Shape):
         t = brentq(outside, 0.0, least - math.sqrt(least) * offset, xtol=1e-300, rtol=1e-15)
         return float(np.linalg.norm(centre * t / (squares - t)))
 
+    def possible_multiple(self, squares: Array, enough: float = math.inf) -> float:
+        """In units of the half extents the body is a ball, in which a mean square distance of up to 1 from its middle is possible.
+
+        Source: F. Uhlig, Linear Algebra Appl. 25 (1979), 219-237, for the S-lemma, by which no other condition is needed.
+        """
+        left = max(1.0 - float(np.sum((self.centre / self.semi_axes) ** 2)), 0.0)
+        return left / float(np.sum(np.diag(squares) / self.semi_axes**2))
+
     @property
     def outline(self) -> Outline:
         angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)

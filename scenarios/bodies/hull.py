@@ -63,10 +63,10 @@ def outline(points: Array, size: float) -> Outline:
     return Outline(points[list(used)], faces)
 
 
-def around_axis(radii: Array, heights: Array) -> Array:
+def around_axis(radii: Array, heights: Array, meridians: int = MERIDIANS) -> Array:
     """Points of a surface of revolution about the y axis, shape (n, 3): rings of given radii at given heights [m]."""
-    angles = np.linspace(0.0, 2.0 * np.pi, MERIDIANS, endpoint=False)
-    rings = np.multiply.outer(radii, np.stack([np.sin(angles), np.zeros(MERIDIANS), np.cos(angles)], axis=-1))
+    angles = np.linspace(0.0, 2.0 * np.pi, meridians, endpoint=False)
+    rings = np.multiply.outer(radii, np.stack([np.sin(angles), np.zeros(meridians), np.cos(angles)], axis=-1))
     points: Array = (rings + np.multiply.outer(heights, UP)[:, np.newaxis]).reshape(-1, 3)
     return points
 

@@ -5,6 +5,7 @@ cylinder. A new shape is a file of its own beside this one, which gives `vertice
 follows from these unless the shape overrides it.
 """
 
+import math
 from abc import abstractmethod
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -12,14 +13,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from pydantic import model_validator
 
-from dropspin.scenarios.bodies.hull import Outline, outline
+from dropspin.scenarios.bodies.hull import Outline, around_axis, outline
 from dropspin.scenarios.bodies.inertia import Moments, is_diagonal, tensor
+from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.bodies.surface import RIM, rise_of_centre
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import Array
 from dropspin.scenarios.tables import Positive, Table, Vector
 
 INERTIA_ROUNDING = 1.001  # moments are often given with four digits
+AROUND = 64
+"""Points of each circle of the polytope around a round body."""
 MIRRORED = np.array([[1.0, -1.0, -1.0], [-1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]])
 """The signs of a tensor of inertia that is mirrored at the plane x = 0."""
 
@@ -157,20 +161,30 @@ class Shape(Table):
         squares: Array = (self.semi_axes + self.vertices.max(axis=0)) * (self.semi_axes - self.vertices.min(axis=0))
         return squares
 
+    def possible_multiple(self, squares: Array, enough: float = math.inf) -> float:
+        """The largest multiple of second moments about the centre of mass [m²], shape (3, 3), that masses inside of the body have.
+
+        That of the convex hull, or of a polytope around a round body, whose second moments are larger by up to 1 %. If it is above
+        `enough`, any other number above that.
+        """
+        return largest_multiple(_around(self.hull, self.semi_axes), squares, enough)
+
     @property
     def excess_inertia(self) -> str:
-        """Why the given moments of inertia are impossible for a body of this size; empty if they are possible."""
+        """Why the given moments of inertia are impossible for a body of this shape; empty if a distribution of its mass has them."""
         if isinstance(self.inertia, str):
             return ""
-        moments = np.array(self.moments)
-        spread, largest = (0.5 * moments.sum() - moments) / self.mass, self.largest_spread  # mean squares of x, y and z
-        if not np.any(spread > INERTIA_ROUNDING * largest) and spread.sum() <= INERTIA_ROUNDING * self.size**2:
+        squares = (0.5 * np.trace(self.inertia_tensor) * np.eye(3) - self.inertia_tensor) / self.mass
+        multiple = self.possible_multiple(squares, 1.0 / INERTIA_ROUNDING)
+        if multiple * INERTIA_ROUNDING >= 1.0:
             return ""
+        needed, largest = np.diag(squares).clip(0.0), self.largest_spread.clip(0.0)
         possible = self.mass * np.minimum(largest.sum() - largest, self.size**2)
         return (
-            f"got {np.array(self.inertia).tolist()} kg m², which needs mass outside of the body: a root mean square of x, y and z of "
-            f"{_digits(np.sqrt(spread))} m, of which this shape allows {_digits(np.sqrt(largest))} m, and moments of inertia of up to "
-            f"{_digits(possible)} kg m² for {self.mass:g} kg. Correct the inertia, the mass or the size."
+            f"got {np.array(self.inertia).tolist()} kg m², which needs mass outside of the body: at most {multiple:.3g} times as "
+            f"much is possible. It has a root mean square of x, y and z of {_digits(np.sqrt(needed))} m, of which this shape allows "
+            f"{_digits(np.sqrt(largest))} m, each by itself, and moments of inertia of up to {_digits(possible)} kg m² for "
+            f"{self.mass:g} kg. Correct the inertia, the mass or the size."
         )
 
     @property
@@ -200,6 +214,19 @@ class Shape(Table):
             permuted = _permuted(order, self.inertia)
             keys["inertia"] = tuple(permuted[axis] for axis in order) if isinstance(permuted[0], tuple) else permuted
         return keys
+
+
+def _around(points: Array, semi_axes: Array) -> Array:
+    """Points whose hull contains the ellipsoids about given points, shape (n, 3)."""
+    if not semi_axes.any():
+        return points
+    narrow = math.cos(math.pi / AROUND)
+    if semi_axes[1] == 0.0:
+        ring = around_axis(np.ones(1), np.zeros(1), AROUND) / narrow
+    else:
+        angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, AROUND // 2 + 1)
+        ring = around_axis(np.cos(angles), np.sin(angles), AROUND) / narrow**2
+    return (points[:, np.newaxis] + semi_axes * ring).reshape(-1, 3)
 
 
 def times(factor: float, values: Any) -> Any:

@@ -38,6 +38,10 @@ class Sphere(Shape):
     def resting_height(self) -> float:
         return self.radius - math.hypot(*self.centre)
 
+    def possible_multiple(self, squares: Array, enough: float = math.inf) -> float:
+        """That of an ellipsoid with equal half extents."""
+        return max(self.radius**2 - float(np.sum(self.centre**2)), 0.0) / float(np.trace(squares))
+
     def tensor_of(self, distribution: str) -> Array:
         share = 0.4 if distribution == "solid" else 2.0 / 3.0
         return share * self.mass * self.radius**2 * np.eye(3)

@@ -203,7 +203,7 @@ def _integrated(scene: Scenario, contact: _Contact, disturbance: Array, coarser:
 
 def _solved(scene: Scenario, contact: _Contact, friction: float) -> Truth:
     steps, solution, touches = _integrated(scene, contact, np.zeros(3), 1.0)
-    others, disturbed, _ = _integrated(scene, contact, DISTURBANCE, COARSER)
+    others, disturbed, touches_too = _integrated(scene, contact, DISTURBANCE, COARSER)
 
     def states(t: Array) -> Array:
         y = solution(t)
@@ -227,7 +227,7 @@ def _solved(scene: Scenario, contact: _Contact, friction: float) -> Truth:
         "the motion amplifies small differences too much": np.abs(disturbed(times)[:, 4:7] - y[:, 4:7]).max(axis=1) > MAX_GROWTH * 1e-10,
     }
     firsts = {cause: int(np.argmax(ends)) for cause, ends in causes.items() if ends.any()}
-    horizon, ends = float(times[-1]), "another part of the body touches the floor" if touches else ""
+    horizon, ends = float(times[-1]), "another part of the body touches the floor" if touches or touches_too else ""
     if firsts:
         ends = min(firsts, key=firsts.__getitem__)
         horizon = float(times[max(firsts[ends] - 1, 0)])

@@ -25,7 +25,7 @@ def scene(body, **tables):
         ({"shape": "box", "half_extents": [0.005, 0.01, 0.01]}, [2e-4, 1.25e-4, 1.25e-4]),  # all mass at the corners
         ({"shape": "sphere", "radius": 0.3}, [0.06, 0.06, 0.06]),  # a shell: 2/3 M R²
         ({"shape": "sphere", "radius": 0.3}, [0.09, 0.09, 0.0]),  # all mass at two poles
-        ({"shape": "vertices", "points": [[-0.1, -0.1, -0.1], [0.1, 0.1, 0.1], [0.1, -0.1, 0.1], [-0.1, 0.1, -0.1]]}, [0.02, 0.02, 0.02]),
+        ({"shape": "vertices", "points": [[-0.1, -0.1, -0.1], [0.1, 0.1, -0.1], [0.1, -0.1, 0.1], [-0.1, 0.1, 0.1]]}, [0.02, 0.02, 0.02]),
     ],
 )
 def test_largest_possible_moments_are_accepted_and_larger_ones_are_not(shape, largest):

@@ -147,8 +147,7 @@ class Comparison:
         rows = np.arange(len(self.motion if self.reference is None else self.reference))
         times = self.motion.t[rows]
         if not self.impacts and self.reference is None:
-            contact = self.first_contact
-            return [rows if contact is None else rows[: contact[0] + 1]]
+            return [rows[: int(self.motions.first_flight_end) + 1]]
         edges = [0.0, *self.impacts, times[-1]]
         # After the last impact the body may lie on the floor, so the time until the end is not the length of a flight.
         lengths = np.diff(edges)

@@ -71,7 +71,8 @@ def energy_drift(case: Comparison | Motions) -> Array:
 def energy_gain(case: Comparison | Motions) -> Array:
     """Largest increase of energy above any earlier value, over the scene's energy.
 
-    Energy that a contact may have stored, at most its force times the depth of the lowest point, counts as present.
+    Energy that a contact may have stored, at most its force times the depth of the lowest point, counts as present. Values at which the
+    body may touch a wall do not count as earlier ones.
     """
     motions = case.motions if isinstance(case, Comparison) else case
     return motions.energy_gained / case.energy_scale

@@ -177,11 +177,14 @@ class Motions:
 
     @cached_property
     def energy_gained(self) -> Array:
-        """Largest increase of energy above any earlier value [J], shape (...); energy that a contact may have stored counts as present."""
+        """Largest increase of energy above any earlier value [J], shape (...); energy that a contact may have stored counts as present.
+
+        Of many motions it is not known beside walls.
+        """
         return (self.energy - np.minimum.accumulate(self._energy_with_stored(), axis=-1)).max(axis=-1)
 
     def _energy_with_stored(self) -> Array:
-        """Energy plus the largest energy that a contact may have stored and give back [J], shape (..., n).
+        """Energy plus the largest energy that a contact may have stored and give back [J], shape (..., n); unknown, inf, at a wall.
 
         A force that grows with the depth of the lowest point below its height before the contact stores at most force times depth, and no
         more than the energy that the body lost in the contact. A contact is rigid, and stores none, unless the point moves down against a
@@ -204,7 +207,11 @@ class Motions:
             lost = energy[motion, before] - energy[motion, row]
             stored = np.minimum(force * np.maximum(level - lowest[motion, row], 0.0), lost)
             found[motion, row] = np.maximum(found[motion, row], energy[motion, row] + stored)
-        return found.reshape(self.energy.shape)
+        found = found.reshape(self.energy.shape)
+        if self.setup.walls:
+            assert isinstance(self.states, States)
+            found[self.states.near_wall] = np.inf
+        return found
 
     @cached_property
     def first_contact(self) -> tuple[RowNumbers, RowNumbers]:
@@ -221,7 +228,11 @@ class Motions:
     def first_flight_end(self) -> RowNumbers:
         """The last row before the first contact, or the last row, shape (...)."""
         before, _ = self.first_contact
-        return np.where(before < 0, self.last_row, before)
+        end = np.where(before < 0, self.last_row, before)
+        if self.setup.walls:
+            assert isinstance(self.states, States)
+            end = np.minimum(end, np.argmax(np.append(self.states.near_wall, True)))
+        return end
 
     @cached_property
     def rebound(self) -> Array:
@@ -249,8 +260,7 @@ class Motions:
             "in_contact": self.in_contact[number],
             "first_contact": tuple(np.asarray(rows[number]) for rows in self.first_contact),
             "energy_scale": self.energy_scale[number],
-            "energy_gained": self.energy_gained[number],
-        }
+        } | ({} if self.setup.walls else {"energy_gained": self.energy_gained[number]})
 
 
 def at_rows(values: Array, rows: RowNumbers | int) -> Array:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dropspin.scenarios import Scenario, Trajectory
 from dropspin.scenarios.mechanics import Components, angular_momentum, energy, kinetic_energy, lowest_height, scalar_product
+from dropspin.scenarios.model import TOUCHING
 from dropspin.scenarios.rotations import length
 
 Array = NDArray[np.float64]
@@ -82,6 +83,16 @@ class States:
     def lowest_height(self) -> Array:
         """Height of the body's lowest point above the floor [m], shape (n,)."""
         return lowest_height(self.scene, self.motion)
+
+    @cached_property
+    def near_wall(self) -> Mask:
+        """Whether the body may touch a wall within a step before or after a row, shape (n,)."""
+        dt, size = self.motion.t[1] - self.motion.t[0], self.scene.body.size
+        reach = TOUCHING * size + dt * (length(self.motion.velocity) + size * length(self.motion.angular_velocity))
+        found = np.zeros(len(self.motion), dtype=bool)
+        for wall in self.scene.wall or ():
+            found |= lowest_height(self.scene, Trajectory.from_states(self.motion.t, wall.as_floor(self.motion.states))) <= reach
+        return found
 
     @cached_property
     def touching(self) -> Mask:

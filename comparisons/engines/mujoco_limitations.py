@@ -12,6 +12,7 @@ from dropspin.scenarios.bodies.surface import rise_of_centre
 from dropspin.scenarios.mechanics import angular_momentum, kinetic_energy
 from dropspin.scenarios.rotations import cross, length, rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, SPIN, UP, VELOCITY
+from dropspin.scenarios.surfaces import Surface, Wall
 from dropspin.scenarios.trajectory import Trajectory
 
 AT_REST = 1e-3  # m/s; a slip that friction has stopped, and a body that rests, may still have this speed
@@ -27,22 +28,27 @@ def limitations_met(scene: Scenario, states: Array, dt: float, *, estimated: boo
         estimated: Whether the regularisation of a contact has MuJoCo's estimate of its inverse inertia, which is exact for balls alone, and
             never larger than the exact one.
     """
-    if scene.floor is None:
-        return
-    before, after = states[:-1], states[1:]
-    arms = rotate(before[:, None, ORIENTATION], scene.body.vertices) - rise_of_centre(before[:, None, ORIENTATION], scene.body.semi_axes)
-    touching = before[:, None, 1] + arms[..., 1] <= 0.0
-    box = int(estimated and not scene.body.is_ball)
-    if float(-states[:, 8].min()) > AT_REST and (scene.floor.friction != "none" or (touching.sum(axis=1) > 1 - box).any()):
-        yield _of_impedance(scene, before, arms, touching)
-    if isinstance(scene.floor.friction, float):
-        velocities = after[:, None, VELOCITY] + cross(after[:, None, SPIN], arms)
-        slip = float(np.hypot(velocities[..., 0], velocities[..., 2])[touching].max(initial=0.0))
-        if slip > AT_REST:
-            yield _of_friction_cone(scene, scene.floor.friction, states, slip, dt)
+    times, box = dt * np.arange(len(states), dtype=float), int(estimated and not scene.body.is_ball)
+    for surface in scene.surfaces:
+        moved = surface.as_floor(states) if isinstance(surface, Wall) else states
+        near = moved[:-1, 1] <= scene.body.size
+        before, after = moved[:-1][near], moved[1:][near]
+        turned = before[:, None, ORIENTATION]
+        arms = rotate(turned, scene.body.hull) - rise_of_centre(turned, scene.body.semi_axes)
+        touching = before[:, None, 1] + arms[..., 1] <= 0.0
+        approach = float(-moved[:, 8].min())
+        shared = surface.friction != "none" or (touching.sum(axis=1) > 1 - box).any()
+        if surface is scene.floor and approach > AT_REST and shared:
+            yield _of_impedance(scene, before, arms, touching, approach)
+        if isinstance(surface.friction, float):
+            velocities = after[:, None, VELOCITY] + cross(after[:, None, SPIN], arms)
+            slip = float(np.hypot(velocities[..., 0], velocities[..., 2])[touching].max(initial=0.0))
+            if slip > AT_REST:
+                left = (len(states) - 1 - np.flatnonzero(near)[touching.any(axis=1)][0]) * dt
+                yield _of_friction_cone(scene, surface, Trajectory.from_states(times, states), slip, max(0.0, approach), left)
 
 
-def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray[np.bool_]) -> KnownLimitation:
+def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray[np.bool_], approach: float) -> KnownLimitation:
     """The change of restitution where several forces share an impulse: those of several corners, or friction and the normal force.
 
     Each has the regularisation R = (1 - d)/d A with its own inverse inertia A, where d is the impedance. It leaves up to R/A of the
@@ -53,6 +59,7 @@ def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray
         before: States before each step, shape (n, 13).
         arms: The corners relative to the centre of mass [m], shape (n, corners, 3).
         touching: Whether they are below the floor, shape (n, corners).
+        approach: The largest speed of fall [m/s].
     """
     assert scene.floor is not None
     velocities = (before[:, None, VELOCITY] + cross(before[:, None, SPIN], arms))[touching]
@@ -60,7 +67,6 @@ def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray
     turned = unrotate(before[:, None, ORIENTATION], cross(arms, np.broadcast_to(UP, arms.shape)))[touching]
     inverse_inertias = 1.0 + scene.body.mass * np.sum(turned * np.linalg.solve(scene.body.inertia_tensor, turned.T).T, axis=1)
     speed = (1.0 + scene.floor.restitution) * float(length(stopped).max(initial=0.0))
-    approach = float(-before[:, 8].min())
     changed = (1.0 - IMPEDANCE) / IMPEDANCE * float(inverse_inertias.max(initial=0.0)) * speed / approach
     sizes = {"restitution_error": changed} | _of_bounce(scene, scene.floor.restitution * approach, changed * approach)
     return KnownLimitation(
@@ -68,24 +74,31 @@ def _of_impedance(scene: Scenario, before: Array, arms: Array, touching: NDArray
     )
 
 
-def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: float, dt: float) -> KnownLimitation:
-    """The errors of contacts that slip under Coulomb friction, at the corners that begin a step below the floor.
+def _of_friction_cone(scene: Scenario, surface: Surface, motion: Trajectory, slip: float, approach: float, left: float) -> KnownLimitation:
+    """The errors of contacts that slip under Coulomb friction, at the corners that begin a step below the floor or behind the wall.
 
     MuJoCo's friction cone is convex: a contact that slips at s [m/s] gains up to a = µ s of rebound speed (dual cone, one-step damper).
-    The hop takes 2 (e u + a)/g, where u is the approach speed; during 2 a/g of it friction acts too late, so that the slip is wrong by up
-    to 2 µ a until the next landing compensates.
+    A hop from the floor takes 2 (e u + a)/g, where u is the approach speed; during 2 a/g of it friction acts too late, so that the slip is
+    wrong by up to 2 µ a until the next landing compensates. From a wall there is no landing, and the velocities stay wrong.
+
+    Args:
+        scene: The scene.
+        surface: The floor or the wall.
+        motion: The motion.
+        slip: The largest speed of slip s [m/s].
+        approach: The largest speed of approach u [m/s].
+        left: Time from the first contact to the end [s].
     """
-    assert scene.floor is not None
-    e, g, approach = scene.floor.restitution, -float(scene.acceleration[1]), max(0.0, float(-states[:, 8].min()))
-    fastest = approach + max(g, 0.0) * dt  # the exact impact may be a step later
-    added = friction * slip
-    late = 2.0 * friction * added
-    hop = 2.0 * (e * fastest + added) / g if g > 0.0 else 0.0
-    body = scene.body
-    # The normal force of a ball has no torque, and its friction turns it; other bodies stay flat.
-    turning = body.mass * body.size * late / np.min(np.diag(body.inertia_tensor)) if body.is_ball else (late + added) / body.size
+    e, g, body, is_wall = surface.restitution, -float(scene.acceleration[1]), scene.body, isinstance(surface, Wall)
+    fastest = approach + float(np.linalg.norm(scene.acceleration)) * (motion.t[1] - motion.t[0])  # the exact impact may be a step later
+    added = surface.coefficient * slip
+    late = 2.0 * surface.coefficient * added
+    hop = left if is_wall else 2.0 * (e * fastest + added) / g if g > 0.0 else 0.0
+    pushed = late if body.is_ball else late + added  # the normal force of a ball has no torque, and its friction turns it
+    turning = pushed / body.size  # of a body that stays flat on a floor
+    if body.is_ball or is_wall:
+        turning = body.mass * body.size * pushed / np.min(np.linalg.eigvalsh(body.inertia_tensor))
     lifted = body.mass * (e * fastest * added + 0.5 * added**2)
-    motion = Trajectory.from_states(dt * np.arange(len(states), dtype=float), states)
     height = scene.clearance if scene.starts_above_floor else body.size
     energy = max(body.mass * abs(g) * height, float(kinetic_energy(scene, motion)[0]))
     sizes = {
@@ -96,11 +109,10 @@ def _of_friction_cone(scene: Scenario, friction: float, states: Array, slip: flo
     }
     spin = float(length(angular_momentum(scene, motion)).max())
     if spin > 0.0:
-        turned = body.mass * body.size * (late + (0.0 if body.is_ball else added)) / spin
+        turned = body.mass * body.size * pushed / spin
         sizes |= {"angular_momentum_error": turned, "angular_momentum_direction_error": 0.5 * np.pi * turned}
-    if approach > 0.0:
-        sizes["restitution_error"] = added / approach
-    sizes |= _of_bounce(scene, e * fastest, added)
+    if not is_wall:
+        sizes |= _of_bounce(scene, e * fastest, added) | ({"restitution_error": added / approach} if approach > 0.0 else {})
     return KnownLimitation(
         f"contacts slip at up to {slip:.3g} m/s; with calibrated contacts MuJoCo's friction cone adds up to µ times that, {added:.3g} m/s, "
         "to the rebound",

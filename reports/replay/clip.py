@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from dropspin.reports.replay.motions import Motion, Replay
 from dropspin.scenarios import DropspinError
 from dropspin.scenarios.bodies.hull import Outline
 from dropspin.scenarios.rotations import rotate
+from dropspin.scenarios.surfaces import Wall
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,7 +78,9 @@ def _frame_times(replay: Replay, speed: float) -> Array:
 
 
 def _add_axes(figure: "Figure", replay: Replay) -> "Axes3D":
-    """Add axes that show every motion, y up, with the floor and a legend."""
+    """Add axes that show every motion, y up, with the floor, the walls and a legend."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
     axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
     size = replay.scene.body.size
     positions = np.concatenate([motion.frames.position for motion in replay.motions])
@@ -90,10 +94,23 @@ def _add_axes(figure: "Figure", replay: Replay) -> "Axes3D":
     if replay.scene.floor is not None:
         across, along = np.meshgrid(np.linspace(*x, 9), np.linspace(-z[1], -z[0], 9))
         axes.plot_wireframe(across, along, np.zeros_like(across), color=EXACT_COLOUR, alpha=0.2, linewidth=0.7)
+    walls = [_y_up(_in_box(wall, low, high)) for wall in replay.scene.wall or ()]
+    axes.add_collection3d(Poly3DCollection(walls, facecolor=EXACT_COLOUR, edgecolor=EXACT_COLOUR, alpha=0.1))
     lines = [(motion.label, motion.colour or EXACT_COLOUR, "-" if motion.colour else "--") for motion in replay.motions]
     handles = [axes.plot([], [], [], color=colour, linestyle=style, label=label)[0] for label, colour, style in lines]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9)
     return axes
+
+
+def _in_box(wall: Wall, low: Array, high: Array) -> Array:
+    """The corners of the part of a wall that is in a box, in order around it, shape (n, 3); none if it is outside."""
+    corners = np.array(list(product(*zip(low, high, strict=True))))
+    heights = (corners - wall.point) @ np.array(wall.normal)
+    edges = [(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i & bit]
+    crossed = [(i, j) for i, j in edges if (heights[i] < 0.0) != (heights[j] < 0.0)]
+    found = np.array([(heights[i] * corners[j] - heights[j] * corners[i]) / (heights[i] - heights[j]) for i, j in crossed]).reshape(-1, 3)
+    x, _, z = rotate(wall.frame, found - found.mean(axis=0)).T if len(found) else np.empty((3, 0))
+    return found[np.argsort(np.arctan2(z, x))]
 
 
 def _draw(axes: "Axes3D", shape: Outline, replay: Replay, motion: Motion, time: float) -> list[Any]:

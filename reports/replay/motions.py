@@ -55,7 +55,7 @@ class Motion:
         frames: States at a fixed stride, and those at impacts, from the start to the last finite one.
         errors: Distance [m] and angle [rad] from the exact solution at each frame, shape (frames, 2), NaN after the end of the exact
             solution; None without an exact solution.
-        impacts: The impacts on the floor, in order.
+        impacts: The impacts on the floor and on walls, in order.
     """
 
     label: str
@@ -190,9 +190,8 @@ def _motion(scene: Scenario, truth: Truth | None, label: str, colour: str, motio
 
 def _exact_motion(scene: Scenario, truth: Truth, times: Array) -> Motion:
     times = np.union1d(times, [event.time for event in truth.events])
-    on_floor = [event for event in truth.events if event.wall is None]
-    states = np.array([[event.before, event.after] for event in on_floor]).reshape(-1, 13)
-    pairs = Trajectory.from_states(np.repeat([event.time for event in on_floor], 2), states)
+    states = np.array([[event.before, event.after] for event in truth.events]).reshape(-1, 13)
+    pairs = Trajectory.from_states(np.repeat([event.time for event in truth.events], 2), states)
     before = np.arange(0, len(states), 2)
     impacts = Impacts(pairs.t[before], *contact_impulses(scene, pairs, before, before + 1))
     return Motion(EXACT, "", exactly(truth, times), None, impacts)
@@ -216,7 +215,8 @@ def impact_rows(scene: Scenario, motion: Trajectory) -> tuple[Rows, Rows, Rows]:
     Returns:
         The row before each impact, the row after it, and the row after the step with the largest impulse in it, each of shape (k,).
     """
-    steps = np.flatnonzero(Comparison(scene, motion).motions.in_contact)
+    case = Comparison(scene, motion)
+    steps = np.flatnonzero(case.motions.in_contact | (case.states.touching & case.states.near_wall[:-1]))
     impulses = np.linalg.norm(contact_impulses(scene, motion, steps, steps + 1)[0], axis=1)
     weight = scene.body.mass * float(np.linalg.norm(scene.acceleration))
     is_impact = impulses > RESOLVED_HOP * weight * (motion.t[1] - motion.t[0])

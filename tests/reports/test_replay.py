@@ -17,12 +17,13 @@ from dropspin.reports.commands.replay import replay_command
 from dropspin.reports.html.replay import replay_page
 from dropspin.reports.plots.colours import EXACT
 from dropspin.reports.replay import replay_of
-from dropspin.reports.replay.clip import write_clip
+from dropspin.reports.replay.clip import _in_box, write_clip
 from dropspin.reports.replay.data import as_data
 from dropspin.reports.replay.motions import MOST_FRAMES, _stride, contact_impulses, impact_rows, replay_together
 from dropspin.scenarios import DropspinError, Trajectory, truth_for
 from dropspin.scenarios.mechanics import angular_momentum
 from dropspin.scenarios.rotations import about, angle_between_orientations, multiply, rotate
+from dropspin.scenarios.surfaces import Wall
 
 
 @pytest.fixture(scope="module")
@@ -292,7 +293,7 @@ def test_damaged_run_is_refused(folder, tmp_path, damage):
         assert_refused(dropspin(verb, copied, cwd=tmp_path), "not the folder of a run, or damaged")
 
 
-def test_planes_of_a_scene_are_drawn_and_impulses_are_those_of_the_floor():
+def test_planes_of_a_scene_are_drawn_and_impulses_are_those_of_all():
     surface = {"restitution": 0.8, "friction": "none"}
     wall = surface | {"point": [1.0, 0.0, 0.0], "normal": [-0.6, 0.0, 0.8]}
     start = {"position": [0.0, 0.5, 0.0], "velocity": [4.0, 1.0, 0.0]}
@@ -303,7 +304,18 @@ def test_planes_of_a_scene_are_drawn_and_impulses_are_those_of_the_floor():
     floor_drawn, wall_drawn = as_data(replay)["planes"]
     assert floor_drawn["ends"] == (4.0, 2.0)
     np.testing.assert_allclose(np.array(wall_drawn["along"]) @ wall["normal"], 0.0, atol=1e-9)
-    exact = replay.motions[-1]
     assert [event.wall for event in truth_for(scene).events] == [0, None]
-    np.testing.assert_allclose(exact.impacts.times, [truth_for(scene).events[1].time])
-    np.testing.assert_allclose(exact.impacts.impulses[:, [0, 2]], 0.0, atol=1e-12)
+    for motion, tolerance in zip(replay.motions, (0.01, 1e-12), strict=True):
+        at_wall, at_floor = motion.impacts.impulses
+        np.testing.assert_allclose(motion.impacts.times, [event.time for event in truth_for(scene).events], atol=2e-3)  # two steps
+        np.testing.assert_allclose(at_wall, 1.8 * 2.4 * np.array(wall["normal"]), atol=tolerance)  # M (1 + e) u, u = 4 m/s 0.6
+        np.testing.assert_allclose(at_floor[[0, 2]], 0.0, atol=1e-12)
+
+
+def test_wall_of_a_gif_fills_the_view():
+    """The diagonal plane of a cube cuts it in a regular hexagon of side √½; a plane beside the cube, not at all."""
+    wall = Wall(point=(0.5, 0.5, 0.5), normal=(1.0, 1.0, 1.0), restitution=0.5, friction="none")
+    corners = _in_box(wall, np.zeros(3), np.ones(3))
+    np.testing.assert_allclose(np.linalg.norm(np.roll(corners, 1, axis=0) - corners, axis=1), [np.sqrt(0.5)] * 6)
+    np.testing.assert_allclose(corners.sum(axis=1), 1.5)
+    assert _in_box(wall, np.ones(3), np.full(3, 2.0)).shape == (0, 3)

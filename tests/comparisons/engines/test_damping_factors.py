@@ -40,8 +40,25 @@ def test_velocities_decay_by_the_factors(engine, dt):
     own, exact = decayed(n, 1), decayed(n, dt / DT)
     np.testing.assert_allclose(truth_for(scene)([n * dt]).states[0][[7, 12]], exact, rtol=n * EPS)
     np.testing.assert_allclose(last[[7, 12]], own if engine == "wang" else exact, rtol=n * EPS)
-    assert [text for text in simulation.known_limitations if f"damp {DT / dt:.3g} times" in text] == list(simulation.known_limitations)
     assert len(simulation.known_limitations) == (engine == "wang" and dt != DT)
+    for limitation in simulation.known_limitations:
+        assert f"damp {DT / dt:.3g} times" in limitation.message
+        assert limitation.explained_errors["angular_momentum_error"] == pytest.approx(1.1 / 4.0, rel=1e-3)  # of K^n - K^2n, where K^n = ½
+
+
+def test_limitation_of_factors_explains_the_error_of_steps_of_another_size():
+    """Expectations that it fails with half the time step are `limited`, for each rotation; at the factors' own step, they fail."""
+    expected = [
+        {"metric": metric, "dt": DT / 2, "below": 1e-3, "reason": "too strict"}
+        for metric in ("orientation_error", "angular_momentum_error")
+    ]
+    table = ds.run(thrown(expect=expected), ["wang", "wang[rotation=exact]"], dt=[DT / 2]).table
+    judged = table[table["metric"].isin(["orientation_error", "angular_momentum_error"]) & (table["kind"] != "asymptotic_error")]
+    assert set(judged["verdict"]) == {"limited"}
+    assert judged["reason"].str.contains("damp 2 times as much").all()
+    [expected] = [one | {"dt": DT} for one in expected if one["metric"] == "orientation_error"]
+    table = ds.run(thrown(expect=[expected], duration=60.0, start={"angular_velocity": [0.0, 0.0, 60.0]}), "wang", dt=[DT]).table
+    assert table.set_index("metric").loc["orientation_error", "verdict"] == "failed"  # (60 rad/s 15 ms)²/12 of the angle, by eq 6
 
 
 def test_batch_and_single_simulations_have_the_same_bits_and_limitations():

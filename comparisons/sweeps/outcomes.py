@@ -58,19 +58,18 @@ def standard_metrics(motions: Motions) -> NDArray[np.float64]:
     """The `STANDARD_METRICS` of motions, shape (..., 5); NaN where one does not apply.
 
     Energy drift and gain do not apply with damping, nor where there is no energy at all, and drift only to a start in flight; penetration
-    needs a floor that does not end. Drift, gain and rebound do not apply with walls or a floor that ends.
+    needs a floor that does not end. Drift, gain and rebound do not apply to a floor that ends, and rebound not with walls.
     """
     setup, values = motions.setup, np.full((*motions.last_row.shape, len(STANDARD_METRICS)), np.nan)
-    knows_contacts = not (setup.ends or setup.walls)
     with np.errstate(all="ignore"):  # of numbers near the largest, and of an energy scale of 0
-        if setup.damping is None and knows_contacts:
+        if setup.damping is None and not setup.ends:
             has_energy = motions.energy_scale != 0.0
             in_flight = setup.starts_above_floor if setup.floor else True
             values[..., 0] = np.where(has_energy & in_flight, energy_drift(motions), np.nan)
             values[..., 1] = np.where(has_energy, energy_gain(motions), np.nan)
         if setup.floor and not setup.ends:
             values[..., 2] = penetration(motions)
-        if knows_contacts:
+        if not (setup.ends or setup.walls):
             values[..., 3] = motions.rebound
         values[..., 4] = motions.dt * motions.last_row_in_motion
     return values

@@ -20,7 +20,7 @@ class Ellipsoid(Shape):
 
     shape: Literal["ellipsoid"]
     half_extents: PositiveVector
-    inertia: Literal["solid"] | Moments = "solid"
+    inertia: Literal["solid", "surface"] | Moments = "solid"
 
     @cached_property
     def corners(self) -> Array:
@@ -70,5 +70,23 @@ class Ellipsoid(Shape):
         return outline(self.semi_axes * around_axis(np.cos(angles), np.sin(angles)) - self.centre, self.size)
 
     def tensor_of(self, distribution: str) -> Array:
+        """The tensor of inertia; of the surface by the means over the unit sphere of w, n² w and n²/w, w² = Σ (n/a)².
+
+        A point is at (a n) where the surface has w times the sphere's area; its mean square along an axis is a² <n² w>/<w>. The flux of
+        n w^k e through the sphere, e along that axis, gives <w> + <n²/w>/a² = 4 <n² w> for k = 1, and for k = -1 the mean of n²/w.
+
+        Source: B. C. Carlson, Elliptic integrals, DLMF 19.16.3 (R_G as the mean of w) and 19.16.5 (R_D).
+        """
+        if distribution == "surface":
+            return self._tensor_of_surface()
         a, b, c = np.square(self.half_extents)
         return 0.2 * self.mass * np.diag([b + c, c + a, a + b])
+
+    def _tensor_of_surface(self) -> Array:
+        from scipy.special import elliprd, elliprf, elliprg
+
+        squares = np.square(self.half_extents)
+        x, y, z = 1.0 / squares
+        inverse = 0.5 * (elliprf(x, y, z) - np.array([x * elliprd(y, z, x), y * elliprd(z, x, y), z * elliprd(x, y, z)]) / 3.0)
+        means = 0.25 * (squares + inverse / elliprg(x, y, z))
+        return self.mass * (means.sum() * np.eye(3) - np.diag(means))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import dropspin as ds
+from dropspin.comparisons.engines.mujoco_limitations import limitations_met
 from dropspin.comparisons.engines.registry import engine
 
 
@@ -74,3 +75,23 @@ def test_mujoco_alone_adds_the_slip_at_a_wall_to_the_rebound():
     slip = data.qvel[1] + np.cross(data.qvel[3:], [0.1, 0.0, 0.0])[1]
     assert slip > 0.9
     assert -data.qvel[0] == pytest.approx(2.0 + 0.05 * slip, abs=1e-4)
+
+
+@pytest.mark.parametrize(("lowest", "is_stated"), [(-0.03, True), (1e-3, False)])
+def test_cylinder_that_falls_through_the_floor_is_stated(lowest, is_stated):
+    """MuJoCo 4 misses one of twenty cylinders that are 1e-15 rad from upright, until they are up to their radius too deep."""
+    scene = ds.load(
+        {
+            "duration": 1.0,
+            "body": {"shape": "cylinder", "radius": 0.1, "half_length": 0.2, "mass": 1.0},
+            "start": {"position": [0.0, 0.3, 0.0]},
+            "gravity": {"acceleration": [0.0, -9.8, 0.0]},
+            "floor": {"restitution": 0.5, "friction": "none"},
+        }
+    )
+    speeds = -1.0 - 9.8e-3 * np.arange(5)
+    states = np.tile(scene.initial_state, (5, 1))
+    states[:, 1], states[:, 8] = 0.2 + np.linspace(0.02, lowest, 5), speeds
+    states[4, 8] = 0.5
+    found = [limitation.message for limitation in limitations_met(scene, states, 1e-3)]
+    assert any("lowest point of a cylinder" in message for message in found) == is_stated

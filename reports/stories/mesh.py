@@ -3,12 +3,15 @@
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from dropspin.scenarios.bodies import Mesh
 from dropspin.scenarios.bodies.hull import convex_hull
 from dropspin.scenarios.bodies.mesh import is_closed
 from dropspin.scenarios.bodies.mesh_files import read_mesh
+from dropspin.scenarios.errors import DropspinError
 from dropspin.scenarios.text import counted
+from dropspin.scenarios.validation import first_problem
 
 IN_MILLIMETRES = 5.0  # m, from which on a body is probably not given in metres
 CONVEX = 1e-6  # largest part of the volume of a hull that is outside of a convex body, by the rounding of a file in single precision
@@ -18,12 +21,15 @@ def mesh_rows(file: str) -> list[dict[str, str]]:
     """The size, the mass properties, the hull and the defects of a mesh, as a solid, or as a surface if it is not closed.
 
     Raises:
-        DropspinError: The file is not a mesh.
+        DropspinError: The file is not a mesh, or a mesh that no body has.
     """
     points, faces = read_mesh(Path(file), file)
     closed = is_closed(points, faces)
     inertia = "solid" if closed else "surface"
-    body = Mesh.model_validate({"shape": "mesh", "points": points, "faces": faces, "mass": 1.0, "inertia": inertia})
+    try:
+        body = Mesh.model_validate({"shape": "mesh", "points": points, "faces": faces, "mass": 1.0, "inertia": inertia})
+    except ValidationError as error:
+        raise DropspinError(f"{file}: {first_problem(Mesh, error)}") from None
     extents, hull = np.ptp(points, axis=0), convex_hull(points)
     facts = {
         "mesh": file,

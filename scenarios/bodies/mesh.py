@@ -6,12 +6,12 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
 
-from dropspin.scenarios.bodies.hull import Outline, hull_corners, lowest_face, outline
+from dropspin.scenarios.bodies.hull import FLAT, Outline, hull_corners, lowest_face, outline
 from dropspin.scenarios.bodies.inertia import Moments, second_moments
 from dropspin.scenarios.bodies.mesh_files import Faces
 from dropspin.scenarios.bodies.shape import Shape
 from dropspin.scenarios.state import Array
-from dropspin.scenarios.tables import Vector
+from dropspin.scenarios.tables import LARGEST, Vector
 
 ROUNDING = 1e-15  # of products of inertia, relative to the moments
 MOST_DRAWN = 2000  # faces; the hull of a finer mesh is drawn
@@ -25,8 +25,8 @@ def _rows(kind: type) -> BeforeValidator:
             found: Array = np.array(given, dtype=kind)
         except (TypeError, ValueError, OverflowError):
             found = np.empty(0)
-        if found.ndim != 2 or found.shape[1] != 3 or not len(found) or not np.isfinite(found).all():
-            raise ValueError("must be a list of rows of three finite numbers")
+        if found.ndim != 2 or found.shape[1] != 3 or not len(found) or not (np.abs(found) <= LARGEST).all():
+            raise ValueError(f"must be a list of rows of three numbers of up to {LARGEST:g}")
         found.setflags(write=False)
         return found
 
@@ -131,6 +131,8 @@ class Mesh(Shape):
             normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             contents = np.sum(corners[:, 0] * normals, axis=1) / 6.0 if n == 4 else 0.5 * np.linalg.norm(normals, axis=1)
             total, sums = contents.sum(), corners.sum(axis=1)
+            if not abs(total) > FLAT * np.ptp(self.points) ** (n - 1):
+                raise ValueError(f"the mesh has no {'volume' if n == 4 else 'area'}")
             centre = centre + contents @ sums / (n * total)
         points = np.concatenate([corners.reshape(-1, 3), sums])
         weights = np.concatenate([np.repeat(contents, 3), contents]) / (n * (n + 1))

@@ -58,7 +58,7 @@ def read_mesh(path: Path, given: str) -> tuple[Array, Faces]:
 def _obj(raw: bytes) -> tuple[Array, Faces]:
     points: list[list[float]] = []
     faces: list[tuple[int, int, int]] = []
-    for number, line in enumerate(raw.decode("utf-8", "replace").replace("\\\n", " ").splitlines(), 1):
+    for number, line in enumerate(raw.decode("utf-8-sig", "replace").replace("\\\n", " ").splitlines(), 1):
         word, *values = line.partition("#")[0].split() or [""]
         if word == "v":
             if len(values) < 3:

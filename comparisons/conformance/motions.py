@@ -21,6 +21,7 @@ from dropspin.comparisons.engines.base import Engine, KnownLimitation
 from dropspin.comparisons.faults.fault_model import FaultModel
 from dropspin.comparisons.faults.mistakes import MISTAKES, Mistake
 from dropspin.comparisons.faults.parameters import FAULT_MODELS
+from dropspin.comparisons.faults.shapes import SHAPE_FAULTS
 from dropspin.comparisons.measuring.comparison import Comparison
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.comparisons.running.recording import Breakdown, record, try_record
@@ -32,7 +33,7 @@ from dropspin.scenarios.truths import LAWS, Law
 Array = NDArray[np.float64]
 
 Fault = FaultModel | Mistake
-SINGLY: tuple[Fault, ...] = (*(fault for fault in FAULT_MODELS if fault.about != "start"), *MISTAKES)
+SINGLY: tuple[Fault, ...] = (*(fault for fault in FAULT_MODELS if fault.about != "start"), *SHAPE_FAULTS, *MISTAKES)
 """The start has a check of its own."""
 QUANTITIES = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("angular velocity", "rad/s"))
 """Those of `differences`."""
@@ -115,11 +116,12 @@ def explain_motion(probe: Probe, found: Array, motion_of: Callable[[Probe], Arra
     """
     # The exact solution of a box on its corner takes too long for thousands of pairs.
     counts = (1, 2) if _has_pairs(probe) else (1,)
+    shapes = {*Engine.shapes, probe.scene.body.shape}
     for count in counts:
         motions = _motions_with_faults(probe, count)
         off = dict(zip(motions, np.round(probe.off(found, np.array([*motions.values()])), 3), strict=True))
         candidates = sorted((fault for fault in motions if off[fault] <= 1.0), key=off.__getitem__)
-        others = [other for other in PROBES if other != probe and (count == 1 or _has_pairs(other))]
+        others = [other for other in PROBES if other != probe and other.scene.body.shape in shapes and (count == 1 or _has_pairs(other))]
         best = _best(candidates, others, motion_of)
         if best is not None:
             return best

@@ -25,7 +25,8 @@ from dropspin.comparisons.engines.mapping import (
     refusal_of_neighbour,
 )
 from dropspin.comparisons.engines.programs import can_be_pasted, rendered
-from dropspin.comparisons.engines.pybullet_simulation import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION, PyBulletSimulation
+from dropspin.comparisons.engines.pybullet_limitations import LARGEST_TURN, MOST_BALLS, STRONGEST_FRICTION
+from dropspin.comparisons.engines.pybullet_simulation import PyBulletSimulation
 from dropspin.comparisons.measuring.predictions import bounce_error, flight_error
 from dropspin.scenarios import DropspinError, Scenario, Truth
 from dropspin.scenarios.bodies import SHAPES, Box, OnAxis, Vertices

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from dropspin.comparisons.faults.conventions import CONVENTIONS
 from dropspin.comparisons.faults.fault_model import FaultModel, Simulated, changed_table
 from dropspin.scenarios import Scenario
-from dropspin.scenarios.bodies import Box
+from dropspin.scenarios.bodies import Box, Ellipsoid
+from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.model import Gravity
 from dropspin.scenarios.variations import with_values
 
@@ -43,7 +44,13 @@ def _scaled_inertia(by: Callable[[float], float]) -> Simulated:
 
 
 def _permuted_moments(order: tuple[int, ...]) -> Simulated:
-    return changed_table("body", inertia=lambda given: tuple(given[axis] for axis in order) if isinstance(given, tuple) else given)
+    """The principal moments about other principal axes."""
+
+    def permuted(scene: Scenario) -> Scenario:
+        moments, axes = principal_axes(scene.body.inertia_tensor)
+        return with_values(scene, "body", inertia=(axes * moments[list(order)] @ axes.T).tolist())
+
+    return permuted
 
 
 def _as_a_ball(scene: Scenario) -> Scenario:
@@ -61,7 +68,7 @@ def _friction(change: Callable[[float], float]) -> Simulated:
 
 def _permuted_extents(order: tuple[int, ...]) -> Simulated:
     def permuted(scene: Scenario) -> Scenario:
-        if not isinstance(scene.body, Box):
+        if not isinstance(scene.body, Box | Ellipsoid):
             return scene
         extents = [scene.body.half_extents[axis] for axis in order]
         return with_values(scene, "body", half_extents=extents, inertia=scene.body.moments)
@@ -70,7 +77,7 @@ def _permuted_extents(order: tuple[int, ...]) -> Simulated:
 
 
 def _scaled(size: str, by: float) -> Simulated:
-    """The radius of spheres or the half extents of boxes times a factor, with the same moments of inertia."""
+    """The radius or the half extents of bodies times a factor, with the same moments of inertia."""
 
     def scaled(scene: Scenario) -> Scenario:
         if scene.floor is None or size not in type(scene.body).model_fields:
@@ -131,11 +138,11 @@ PARAMETERS: dict[str, dict[str, Simulated]] = {
         f"friction appears to be halved; {AVERAGES}": _friction(lambda mu: mu / 2),
     },
     "size": {
-        **{f"the box's extents appear to be permuted to ({named})": _permuted_extents(order) for order, named in ORDERS.items()},
-        "the sphere is half as large as it should be: is a radius read as a diameter?": _scaled("radius", 0.5),
-        "the sphere is twice as large as it should be: is a diameter read as a radius?": _scaled("radius", 2.0),
-        "the box is half as large as it should be: are half extents read as extents?": _scaled("half_extents", 0.5),
-        "the box is twice as large as it should be: are extents read as half extents?": _scaled("half_extents", 2.0),
+        **{f"the half extents appear to be permuted to ({named})": _permuted_extents(order) for order, named in ORDERS.items()},
+        "the radius is half as large as it should be: is a radius read as a diameter?": _scaled("radius", 0.5),
+        "the radius is twice as large as it should be: is a diameter read as a radius?": _scaled("radius", 2.0),
+        "the body is half as large as it should be: are half extents read as extents?": _scaled("half_extents", 0.5),
+        "the body is twice as large as it should be: are extents read as half extents?": _scaled("half_extents", 2.0),
     },
 }
 """By what is wrong: the message of each fault, and the scene that is simulated."""

@@ -59,17 +59,21 @@ def test_documented_adapter_passes_and_is_short():
     assert len([line for line in ADAPTER.splitlines() if line.strip()]) <= 40
 
 
+ELLIPSOID = {"striking ellipsoid"}
+STRIKES = {"corner", "striking capsule", "striking cylinder", "striking mesh", *ELLIPSOID}
+
+
 @pytest.mark.parametrize(
     ("name", "noted"),
     [
-        ("wang", {"tumbling", "tumbling askew", "corner"}),
+        ("wang", {"tumbling", "tumbling askew", *STRIKES}),
         pytest.param("wang[law=coulomb,rotation=exact]", set(), marks=pytest.mark.slow),
-        pytest.param("wang[rotation=rk4]", {"corner"}, marks=pytest.mark.slow),
+        pytest.param("wang[rotation=rk4]", STRIKES, marks=pytest.mark.slow),
         ("mujoco", {"slippery floor", "sliding box"}),
         pytest.param("mujoco[integrator=rk4]", set(), marks=pytest.mark.slow),
         pytest.param("mujoco[integrator=implicitfast]", {"slippery floor", "sliding box"}, marks=pytest.mark.slow),
-        ("pybullet", set()),
-        pytest.param("pybullet[coordinates=multibody]", set(), marks=pytest.mark.slow),
+        ("pybullet", ELLIPSOID),
+        pytest.param("pybullet[coordinates=multibody]", ELLIPSOID, marks=pytest.mark.slow),
         ("rapier", set()),
         ("dart", {"slow ball", "symmetries"}),
         ("drake", set()),
@@ -216,11 +220,11 @@ def body(**values):
         (floor(friction="none"), "gripping floor", "friction is omitted"),
         (floor(friction=0.0144), "slippery floor", "friction appears to be squared"),
         (floor(friction=0.5), "slippery floor", "friction is 0.5 for every scene"),
-        (body(radius=lambda r: 2 * r), "bouncing ball", "the sphere is twice as large as it should be: is a diameter read as a radius?"),
+        (body(radius=lambda r: 2 * r), "bouncing ball", "the radius is twice as large as it should be: is a diameter read as a radius?"),
         (
             body(half_extents=lambda a: tuple(x / 2 for x in a)),
             "bouncing box",
-            "the box is half as large as it should be: are half extents read as extents?",
+            "the body is half as large as it should be: are half extents read as extents?",
         ),
         (body(inertia=lambda _: "solid"), "corner", "inertia is that of the solid shape for every scene"),
         (body(mass=lambda _: 1.0, inertia=lambda given: given), "corner", "mass is 1 kg for every scene"),

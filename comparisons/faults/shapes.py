@@ -1,0 +1,104 @@
+"""Faults of shapes: a body that is built as another one, of other lengths, along another axis or about another point.
+
+They show at an impact. The inertia may be the scene's, or that of the shape that is built instead.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from dropspin.comparisons.faults.fault_model import Array, FaultModel, Reported, Simulated, changed_part, changed_start
+from dropspin.scenarios import DropspinError, Scenario
+from dropspin.scenarios.bodies import Body, Capsule, Cylinder, Ellipsoid, Mesh, OnAxis, Shape
+from dropspin.scenarios.rotations import about, conjugate, multiply
+from dropspin.scenarios.state import ORIENTATION
+from dropspin.scenarios.variations import with_values
+
+BODY: TypeAdapter[Any] = TypeAdapter(Body)
+Instead = Callable[[Any], Mapping[str, Any]]
+"""From a body to the keys of the one that is built instead."""
+
+
+def _built_as(kind: type[Shape], instead: Instead, inertia: str = "") -> Simulated:
+    """Scenes with bodies of a kind built otherwise; with their own inertia, or with a distribution of the mass of what is built."""
+
+    def simulated(scene: Scenario) -> Scenario:
+        body = scene.body
+        if not isinstance(body, kind):
+            return scene
+        own = {"mass": body.mass, "inertia": inertia or body.inertia_tensor.tolist(), "center_of_mass": body.centre.tolist()}
+        return scene.model_copy(update={"body": BODY.validate_python(own | dict(instead(body)))})
+
+    return simulated
+
+
+def _lengths(**changed: Callable[[Any], float]) -> Instead:
+    """The same shape with some lengths changed."""
+    return lambda body: (
+        {"shape": body.shape, "radius": body.radius, "half_length": body.half_length}
+        | {name: change(body) for name, change in changed.items()}
+    )
+
+
+WRONG: dict[str, tuple[type[Shape], Instead]] = {
+    "a cylinder appears to be built as a box": (
+        Cylinder,
+        lambda body: {"shape": "box", "half_extents": [body.radius, body.half_length, body.radius]},
+    ),
+    "a capsule appears to be built as a cylinder, without the half balls at its ends": (
+        Capsule,
+        lambda body: {"shape": "cylinder", "radius": body.radius, "half_length": body.half_length},
+    ),
+    "a capsule appears to be too short by its half balls; half_length is without them": (
+        Capsule,
+        _lengths(half_length=lambda body: abs(body.half_length - body.radius)),
+    ),
+    "the body appears to be half as long as it should be: is half_length read as a length?": (
+        OnAxis,
+        _lengths(half_length=lambda body: 0.5 * body.half_length),
+    ),
+    "the body appears to be twice as long as it should be: is a length read as half_length?": (
+        OnAxis,
+        _lengths(half_length=lambda body: 2.0 * body.half_length),
+    ),
+    "an ellipsoid appears to be built as a box": (Ellipsoid, lambda body: {"shape": "box", "half_extents": body.half_extents}),
+    "a mesh appears to be about the origin of its file; a state has the centre of mass": (
+        Mesh,
+        lambda body: {"shape": "mesh", "points": body.points, "faces": body.faces, "center_of_mass": [0.0, 0.0, 0.0]},
+    ),
+}
+"""By the fault, the kind of body, and what is built instead."""
+
+
+def _turned(turn: Array) -> Reported:
+    return changed_part(ORIENTATION, lambda orientation, _: multiply(orientation, turn))
+
+
+def _along(number: int) -> Iterator[FaultModel]:
+    """A body whose axis is x or z, with its own moments along y, or with those of a body along that axis."""
+    turn = about(np.eye(3)[2 - number], np.array(0.5 * np.pi * (number - 1)))  # to a frame in which the axis is y again
+    order = np.arange(3)
+    order[[1, number]] = [number, 1]
+
+    def simulated(scene: Scenario, order: NDArray[np.intp]) -> Scenario:
+        if not isinstance(scene.body, OnAxis):
+            raise DropspinError(f"a {scene.body.shape} has no axis of its own")
+        return changed_start(_turned(turn))(with_values(scene, "body", inertia=np.array(scene.body.moments)[order].tolist()))
+
+    message = f"the axis of a capsule or a cylinder appears to be {'xyz'[number]}; it is y"
+    for moments in (order, np.arange(3)):
+        yield FaultModel(message, partial(simulated, order=moments), _turned(conjugate(turn)))
+
+
+def _otherwise() -> Iterator[FaultModel]:
+    for message, (kind, instead) in WRONG.items():
+        for inertia in ("", "solid"):
+            yield FaultModel(message, _built_as(kind, instead, inertia), about="shape")
+
+
+SHAPE_FAULTS = (*_otherwise(), *_along(2), *_along(0))
+"""All of them; where two give the same motion the earlier is preferred."""

@@ -1,7 +1,7 @@
 """Random scenes, each with an exact solution. An engine can be tuned to a fixed list of scenes, but not to random ones.
 
-The scenes are taken from ten families in turn. U(a, b) is a uniform, LU(a, b) a log-uniform distribution; directions and orientations are
-uniform (from normal variates: G. Marsaglia, Annals of Mathematical Statistics 43 (1972)). Spin is the initial angular velocity.
+The scenes are taken from fifteen families in turn. U(a, b) is a uniform, LU(a, b) a log-uniform distribution; directions and orientations
+are uniform (from normal variates: G. Marsaglia, Annals of Mathematical Statistics 43 (1972)). Spin is the initial angular velocity.
 
     all           mass LU(0.01, 1000) kg; diameters and edge lengths LU(0.1, 1) m; points are normally distributed, with half of such a
                   length as standard deviation
@@ -12,7 +12,7 @@ uniform (from normal variates: G. Marsaglia, Annals of Mathematical Statistics 4
     floors        gravity LU(0.5, 30) m/s² downwards; restitution U(0.1, 0.95); infinite friction or none
     falls         time of the fall T = U(0.12, 0.3) s; initial upward velocity U(-0.5, 0.5) times g T/2; horizontal velocity U(0, 2) m/s;
                   the scene ends after U(0.5, 0.8) of the last flight, of which at most 0.3 s are used
-    tilted        in three of ten falls of balls and corners, gravity is inclined by U(0, 0.5) rad
+    tilted        in three of ten falls of balls, corners, round bodies and meshes, gravity is inclined by U(0, 0.5) rad
 
     free-tensor   a flight of 4 to 8 points of unequal masses, whose axes are not principal axes
     free-axes     a flight of a ball or a box with random moments
@@ -26,6 +26,14 @@ uniform (from normal variates: G. Marsaglia, Annals of Mathematical Statistics 4
                   and the scene ends at 1.1 T
     standing      a box that falls over from an edge; the initial angle from balance is U(0.05, 0.3) rad, and the scene ends after
                   U(0.5, 0.8) of the time until the box lands; the edge sticks or slips; restitution 0
+    strike        a capsule, a cylinder or an ellipsoid of any orientation, one impact; spin U(0, 3) rad/s
+    lying         a capsule or a cylinder that lands on its side, or an ellipsoid that lands on its shortest axis, on a frictionless floor,
+                  one to three impacts; spin U(-10, 10) rad/s about the vertical
+    rolling       a ball, or a capsule or a cylinder on its side, thrown without spin, with a friction coefficient U(0.1, 0.6); it rolls
+                  after T = U(0.2, 0.6) s, and the scene ends at 1.5 T
+    mesh          a solid tetrahedron of any orientation, one impact; spin U(0, 3) rad/s
+    wall          a ball that strikes a vertical wall after U(0.3, 0.7) of its fall, up to 0.5 rad from at right angles, and then the floor,
+                  both without friction
 
 A draw is repeated until its exact solution is known for the whole duration and the default time steps resolve the scene: each flight has
 at least 16 steps of 4 ms; the body rotates by at most 0.1 rad in a step; and when one corner strikes the floor, every other corner is
@@ -37,14 +45,17 @@ Source of the exact solutions: `dropspin.scenarios.truths`.
 import numpy as np
 
 from dropspin.scenarios.bodies.surface import depth_below_centre
+from dropspin.scenarios.draws import Draws
 from dropspin.scenarios.errors import DropspinError, SceneError
-from dropspin.scenarios.families import FAMILIES, Draws
+from dropspin.scenarios.families import FAMILIES
 from dropspin.scenarios.model import Scenario
 from dropspin.scenarios.rotations import rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from dropspin.scenarios.truths import Impact, truth_for
 
-MOST_SCENES = 1000
+MOST_SCENES = 1000  # of a kind
+OF_PLAIN_SHAPES = 10
+"""The families of balls, boxes and points, whose scenes have the numbers up to `MOST_SCENES`; those of the others come after it."""
 LARGEST_SEED = 2**64 - 1
 COARSEST_STEP = 4e-3  # s, of a run by default
 FLIGHT_STEPS, TURN = 16, 0.1  # fewest steps of a flight, and the largest turn in one [rad]
@@ -61,7 +72,7 @@ def draw(count: int, seed: int) -> list[Scenario]:
         seed: Seed, from 0 to 2⁶⁴ - 1. The same seed gives the same scenes with the same versions of dropspin and NumPy.
 
     Returns:
-        The scenes, numbered from 1.
+        The scenes: of each fifteen, ten are numbered from 1, and five, of round bodies, meshes and walls, from 1001.
 
     Raises:
         DropspinError: Count or seed are out of range.
@@ -69,7 +80,15 @@ def draw(count: int, seed: int) -> list[Scenario]:
     for name, given, least, most in (("count", count, 1, MOST_SCENES), ("seed", seed, 0, LARGEST_SEED)):
         if isinstance(given, bool) or not isinstance(given, int) or not least <= given <= most:
             raise DropspinError(f"{name}: got {given!r}; give a whole number from {least} to {most}.")
-    return [drawn_scene(seed, number) for number in range(1, count + 1)]
+    return [drawn_scene(seed, _number(place)) for place in range(count)]
+
+
+def _number(place: int) -> int:
+    """The number of the scene at a place in the sequence, in which all families follow each other."""
+    cycle, family = divmod(place, len(FAMILIES))
+    if family < OF_PLAIN_SHAPES:
+        return 1 + OF_PLAIN_SHAPES * cycle + family
+    return 1 + MOST_SCENES + (len(FAMILIES) - OF_PLAIN_SHAPES) * cycle + family - OF_PLAIN_SHAPES
 
 
 def drawn_scene(seed: int, number: int) -> Scenario:
@@ -79,9 +98,11 @@ def drawn_scene(seed: int, number: int) -> Scenario:
         SceneError: There is no such scene.
     """
     name = f"draw-{seed}-{number:03d}"
-    if not (1 <= number <= MOST_SCENES and seed <= LARGEST_SEED):
-        raise SceneError(f"scene {name!r}: scenes are drawn with seeds up to {LARGEST_SEED} and numbers from 1 to {MOST_SCENES}.")
-    family = list(FAMILIES)[(number - 1) % len(FAMILIES)]
+    if not (1 <= number <= 2 * MOST_SCENES and seed <= LARGEST_SEED):
+        raise SceneError(f"scene {name!r}: scenes are drawn with seeds up to {LARGEST_SEED} and numbers from 1 to {2 * MOST_SCENES}.")
+    families = list(FAMILIES)
+    families = families[:OF_PLAIN_SHAPES] if number <= MOST_SCENES else families[OF_PLAIN_SHAPES:]
+    family = families[(number - 1) % len(families)]
     summary, draw_content = FAMILIES[family]
     draws = Draws(np.random.default_rng([seed, number]))
     for _ in range(MOST_DRAWS):

@@ -1,4 +1,4 @@
-"""Ten families of random scenes with exact solutions. The docstring of `dropspin.scenarios.draw` states the distributions.
+"""Fifteen families of random scenes with exact solutions. The docstring of `dropspin.scenarios.draw` states the distributions.
 
 A family returns the content of a scene with the longest allowed duration, and the number of the impact after which the scene ends: 0 if it
 ends in the flight before the first impact, None if the scene lasts for the whole duration.
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dropspin.scenarios.draws import Draws
 from dropspin.scenarios.rotations import about, multiply, rotate
 from dropspin.scenarios.state import UP, Array
 
@@ -23,43 +24,6 @@ FLIGHT_TIME = 0.3  # s, the longest after each impact
 RESTITUTION = (0.1, 0.95)
 FACES = (np.array([0.0, 0.0, 0.0, 1.0]), about(np.eye(3)[0], np.array(0.5 * math.pi)), about(np.eye(3)[2], np.array(0.5 * math.pi)))
 """Orientations in which one axis of a box is vertical, for each axis."""
-
-
-class Draws:
-    """Random draws for one scene, all from uniform or normal variates of one generator."""
-
-    def __init__(self, generator: np.random.Generator) -> None:
-        self._generator = generator
-
-    def uniform(self, low: float, high: float) -> float:
-        """A number of U(low, high)."""
-        return low + (high - low) * float(self._generator.random())
-
-    def log_uniform(self, low: float, high: float) -> float:
-        """A number of LU(low, high)."""
-        return low * (high / low) ** float(self._generator.random())
-
-    def happens(self, probability: float) -> bool:
-        """Whether an event of this probability occurs."""
-        return float(self._generator.random()) < probability
-
-    def one_of(self, count: int) -> int:
-        """A number below `count`."""
-        return int(count * float(self._generator.random()))
-
-    def direction(self, dimensions: int = 3) -> Array:
-        """A unit vector; of four dimensions, an orientation."""
-        vector = self._generator.normal(size=dimensions)
-        return vector / np.linalg.norm(vector)
-
-    def heading(self) -> Array:
-        """A horizontal unit vector."""
-        x, z = self.direction(2)
-        return np.array([x, 0.0, z])
-
-    def normal(self, rows: int) -> Array:
-        """Standard normal variates, shape (rows, 3)."""
-        return self._generator.normal(size=(rows, 3))
 
 
 def free_tensor(draws: Draws) -> Drawn:
@@ -150,6 +114,57 @@ def standing(draws: Draws) -> Drawn:
     return {"duration": 1.2, "body": body, "start": start, "gravity": gravity, "floor": floor}, 0
 
 
+def strike(draws: Draws) -> Drawn:
+    """A capsule, a cylinder or an ellipsoid of any orientation."""
+    scene = _fall(draws, _round(draws), draws.direction(4), draws.uniform(0.0, 3.0) * draws.direction(), may_tilt=True)
+    return scene | _floor(draws, "infinite" if draws.happens(0.5) else "none"), 1
+
+
+def lying(draws: Draws) -> Drawn:
+    """A capsule or a cylinder that lands on its side, or an ellipsoid that lands on its shortest axis."""
+    body, impacts = _round(draws), 1 + draws.one_of(3)
+    down = 2 if "radius" in body else int(np.argmin(body["half_extents"]))
+    attitude = multiply(about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi))), FACES[down - 1])
+    scene = _fall(draws, body, attitude, draws.uniform(-10.0, 10.0) * UP, impacts)
+    return scene | _floor(draws, "none"), impacts
+
+
+def rolling(draws: Draws) -> Drawn:
+    """A ball, or a capsule or a cylinder on its side, is thrown along a rough floor; it slides until it rolls."""
+    body = _ball(draws) if draws.happens(1.0 / 3.0) else _on_axis(draws)
+    g, friction, rolls = draws.log_uniform(*GRAVITY), draws.uniform(0.1, 0.6), draws.uniform(0.2, 0.6)
+    turned = about(UP, np.array(draws.uniform(0.0, 2.0 * math.pi)))
+    speed = friction * g * rolls * (1.0 + body["mass"] * body["radius"] ** 2 / _made(body).moments[1])
+    start = {
+        "position": [0.0, body["radius"], 0.0],
+        "orientation": multiply(turned, FACES[1]).tolist(),
+        "velocity": (speed * rotate(turned, np.eye(3)[0])).tolist(),
+    }
+    floor = {"restitution": draws.uniform(*RESTITUTION), "friction": friction}
+    return {"duration": 1.5 * rolls, "body": body, "start": start, "gravity": {"acceleration": [0.0, -g, 0.0]}, "floor": floor}, None
+
+
+def mesh(draws: Draws) -> Drawn:
+    """A solid tetrahedron, given as a mesh, that lands on a corner."""
+    points = 0.5 * draws.log_uniform(*LENGTH) * draws.normal(4)
+    faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    body = {"shape": "mesh", "mass": draws.log_uniform(*MASS), "points": points.tolist(), "faces": faces}
+    scene = _fall(draws, body, draws.direction(4), draws.uniform(0.0, 3.0) * draws.direction(), may_tilt=True)
+    return scene | _floor(draws, "infinite" if draws.happens(0.5) else "none"), 1
+
+
+def wall(draws: Draws) -> Drawn:
+    """A ball that strikes a smooth vertical wall, and then a smooth floor."""
+    body = _ball(draws)
+    scene = _fall(draws, body, draws.direction(4), draws.log_uniform(0.5, 12.0) * draws.direction(), 2) | _floor(draws, "none")
+    velocity = np.array(scene["start"]["velocity"]) * (1.0 - UP)
+    heading = rotate(about(UP, np.array(draws.uniform(-0.5, 0.5))), velocity / np.linalg.norm(velocity))
+    struck = draws.uniform(0.3, 0.7) * (scene["duration"] - 2.0 * FLIGHT_TIME)
+    point = velocity * struck + body["radius"] * heading
+    surface = {"point": point.tolist(), "normal": (-heading).tolist(), "restitution": draws.uniform(*RESTITUTION), "friction": "none"}
+    return scene | {"wall": [surface]}, 2
+
+
 FAMILIES: dict[str, tuple[str, Callable[[Draws], Drawn]]] = {
     "free-tensor": ("Points of unequal masses in free flight", free_tensor),
     "free-axes": ("A body with random principal moments in free flight", free_axes),
@@ -161,6 +176,11 @@ FAMILIES: dict[str, tuple[str, Callable[[Draws], Drawn]]] = {
     "edge": ("A box lands on an edge", edge),
     "on-floor": ("A box slides or turns on a rough floor until it stops", on_floor),
     "standing": ("A box falls over from an edge", standing),
+    "strike": ("A round body lands on a point", strike),
+    "lying": ("A round body lands on its side", lying),
+    "rolling": ("A round body slides until it rolls", rolling),
+    "mesh": ("A mesh lands on a corner", mesh),
+    "wall": ("A ball strikes a wall and the floor", wall),
 }
 """The summary of each family, and the function that draws it."""
 
@@ -174,6 +194,18 @@ def _box(draws: Draws) -> Table:
     mass = draws.log_uniform(*MASS)
     inertias = ("solid", "vertices", _moments(draws, mass, half_extents))
     return {"shape": "box", "mass": mass, "half_extents": half_extents, "inertia": inertias[draws.one_of(3)]}
+
+
+def _on_axis(draws: Draws) -> Table:
+    lengths = {name: 0.5 * draws.log_uniform(*LENGTH) for name in ("radius", "half_length")}
+    return {"shape": ("capsule", "cylinder")[draws.one_of(2)], "mass": draws.log_uniform(*MASS), **lengths}
+
+
+def _round(draws: Draws) -> Table:
+    if draws.happens(2.0 / 3.0):
+        return _on_axis(draws)
+    half_extents = [0.5 * draws.log_uniform(*LENGTH) for _ in range(3)]
+    return {"shape": "ellipsoid", "mass": draws.log_uniform(*MASS), "half_extents": half_extents}
 
 
 def _points(draws: Draws) -> Table:
@@ -232,9 +264,12 @@ def _flat(draws: Draws) -> Array:
 
 def _height(body: Table, attitude: Array) -> float:
     """Height at which a body of this orientation touches the floor [m]."""
+    return -float(_made(body).lowest(attitude, 0.0)[0, 1])
+
+
+def _made(body: Table) -> Any:
     from pydantic import TypeAdapter
 
     from dropspin.scenarios.bodies import Body
 
-    made: Any = TypeAdapter(Body).validate_python(body)
-    return -float(made.lowest(attitude, 0.0)[0, 1])
+    return TypeAdapter(Body).validate_python(body)

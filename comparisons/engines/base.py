@@ -139,7 +139,7 @@ class Engine(Configured, ABC):
         """Why a scene is not simulated, by the shape of its body or as `declines` says; None if it is."""
         if scene.floor is not None and scene.body.shape not in self.shapes:
             return f"the adapter maps the shapes {', '.join(self.shapes)} onto a floor, not {scene.body.shape}"
-        if scene.floor is not None and not self.takes_offsets and scene.body.shape != "vertices" and scene.body.centre.any():
+        if scene.floor is not None and not self.takes_offsets and scene.body.shape not in ("vertices", "mesh") and scene.body.centre.any():
             return "the adapter builds bodies with the centre of mass at the centre of their shape"
         if scene.has_edges_or_walls and not self.takes_walls:
             return "the adapter builds no walls" if scene.wall is not None else "the adapter builds a floor that does not end"

@@ -239,7 +239,7 @@ def test_drawn_scenes_are_run_and_reproduced(tmp_path):
         (("--draw", "1001"), "count: got 1001; give a whole number from 1 to 1000."),
         (("--draw", "two"), "Invalid value for '--draw': 'two' is not a valid integer."),
         (("--draw", "1", "--seed", "-1"), "seed: got -1; give a whole number from 0 to 18446744073709551615."),
-        (("draw-3-000",), "scene 'draw-3-000': scenes are drawn with seeds up to 18446744073709551615 and numbers from 1 to 1000."),
+        (("draw-3-000",), "scene 'draw-3-000': scenes are drawn with seeds up to 18446744073709551615 and numbers from 1 to 2000."),
     ],
 )
 def test_impossible_draws_are_refused_in_one_line(options, message, tmp_path):

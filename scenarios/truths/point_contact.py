@@ -23,8 +23,9 @@ across it,
 and with its centre at rest, Ω d sin θ = ω_n R, Euler's disc: for a thin one Ω² = M g R/(A sin θ).
 
 Source: E. J. Routh, Advanced Part of Dynamics of a System of Rigid Bodies (1905), art. 244, and K. T. McDonald, physics/0008227v1 (2000),
-sections 2.2 to 2.5, for the disc without thickness; A. V. Borisov & I. S. Mamaev, Regul. Chaotic Dyn. 7 (2002), 177-200, for the equations
-of any body; E. Hairer, S. P. Nørsett & G. Wanner, Solving Ordinary Differential Equations I (1993), section II.5, for DOP853.
+sections 2.2 to 2.5, for the disc without thickness, whose balance of moments has r with the thickness here; A. V. Borisov & I. S. Mamaev,
+Regul. Chaotic Dyn. 7 (2002), 177-200, section 1, for the equations of any body; E. Hairer, S. P. Nørsett & G. Wanner, Solving Ordinary
+Differential Equations I (1993), section II.5, for DOP853.
 Valid for: an ellipsoid, a ball with any centre of mass, the end of a capsule, or the rim of a cylinder, that touches the floor at the
 start and does not slip there, or on a frictionless floor; also a capsule or cylinder on its side that rolls about its axis; gravity into
 the floor, no damping. It ends where the friction coefficient is exceeded, the floor would have to pull, another part of the body touches
@@ -108,13 +109,14 @@ class _Contact:
         return self.vertex - stretched / np.sqrt(dot(stretched, up))[..., None]
 
     def forces(self, orientation: Array, spin: Array) -> tuple[Array, Array, Array]:
-        """For one state, ω' [rad/s²], the force of the floor over the mass [m/s²] and r [m], in the body frame.
+        """For one state, ω' in the body frame [rad/s²], and in the world the force of the floor over the mass [m/s²] and -ω × r [m/s].
 
         Args:
             orientation: Shape (4,).
             spin: In the body frame [rad/s], shape (3,).
         """
-        to_body = rotate(orientation, np.eye(3))
+        turn = _crossing(orientation[:3])
+        to_body = np.eye(3) - 2.0 * float(orientation[3]) * turn + 2.0 * turn @ turn
         up, turns = to_body[:, 1], _crossing(spin)
         stretched, turning = self.squares * up, -turns @ up
         depth = np.sqrt(stretched @ up)
@@ -127,7 +129,7 @@ class _Contact:
         response = self.inertia + self.mass * levers @ levers.T
         rate = self.axes @ np.linalg.solve(self.axes.T @ response @ self.axes, self.axes.T @ torque)
         force = lever @ rate - drawn
-        return rate, force if self.is_rough else up * (up @ force), arm
+        return rate, (force if self.is_rough else up * (up @ force)) @ to_body, lever @ spin @ to_body
 
     def gap(self, up: Array) -> float:
         """Height of the other vertices above the contact, or of the centre of a rim above it beyond a flat one [m]."""
@@ -162,7 +164,7 @@ def _contact(scene: Scenario, *, is_rough: bool) -> _Contact | None:
         )
         if not keeps:
             return None
-        axes, vertex, squares = axes[:, 1:2], vertex * (1.0 - UP), np.full(3, body.radius**2)
+        axes, squares = axes[:, 1:2], np.full(3, body.radius**2)
     contact = _Contact(is_rough, body.mass, body.inertia_tensor, vertex, squares, others - vertex, axes, g)
     return contact if contact.gap(unrotate(start[ORIENTATION], UP)) > 0.0 else None
 
@@ -179,8 +181,8 @@ def _integrated(scene: Scenario, contact: _Contact, disturbance: Array, coarser:
 
     def rates(t: float, y: Array) -> Array:
         (x, y_, z, w), (a, b, c) = y[:4].tolist(), y[4:7].tolist()
-        rate, _, arm = contact.forces(y[:4], y[4:7])
-        velocity = rotate(y[:4], cross(arm, y[4:7])) if contact.is_rough else start[VELOCITY] + t * scene.acceleration
+        rate, _, rolling = contact.forces(y[:4], y[4:7])
+        velocity = rolling if contact.is_rough else start[VELOCITY] + t * scene.acceleration
         turning = [w * a + y_ * c - z * b, w * b + z * a - x * c, w * c + x * b - y_ * a, -(x * a + y_ * b + z * c)]
         return np.concatenate([0.5 * np.array(turning), rate, velocity[[0, 2]]])
 
@@ -219,7 +221,7 @@ def _solved(scene: Scenario, contact: _Contact, friction: float) -> Truth:
     times = np.append((steps[:-1, None] + between * np.diff(steps)[:, None]).ravel(), steps[-1])
     times = times[times <= others[-1]]
     y = solution(times)
-    force = rotate(y[:, :4], np.array([contact.forces(row[:4], row[4:7])[1] for row in y]))
+    force = np.array([contact.forces(row[:4], row[4:7])[1] for row in y])
     along = np.hypot(force[:, 0], force[:, 2])
     causes = {
         "the floor would have to pull": force[:, 1] <= 0.0,

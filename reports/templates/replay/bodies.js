@@ -3,6 +3,9 @@
   const SPOT = unit([1, 1, 2]);    // of a sphere, in its own frame
   const SPOT_SIZE = 0.2;           // rad on a sphere, and relative to the distance from the middle of a face to its corner
   const DASHES = [5, 4];
+  const SMOOTH = Math.cos(Math.PI / 6); // of the normals of two faces with a smooth edge
+  const THIN = 0.4;                     // px
+  const MARK = 0.2;                     // of the size of the body; radius of the mark on a smooth surface
 
   const mixed = (colour, other, share) => {
     const parts = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
@@ -31,6 +34,10 @@
       // The marked face: that which looks most along the axis z of the body.
       const along = this.normals.map((n) => n[2]);
       this.marked = along.indexOf(Math.max(...along));
+      // Of a smooth surface its neighbours too, so that it is seen.
+      const middles = this.faces.map((face) => mean(face.map((i) => this.vertices[i])));
+      this.isMarked = middles.map((middle, i) => i === this.marked || (dot(this.normals[i], this.normals[this.marked]) > SMOOTH
+        && size(minus(middle, middles[this.marked])) < MARK * bodySize));
     }
 
     corners({ position, orientation }) {
@@ -40,7 +47,8 @@
     // The middle and radius of the spot on the marked face, near its first corner: it shows half-turns about the normal too.
     spot() {
       const points = this.faces[this.marked].map((i) => this.vertices[i]), middle = mean(points), arm = minus(points[0], middle);
-      return { middle: plus(middle, arm, 0.5), radius: SPOT_SIZE * size(arm) };
+      const isSmooth = this.isMarked.filter(Boolean).length > 1;
+      return { middle: plus(middle, arm, 0.5), radius: isSmooth ? 0.4 * MARK * this.size : SPOT_SIZE * size(arm) };
     }
 
     // Draw it. `style` has a colour, the colour of the ink, and whether it is filled and dashed.
@@ -57,21 +65,28 @@
     }
 
     drawFaces(pen, { seen, eye }, pose, style) {
-      const corners = this.corners(pose), edges = new Map();
+      const corners = this.corners(pose), edges = new Map(), width = pen.lineWidth;
+      let isSpotSeen = false;
       this.faces.forEach((face, number) => {
         const n = rotate(pose.orientation, this.normals[number]), facing = dot(n, minus(eye, corners[face[0]]));
         if (facing <= 0 && !this.isFlat) return;
-        const isMarked = number === this.marked && facing > 0;
+        const isMarked = this.isMarked[number] && facing > 0;
+        isSpotSeen ||= isMarked && number === this.marked;
         polygon(pen, face.map((i) => seen(corners[i])));
         pen.fillStyle = isMarked ? mixed(style.colour, 255, 0.72) : shade(style.colour, 0.8 + 0.35 * dot(n, LIGHT) * Math.sign(facing || 1));
         if (style.isFilled) pen.fill();
-        if (isMarked) this.drawSpot(pen, seen, pose, style);
         // An edge of two faces is drawn once: dashes of two lines would fill each other's gaps.
-        face.forEach((i, k) => edges.set([i, face[(k + 1) % face.length]].sort().join(), [i, face[(k + 1) % face.length]]));
+        face.forEach((i, k) => {
+          const ends = [i, face[(k + 1) % face.length]], key = ends.slice().sort().join();
+          edges.set(key, { ends, n, isSmooth: edges.has(key) && dot(edges.get(key).n, n) > SMOOTH });
+        });
       });
-      for (const edge of edges.values()) {
+      if (isSpotSeen) this.drawSpot(pen, seen, pose, style);
+      for (const { ends, isSmooth } of edges.values()) {
+        if (isSmooth && !style.isFilled) continue; // many would hide the body behind them
+        pen.lineWidth = isSmooth ? THIN : width;
         pen.beginPath();
-        path(pen, edge.map((i) => seen(corners[i])));
+        path(pen, ends.map((i) => seen(corners[i])));
         pen.stroke();
       }
     }

@@ -130,6 +130,13 @@ def test_right_student_is_not_corrected():
     }
 
 
+def test_normal_impulses_are_right_without_a_gyroscopic_term():
+    """The angular velocity after the impact is then constant, 0.104 rad/s off at the end."""
+    engine_ = student(impulse=lambda self, K, u, u_normal: self.wanted_normal(u_normal) / K[1, 1] * UP)
+    type(engine_).discretisation = lambda self, scene: None
+    assert found(engine_, "corner") == {}
+
+
 def test_law_of_the_note_is_recognised_where_it_is_not_stated():
     engine_ = student()
     type(engine_).discretisation = lambda self, scene: None

@@ -21,8 +21,11 @@ from dropspin.comparisons.engines.base import Array, Engine, Simulation
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.validation import shown
 
-PATIENCE, PATIENCE_OF_A_STEP = 10.0, 0.01
-"""Wall times for an answer [s]: a program that keeps its answer in a buffer waits for the next request, and dropspin for the answer."""
+PATIENCE, PATIENCE_OF_A_STEP = 10.0, 1.0
+"""Wall times for an answer, and for each of its steps in a slow interpreter [s].
+
+A program that keeps its answer in a buffer waits for the next request, and dropspin for the answer.
+"""
 
 
 class ProgramEngine(Engine):

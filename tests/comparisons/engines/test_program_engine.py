@@ -90,6 +90,15 @@ def test_program_that_does_not_answer_is_ended(monkeypatch):
     assert found.reason == "RuntimeError: the program did not answer 'start' within 1 s; does it flush its output?"
 
 
+def test_slow_program_is_waited_for(monkeypatch):
+    """An interpreted program that takes 30 ms a step, and most of a second for all of them."""
+    monkeypatch.setattr(program_engine, "PATIENCE", 0.2)
+    answer = f"import time; time.sleep(0.03 * int(line.split()[1]) if word == 'advance' else 0); print('{STATE}')"
+    with python(answer).prepare(SPIN, 0.01) as simulation:
+        simulation.advance(20)
+        assert simulation.state()[6] == 1.0
+
+
 def test_lines_of_a_scene_are_those_of_the_page():
     """Each word has its row in the table of the page, in the order in which it is sent; the numbers are those of the scene."""
     wall = [{"point": [2.0, 0.0, 0.0], "normal": [-1.0, 0.0, 0.0], "restitution": 0.5, "friction": "infinite"}]

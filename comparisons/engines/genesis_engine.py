@@ -11,7 +11,7 @@ import genesis
 import numpy as np
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Engine, OneWorld, Simulation
-from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, refusal_of_axes, refusal_of_floor, refusal_of_rest_speed
+from dropspin.comparisons.engines.mapping import FLOOR_HALF_SIZE, refusal_of_damped_axes, refusal_of_floor, refusal_of_rest_speed
 from dropspin.comparisons.engines.mujoco_simulation import from_world, to_world
 from dropspin.comparisons.engines.packages import version
 from dropspin.scenarios import Scenario
@@ -43,7 +43,7 @@ class Genesis(Engine):
 
     def declines(self, scene: Scenario) -> str | None:
         floor = scene.floor
-        unfit = refusal_of_axes(scene, "damps") if scene.damping is not None else None
+        unfit = refusal_of_damped_axes(scene)
         if unfit is not None or floor is None:
             return unfit
         if floor.coefficient < LEAST_FRICTION:

@@ -45,11 +45,11 @@ def refusal_of_hull(scene: Scenario, name: str) -> str | None:
     return f"a {name} would only approximate a {scene.body.shape}" if scene.body.semi_axes.any() else None
 
 
-def refusal_of_axes(scene: Scenario, does: str) -> str | None:
-    """Why the products of inertia of a scene's body are in the way of what an adapter does, such as `damps`; None if there are none."""
-    if is_diagonal(scene.body.inertia_tensor):
+def refusal_of_damped_axes(scene: Scenario) -> str | None:
+    """Why the products of inertia of a scene's body are in the way of its damping; None if there are none, or no damping."""
+    if scene.damping is None or is_diagonal(scene.body.inertia_tensor):
         return None
-    return f"the adapter {does} along the body's own axes only; these are not principal axes"
+    return "the adapter damps along the body's own axes only; these are not principal axes"
 
 
 def refusal_of_unequal_damping(scene: Scenario) -> str | None:

@@ -22,13 +22,20 @@ from dropspin.comparisons.engines.mapping import (
     SEMI_IMPLICIT_EULER,
     friction_of,
     may_tumble,
-    refusal_of_axes,
     refusal_of_floor,
     refusal_of_hull,
     refusal_of_neighbour,
     refusal_of_rest_speed,
 )
-from dropspin.comparisons.engines.mujoco_model import FORM, IMPEDANCE, INTEGRATORS, calibrated_specification, contact, default_specification
+from dropspin.comparisons.engines.mujoco_model import (
+    FORM,
+    IMPEDANCE,
+    INTEGRATORS,
+    calibrated_specification,
+    contact,
+    damped_axes,
+    default_specification,
+)
 from dropspin.comparisons.engines.mujoco_simulation import MuJoCoBatch, MuJoCoSimulation
 from dropspin.comparisons.engines.options import NumericOption
 from dropspin.comparisons.engines.packages import Version, formatted, numbers_of
@@ -181,8 +188,7 @@ class MuJoCo(Engine):
             )
         if min(body.mass, *np.linalg.eigvalsh(body.inertia_tensor)) < mujoco.mjMINVAL:
             return f"MuJoCo refuses a mass or a moment of inertia below {mujoco.mjMINVAL:g}; scale the scene's units"
-        unfit = refusal_of_axes(scene, "damps") if scene.damping is not None else None
-        unfit = unfit or (refusal_of_hull(scene, "mesh") if self.option("body") == "mesh" else None)
+        unfit = refusal_of_hull(scene, "mesh") if self.option("body") == "mesh" else None
         unfit = unfit or refusal_of_floor(scene, self.option("floor")) or refusal_of_neighbour(scene, self.option("beside"))
         if unfit is not None or floor is None:
             return unfit
@@ -241,6 +247,8 @@ class MuJoCo(Engine):
         first = self.prepare(members[0], dt)
         if differ_in_start_alone(members):
             return MuJoCoBatch(first, [first.model] * len(members), members)
+        if any(damped_axes(member) is not None for member in members):
+            return None
         models = [first.model, *(self.prepare(member, dt).model for member in members[1:])]
         # Models of other sizes in the same data give NaN; MuJoCo's signature does not count the sizes of meshes.
         sizes = {(model.signature, model.nbuffer, model.nbvh) for model in models}

@@ -26,6 +26,7 @@ from dropspin.scenarios import Scenario
 from dropspin.scenarios.bodies import Box, Capsule, Ellipsoid, Mesh, OnAxis, Sphere, Vertices
 from dropspin.scenarios.bodies.inertia import is_diagonal
 from dropspin.scenarios.rotations import conjugate, multiply
+from dropspin.scenarios.state import Array
 from dropspin.scenarios.surfaces import Surface
 
 IMPEDANCE = 0.9999  # the largest that MuJoCo allows
@@ -157,7 +158,10 @@ def _free_bodies(scene: Scenario, dt: float, integrator: str, form: Mapping[str,
     for one in bodies_in(scene, form["beside"]):
         body = spec.worldbody.add_body()
         body.add_freejoint()
-        if form["body"] == "child":
+        damped = damped_axes(one)
+        if damped is not None:
+            body = body.add_body(quat=np.roll(conjugate(damped), 1))
+        elif form["body"] == "child":
             body = body.add_body()
         moments, axes = principal_frame(one.body.inertia_tensor)
         if not is_diagonal(one.body.inertia_tensor):
@@ -169,6 +173,16 @@ def _free_bodies(scene: Scenario, dt: float, integrator: str, form: Mapping[str,
         body.inertia, body.iquat = moments, np.roll(axes, 1)
         bodies.append(body)
     return spec, bodies
+
+
+def damped_axes(scene: Scenario) -> Array | None:
+    """The principal axes of a body with damping, a quaternion; None where these are its own axes, or there is no damping.
+
+    MuJoCo damps along the axes of the free body, which then has these, and a child with the mass and the shape at the body's own axes.
+    """
+    if scene.damping is None or is_diagonal(scene.body.inertia_tensor):
+        return None
+    return principal_frame(scene.body.inertia_tensor)[1]
 
 
 def _is_mesh(scene: Scenario, form: Mapping[str, str]) -> bool:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from dropspin.comparisons.engines.base import Engine
+from dropspin.comparisons.engines.mapping import refusal_of_damped_axes
 from dropspin.comparisons.engines.mujoco_engine import REASONS as MUJOCO_REASONS
 from dropspin.comparisons.engines.mujoco_engine import MuJoCo
 from dropspin.comparisons.engines.mujoco_model import FORM, calibrated_specification, contact
@@ -42,7 +43,7 @@ class Port(Engine):
         return self._mujoco.discretisation(scene)
 
     def declines(self, scene: Scenario) -> str | None:
-        return self._mujoco.declines(scene)
+        return refusal_of_damped_axes(scene) or self._mujoco.declines(scene)
 
 
 def ported_model(scene: Scenario, dt: float, integrator: str, precision: type) -> tuple[Any, dict[str, Any]]:

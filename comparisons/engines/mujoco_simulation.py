@@ -10,18 +10,18 @@ import numpy as np
 from mujoco import rollout
 
 from dropspin.comparisons.engines.base import Array, AsBuilt, BatchSimulation, Diverged, KnownLimitation, Simulation
-from dropspin.comparisons.engines.mapping import built
+from dropspin.comparisons.engines.mapping import built, principal_frame
 from dropspin.comparisons.engines.mujoco_limitations import limitations_met
+from dropspin.comparisons.engines.mujoco_model import damped_axes
 from dropspin.reference_impl.threads import usable_cores
 from dropspin.scenarios import Scenario
 from dropspin.scenarios.model import initial_states
-from dropspin.scenarios.rotations import conjugate, rotate
+from dropspin.scenarios.rotations import conjugate, multiply, rotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY
 from dropspin.scenarios.variations import heavy_neighbour
 
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 BAD_STATE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-WXYZ = [6, 3, 4, 5]  # the quaternion's components in a state, in MuJoCo's order
 CHUNK = 8192
 """Number of states that a thread records at once: 0.9 MB, which fits a processor's cache."""
 
@@ -31,10 +31,11 @@ class MuJoCoSimulation(Simulation):
 
     Attributes:
         model: The model.
+        axes: The axes of the free body in the frame of the scene's body, a quaternion; None where they are the same (`damped_axes`).
     """
 
     def __init__(self, scene: Scenario, specification: Any, settings: Mapping[str, Any]) -> None:
-        self._scene, self.model = scene, specification.compile()
+        self._scene, self.model, self.axes = scene, specification.compile(), damped_axes(scene)
         self.velocity_lag = 0.0 if settings["integrator"] == "rk4" else 0.5 * self.model.opt.timestep
         self.settings = {"version": mujoco.__version__, **settings}
         set_damping(self.model, scene)
@@ -50,14 +51,14 @@ class MuJoCoSimulation(Simulation):
         _raise_if_bad([self._data], f"within the first {self._steps} steps")
 
     def state(self) -> Array:
-        return to_world(np.concatenate([self._data.qpos[:7], self._data.qvel[:6]])[None])[0]
+        return to_world(np.concatenate([self._data.qpos[:7], self._data.qvel[:6]])[None], self.axes)[0]
 
     def record(self, steps: int, every: int = 1) -> Array:
         with _quiet():
             rows = self._each_step(steps) if every == 1 and steps else self._some_steps(steps, every)
         _raise_if_bad([self._data], f"in step {self._steps + _last_good_row(rows) * every + 1}")
         self._steps += (len(rows) - 1) * every
-        states = to_world(rows)
+        states = to_world(rows, self.axes)
         self.known_limitations = self.limitations_of(self._scene, states) if every == 1 else []
         return states
 
@@ -107,14 +108,14 @@ class MuJoCoBatch(BatchSimulation):
         self._roll_out(steps, lambda worlds, states: None)
 
     def states(self) -> Array:
-        return to_world(self._now[:, self._columns])
+        return to_world(self._now[:, self._columns], self._first.axes)
 
     def record(self, steps: int, every: int = 1) -> Array:
         rows = np.empty((len(self._now), 1 + steps // every, 13))
         rows[:, 0] = self.states()
 
         def keep(worlds: slice, states: Array) -> None:
-            rows[worlds, 1:] = to_world(states[:, every - 1 :: every, self._columns])
+            rows[worlds, 1:] = to_world(states[:, every - 1 :: every, self._columns], self._first.axes)
 
         self._roll_out(steps, keep)
         return rows
@@ -144,7 +145,7 @@ class MuJoCoBatch(BatchSimulation):
 def _starts(model: Any, scenes: Sequence[Scenario]) -> Array:
     """The positions of the free body and of the body far away if there is one, followed by their velocities, of each scene at the start."""
     bodies = [scenes, [heavy_neighbour(scene) for scene in scenes]] if model.nq > 7 else [scenes]
-    starts = [from_world(initial_states(one)) for one in bodies]
+    starts = [from_world(initial_states(one), damped_axes(scenes[0])) for one in bodies]
     return np.concatenate([start[:, :7] for start in starts] + [start[:, 7:] for start in starts], axis=1)
 
 
@@ -182,22 +183,28 @@ def set_damping(model: Any, scene: Scenario) -> None:
         if scene.damping.factors and model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
             linear, angular = np.expm1(model.opt.timestep * np.array([linear, angular])) / model.opt.timestep
         rates = np.repeat([linear * scene.body.mass, angular], 3)
-        rates[3:] *= np.diag(scene.body.inertia_tensor)
+        rates[3:] *= principal_frame(scene.body.inertia_tensor)[0]
         model.dof_damping[:] = np.outer(model.body_mass[model.body_mass > 0.0] / scene.body.mass, rates).ravel()
 
 
-def from_world(states: Array) -> Array:
-    """MuJoCo's coordinates, [position, quaternion w x y z, velocity, angular velocity in the body frame], of states, shape (..., 13)."""
-    spins = rotate(conjugate(states[..., ORIENTATION]), states[..., SPIN])
-    return np.concatenate([states[..., POSITION], states[..., WXYZ], states[..., VELOCITY], spins], axis=-1)
+def from_world(states: Array, axes: Array | None = None) -> Array:
+    """MuJoCo's coordinates, [position, quaternion w x y z, velocity, angular velocity in the body frame], of states, shape (..., 13).
+
+    With `axes`, the body frame is that of these axes in the frame of the scene's body.
+    """
+    orientation = states[..., ORIENTATION] if axes is None else multiply(states[..., ORIENTATION], axes)
+    spins = rotate(conjugate(orientation), states[..., SPIN])
+    return np.concatenate([states[..., POSITION], orientation[..., [3, 0, 1, 2]], states[..., VELOCITY], spins], axis=-1)
 
 
-def to_world(rows: Array) -> Array:
+def to_world(rows: Array, axes: Array | None = None) -> Array:
     """States from MuJoCo's coordinates, as `from_world` returns them, shape (..., 13)."""
     states = np.empty_like(rows)
     states[..., POSITION], states[..., VELOCITY] = rows[..., 0:3], rows[..., 7:10]
     states[..., 6], states[..., 3:6] = rows[..., 3], rows[..., 4:7]
     states[..., SPIN] = rotate(states[..., ORIENTATION], rows[..., 10:13])
+    if axes is not None:
+        states[..., ORIENTATION] = multiply(states[..., ORIENTATION], conjugate(axes))
     return states
 
 

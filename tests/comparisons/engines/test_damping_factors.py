@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.spatial.transform import Rotation
 
 import dropspin as ds
 from dropspin.comparisons.measuring.batch import motions_side_by_side
@@ -105,3 +106,31 @@ def test_sweep_over_factors_and_time_steps_has_the_closed_form(tmp_path):
     outcomes, [jobs] = run_jobs(sweep, 0, sweep.size), sweep.jobs(0, sweep.size)
     expected = V * jobs.values["damping.linear_factor"] ** outcomes.steps
     np.testing.assert_allclose(outcomes.state[:, 7], expected, rtol=100 * EPS)
+
+
+@pytest.mark.parametrize(
+    ("floor", "tolerance"), [({}, 1e-12), ({"floor": {"restitution": 0.5, "friction": 0.3}}, 1e-5)], ids=["flight", "impacts"]
+)
+def test_mujoco_damps_a_body_of_any_axes_as_by_its_principal_axes(floor, tolerance):
+    """One body, by its principal axes and by others: the same motion; MuJoCo's meshes have vertices in single precision, which is 1e-6."""
+    points = np.array([[0.2, 0.0, 0.1], [-0.1, 0.3, 0.0], [0.0, -0.2, 0.25], [0.1, 0.1, -0.3]])
+    points -= points.mean(axis=0)
+    turn = Rotation.from_rotvec([0.4, -0.9, 0.7])
+    starts = Rotation.from_rotvec([0.3, 0.2, -0.5]), turn.as_matrix()
+    tables = {"duration": 1.0, "gravity": {"acceleration": [0.0, -9.8, 0.0]}, "damping": {"linear": 0.3, "angular": 2.0}} | floor
+    motions = []
+    for orientation, axes in ((starts[0], np.eye(3)), (starts[0] * turn.inv(), starts[1])):
+        body = {"shape": "vertices", "points": (points @ axes.T).tolist(), "mass": 2.0}
+        body["inertia"] = (axes @ np.diag([0.025, 0.02, 0.015]) @ axes.T).tolist()
+        start = {"position": [0.0, 0.8, 0.0], "orientation": orientation.as_quat().tolist(), "angular_velocity": [3.0, -4.0, 5.0]}
+        scene = ds.load(tables | {"body": body, "start": start})
+        with ds.engine("mujoco").prepare(scene, 1e-3) as simulation:
+            motions.append(simulation.record(600))
+            np.testing.assert_allclose(simulation.as_built().inertia, scene.body.inertia_tensor, atol=1e-15)
+        np.testing.assert_array_equal(simulation.state(), motions[-1][-1])
+        batch = ds.engine("mujoco").prepare_batch([scene, scene], 1e-3)
+        np.testing.assert_array_equal(batch.record(600)[1], motions[-1])
+    own, other = motions
+    other[:, 3:7] = (Rotation.from_quat(other[:, 3:7]) * turn).as_quat(canonical=True)
+    own[:, 3:7] = Rotation.from_quat(own[:, 3:7]).as_quat(canonical=True)
+    np.testing.assert_allclose(other, own, atol=tolerance)

@@ -95,7 +95,7 @@ class KernelBody(NamedTuple):
     has_rims: bool
     """Whether this ellipsoid is a disc across y, so that a rim is about each vertex."""
     many_points: Array | None
-    """Their coordinates, shape (3, n), if there are so many that they are compared with a floor in blocks; else None."""
+    """Their coordinates over the reach, in single precision, shape (3, n), if they are compared with a floor in blocks; else None."""
 
 
 class KernelWall(NamedTuple):

@@ -81,11 +81,11 @@ def recording_kernel(methods: Methods, parts: Parts, width: int) -> Callable[...
     many_points_of = _columns_of if parts.many_points else _no_rows
     semi_axes_of, has_rims = read_semi_axes if parts.ellipsoids else read_nothing, parts.rims
 
-    def fill(recorded, states, columns, points, forces, every, first, last):
+    def fill(recorded, states, columns, points, many_points, forces, every, first, last):
         unsolved = 0
         for block in range(first, last):
             own = min(block, columns.shape[0] - 1)
-            body = read_body(load, columns, rows_of(points, block), own, semi_axes_of, has_rims, many_points_of(points, block))
+            body = read_body(load, columns, rows_of(points, block), own, semi_axes_of, has_rims, many_points_of(many_points, block))
             dt = load(columns, own, STEP_SIZE)
             gravity = gravity_of(load, columns, own)
             damping = damping_of(load, columns, own)
@@ -152,7 +152,7 @@ def _record(recorded, block, row, x, q, v, w):
     out[10], out[11], out[12] = w.x, w.y, w.z
 
 
-def blocks(array: Array, width: int) -> Array:
+def blocks(array: NDArray[Any], width: int) -> NDArray[Any]:
     """An array of shape (B, …), arranged for a kernel of the given width; each column of (n, 3) rows of one body is contiguous."""
     return np.ascontiguousarray(np.swapaxes(array, 1, -1)) if width == 1 else lanes.side_by_side(array)
 

@@ -4,6 +4,7 @@ import math
 import operator
 import warnings
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -117,7 +118,7 @@ class Simulator:
         semi_axes = self._parameters.columns[:, SEMI_AXES : SEMI_AXES + 3]
         self._surface = bool(np.ptp(semi_axes, axis=1).any()), bool(((semi_axes[:, 1] == 0.0) & semi_axes.any(axis=1)).any())
         self._can_fall_without_turning = _can_fall_without_turning(body, world)
-        self._packed: dict[int, list[Array]] = {}
+        self._packed: dict[int, list[NDArray[np.floating[Any]] | None]] = {}
         self.unsolved_steps = 0
 
     def run(self, states: ArrayLike, steps: int, every: int = 1, forces: ArrayLike | None = None, threads: int | None = None) -> Array:
@@ -137,11 +138,13 @@ class Simulator:
         modelled = (world.gravity is not None, on_vertices is not None, world.damping is not None, world.floor is not None, turning)
         edges = world.floor is not None and not (world.floor.half_extents is None and world.floor.thickness is None)
         width = lanes.WIDTH if size > 1 and self._methods.runs_in_lanes and not config.DISABLE_JIT else 1
-        many_points = width == 1 and points.shape[1] >= BLOCK and not self._surface[0]
+        many_points = width == 1 and points.shape[1] >= BLOCK and not columns[:, SEMI_AXES : SEMI_AXES + 3].any()
         parts = Parts(*modelled, *self._surface, edges, len(world.walls), many_points)
         recorded = np.empty((size, 1 + steps // every, 13))
         if width not in self._packed:
-            self._packed[width] = [blocks(columns, width), blocks(points, width)]
+            reach = np.sqrt(np.max(np.sum(points**2, axis=2), axis=1))[:, None, None]
+            units = blocks((points / reach).astype(np.float32), width) if many_points else None
+            self._packed[width] = [blocks(columns, width), blocks(points, width), units]
         packed = (blocks(starts, width), *self._packed[width], None if on_vertices is None else blocks(on_vertices, width))
         kernel = recording_kernel(self._methods, parts, width)
         work = steps * width

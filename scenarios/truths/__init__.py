@@ -20,7 +20,6 @@ from dropspin.scenarios.truths.point_contact import point_contact
 from dropspin.scenarios.truths.rocking import rocking
 from dropspin.scenarios.truths.rolling import rolling
 from dropspin.scenarios.truths.slipping import slipping
-from dropspin.scenarios.truths.top import top
 from dropspin.scenarios.truths.truth import Impact, Truth
 
 __all__ = ["LAWS", "Impact", "Law", "Truth", "other_laws", "truth_for"]
@@ -30,7 +29,6 @@ ON_FLOOR: tuple[Solution, ...] = (
     bounce_ladder,
     rocking,
     slipping,
-    top,
     corner_impact,
     coulomb_slide,
     rolling,

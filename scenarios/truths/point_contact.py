@@ -1,7 +1,7 @@
-"""A body that keeps one contact point on the floor: it rolls without slip, or slides without friction.
+"""A body that keeps one contact point on the floor: it rolls or spins without slip, or slides without friction.
 
-In the body frame, n is upwards, S has the semi-axes of the ellipsoid, disc or ball about the lowest vertex c, r is the vector from the
-centre of mass to the contact point, r' its rate of change in the world, and g gravity:
+In the body frame, n is upwards, S has the semi-axes of the ellipsoid, disc or ball about the lowest vertex c, of a corner 0, r is the
+vector from the centre of mass to the contact point, r' its rate of change in the world, and g gravity:
 
     r  = c - S² n/|S n|,   n' = n × ω,   r' = ω × r - (S² n' - S² n (S n · S n')/|S n|²)/|S n|
     I ω' = -ω × I ω + r × F,   F = M (dv/dt - g)
@@ -22,15 +22,15 @@ across it,
 
 and with its centre at rest, Ω d sin θ = ω_n R, Euler's disc: for a thin one Ω² = M g R/(A sin θ).
 
-Source: E. J. Routh, Advanced Part of Dynamics of a System of Rigid Bodies (1905), art. 244, and K. T. McDonald, physics/0008227v1 (2000),
-sections 2.2 to 2.5, for the disc without thickness, whose balance of moments has r with the thickness here; A. V. Borisov & I. S. Mamaev,
-Regul. Chaotic Dyn. 7 (2002), 177-200, section 1, for the equations of any body; E. Hairer, S. P. Nørsett & G. Wanner, Solving Ordinary
-Differential Equations I (1993), section II.5, for DOP853.
-Valid for: an ellipsoid, a ball with any centre of mass, the end of a capsule, or the rim of a cylinder, that touches the floor at the
-start and does not slip there, or on a frictionless floor; also a capsule or cylinder on its side that rolls about its axis; gravity into
-the floor, no damping. It ends where the friction coefficient is exceeded, the floor would have to pull, another part of the body touches
-the floor, or an initial disturbance has grown too much: an unstable motion is known for a while only. Restitution has no effect, because
-no contact separates.
+Source: J. L. Lagrange, Mécanique analytique (1788), for the top; E. J. Routh, Advanced Part of Dynamics of a System of Rigid Bodies
+(1905), art. 244, and K. T. McDonald, physics/0008227v1 (2000), sections 2.2 to 2.5, for the disc without thickness, whose balance of
+moments has r with the thickness here; A. V. Borisov & I. S. Mamaev, Regul. Chaotic Dyn. 7 (2002), 177-200, section 1, for the equations of
+any body; E. Hairer, S. P. Nørsett & G. Wanner, Solving Ordinary Differential Equations I (1993), section II.5, for DOP853.
+Valid for: an ellipsoid, a ball with any centre of mass, the end of a capsule, the rim of a cylinder, or a corner, such as the tip of a
+top, that touches the floor at the start and does not slip there, or on a frictionless floor; also a capsule or cylinder on its side that
+rolls about its axis; gravity into the floor, no damping. It ends where the friction coefficient is exceeded, the floor would have to pull,
+another part of the body touches the floor, or an initial disturbance has grown too much: an unstable motion is known for a while only.
+Restitution has no effect, because no contact separates.
 """
 
 from collections.abc import Callable
@@ -49,6 +49,7 @@ AT_REST = 1e-12
 """Speed of the contact point that counts as rest, relative to that of the body."""
 ACROSS = 1e-12
 """Largest part of a direction across the one that is meant, relative to it, that is attributed to rounding."""
+TINY = 1e-300
 FLATTEST = 1e-3
 """Sine of the angle between the face within a rim and the floor at which the face counts as touching it."""
 RTOL, ATOL = 3e-14, 1e-15
@@ -65,7 +66,7 @@ COARSER = 300.0
 def point_contact(scene: Scenario, floor: Floor) -> Truth | None:
     """The exact solution of a body on one contact point; None if the scene is no such motion."""
     start = scene.initial_state
-    if scene.acceleration[1] >= 0.0 or not scene.starts_on_floor or not scene.body.semi_axes.any():
+    if scene.acceleration[1] >= 0.0 or not scene.starts_on_floor:
         return None
     contact = _contact(scene, is_rough=floor.friction != "none")
     if contact is None:
@@ -106,10 +107,12 @@ class _Contact:
     def arm(self, up: Array) -> Array:
         """The vector r to the contact point [m], shape (..., 3), where `up` is n."""
         stretched = self.squares * up
-        return self.vertex - stretched / np.sqrt(dot(stretched, up))[..., None]
+        return self.vertex - stretched / np.maximum(np.sqrt(dot(stretched, up)), TINY)[..., None]
 
     def forces(self, orientation: Array, spin: Array) -> tuple[Array, Array, Array]:
-        """For one state, ω' in the body frame [rad/s²], and in the world the force of the floor over the mass [m/s²] and -ω × r [m/s].
+        """For one state, ω' in the body frame [rad/s²], and in the world the force over the mass [m/s²] and the way of the contact [m/s].
+
+        The last is the velocity at which the contact point moves along the floor if it does not slip.
 
         Args:
             orientation: Shape (4,).
@@ -119,7 +122,7 @@ class _Contact:
         to_body = np.eye(3) - 2.0 * float(orientation[3]) * turn + 2.0 * turn @ turn
         up, turns = to_body[:, 1], _crossing(spin)
         stretched, turning = self.squares * up, -turns @ up
-        depth = np.sqrt(stretched @ up)
+        depth = float(np.sqrt(stretched @ up)) or 1.0  # of a corner, 0
         arm = self.vertex - stretched / depth
         moved = (self.squares * turning - stretched * (stretched @ turning) / depth**2) / depth
         drawn = to_body @ self.gravity + turns @ (turns @ arm - moved)
@@ -129,12 +132,12 @@ class _Contact:
         response = self.inertia + self.mass * levers @ levers.T
         rate = self.axes @ np.linalg.solve(self.axes.T @ response @ self.axes, self.axes.T @ torque)
         force = lever @ rate - drawn
-        return rate, (force if self.is_rough else up * (up @ force)) @ to_body, lever @ spin @ to_body
+        return rate, (force if self.is_rough else up * (up @ force)) @ to_body, -moved @ to_body
 
     def gap(self, up: Array) -> float:
         """Height of the other vertices above the contact, or of the centre of a rim above it beyond a flat one [m]."""
         lowest = float(np.min(self.others @ up, initial=np.inf))
-        if self.squares[1] > 0.0:
+        if self.squares[1] > 0.0 or not self.squares.any():
             return lowest
         return min(lowest, float(length(np.sqrt(self.squares) * up) - FLATTEST * np.sqrt(self.squares[0])))
 
@@ -172,17 +175,20 @@ def _contact(scene: Scenario, *, is_rough: bool) -> _Contact | None:
 def _integrated(scene: Scenario, contact: _Contact, disturbance: Array, coarser: float) -> tuple[Array, Callable[[Array], Array], bool]:
     """The steps of the integrator [s], the solution of these times, and whether it ends where another part touches the floor.
 
-    A row of the solution is the orientation, the spin in the body frame, and the position of the centre of mass without its height.
+    A row of the solution is the orientation, the spin in the body frame, and the position without the height: of the contact point, or of
+    the centre of mass if there is no friction.
     """
     from scipy.integrate import solve_ivp
 
     start = scene.initial_state
+    arm = rotate(start[ORIENTATION], contact.arm(unrotate(start[ORIENTATION], UP)))
+    at = start[POSITION] + arm if contact.is_rough else start[POSITION]
     spin = unrotate(start[ORIENTATION], start[SPIN]) + contact.axes @ (contact.axes.T @ disturbance)
 
     def rates(t: float, y: Array) -> Array:
         (x, y_, z, w), (a, b, c) = y[:4].tolist(), y[4:7].tolist()
-        rate, _, rolling = contact.forces(y[:4], y[4:7])
-        velocity = rolling if contact.is_rough else start[VELOCITY] + t * scene.acceleration
+        rate, _, way = contact.forces(y[:4], y[4:7])
+        velocity = way if contact.is_rough else start[VELOCITY] + t * scene.acceleration
         turning = [w * a + y_ * c - z * b, w * b + z * a - x * c, w * c + x * b - y_ * a, -(x * a + y_ * b + z * c)]
         return np.concatenate([0.5 * np.array(turning), rate, velocity[[0, 2]]])
 
@@ -193,7 +199,7 @@ def _integrated(scene: Scenario, contact: _Contact, disturbance: Array, coarser:
     solved = solve_ivp(
         rates,
         (0.0, scene.duration * (1.0 + 1e-9)),
-        np.concatenate([start[ORIENTATION], spin, start[POSITION][[0, 2]]]),
+        np.concatenate([start[ORIENTATION], spin, at[[0, 2]]]),
         method="DOP853",
         rtol=coarser * RTOL,
         atol=coarser * ATOL,
@@ -211,11 +217,14 @@ def _solved(scene: Scenario, contact: _Contact, friction: float) -> Truth:
         y = solution(t)
         q = y[:, :4] / length(y[:, :4])[:, None]
         up = unrotate(q, np.broadcast_to(UP, (len(t), 3)))
-        arm, spin = contact.arm(up), y[:, 4:7]
-        moving = rotate(q, cross(arm, spin))
-        if not contact.is_rough:
+        arm, spin = rotate(q, contact.arm(up)), rotate(q, y[:, 4:7])
+        position, moving = -arm, cross(arm, spin)
+        if contact.is_rough:
+            position[:, [0, 2]] += y[:, 7:]
+        else:
+            position[:, [0, 2]] = y[:, 7:]
             moving[:, [0, 2]] = (scene.initial_state[VELOCITY] + t[:, None] * scene.acceleration)[:, [0, 2]]
-        return np.hstack([y[:, 7:8], -dot(arm, up)[:, None], y[:, 8:9], q, moving, rotate(q, spin)])
+        return np.hstack([position, q, moving, spin])
 
     between = np.linspace(0.0, 1.0, SAMPLES_PER_STEP, endpoint=False)
     times = np.append((steps[:-1, None] + between * np.diff(steps)[:, None]).ravel(), steps[-1])

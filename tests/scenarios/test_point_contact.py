@@ -41,7 +41,7 @@ def newton_euler(scene, *, moves_in_the_body=True):
         R = mp.eye(3) + 2 * (s * turn + turn * turn) / length
         spin = mp.matrix(state[10:13])
         W, E, to_vertex, tensor = skew(spin), R * squares * R.T, R * vertex, R * inertia * R.T
-        rate, depth = W * E - E * W, mp.sqrt(E[1, 1])
+        rate, depth = W * E - E * W, mp.sqrt(E[1, 1]) or mp.mpf(1)
         arm = to_vertex - E * up / depth
         moved = W * to_vertex + E * up * rate[1, 1] / (2 * depth**3) - rate * up / depth if moves_in_the_body else W * arm
         system, right = mp.zeros(6 + len(rows)), mp.zeros(6 + len(rows), 1)
@@ -100,6 +100,16 @@ def test_motion_is_that_of_an_integration_with_25_digits(scene):
     assert correction < 1e-16
     np.testing.assert_allclose(truth([0.03]).states[0], expected, rtol=1e-13, atol=1e-13)
     assert np.abs(faulty - expected).max() > 1e-5
+
+
+@pytest.mark.parametrize("friction", ["none", "infinite"])
+def test_a_body_on_a_corner_moves_as_in_an_integration_with_25_digits(friction):
+    """With three different moments about axes that are not those of the box; the corner rests, or slides without friction."""
+    body = {"shape": "box", "half_extents": [0.1, 0.15, 0.2], "mass": 2.0, "inertia": [0.03, 0.025, 0.02, 2e-3, 1e-3, -1e-3]}
+    scene = on_one_point(body, about(np.array([0.48, 0.6, 0.64]), np.array(0.9)), (0.5, 3.0, -1.0), friction)
+    with mp.workdps(30):
+        expected, _ = extrapolated(newton_euler(scene), scene.initial_state, 0.01, 1)
+    np.testing.assert_allclose(truth_for(scene)([0.01]).states[0], expected, rtol=1e-13, atol=1e-13)
 
 
 @pytest.mark.parametrize("friction", ["none", "infinite"])

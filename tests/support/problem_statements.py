@@ -60,10 +60,14 @@ velocity, until the box stops.""",
 acts there: M dv/dt = M g_t + F, dL/dt = r × F, with g_t the horizontal part of g. While s is not 0, F = -f M |g_y| s/|s|. From the
 time at which s is 0, the ball rolls without slip: F is what keeps s at 0. Nothing resists rolling or turning about the vertical.""",
     ),
-    "top": (
-        """The lowest corner, the tip, stays where it is, as in a ball joint: the floor exerts any force on it, and no
-moment. No other corner touches the floor. About the tip, d(L + r × M v)/dt = r × M g with r from the tip to the centre of mass, and
-v = ω × r.""",
+    "rough-contact": (
+        """One point of the body, at r from its centre of mass, touches the floor and does not slip: v = -ω × r. The floor
+exerts a force F on it, and no moment: M dv/dt = M g + F, dL/dt = r × F. A corner that touches the floor stays where it is. No other point
+touches the floor.""",
+    ),
+    "smooth-contact": (
+        """One point of the body, at r from its centre of mass, touches the floor and has no velocity along y: v_y = -(ω × r)_y.
+The floor exerts a vertical force F on it, and no moment: M dv/dt = M g + F, dL/dt = r × F. No other point touches the floor.""",
     ),
 }
 """For the name of each exact solution, the laws of the motion; those that depend on the scene are added by `laws`."""
@@ -81,10 +85,11 @@ KINDS = {
     "principal-spin": "closed form",
     "rimless-wheel": "elliptic functions",
     "rocking": "elliptic functions",
+    "rough-contact": "numerical integration",
     "rolling": "closed form; numerical integration where the axis of rotation turns",
     "slipping": "quadrature",
+    "smooth-contact": "numerical integration",
     "tipping": "elliptic functions",
-    "top": "numerical integration",
 }
 """The kind of each exact solution, by its name."""
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from dropspin.comparisons.calibration import calibrate as calibrate
     from dropspin.comparisons.conformance.checks import conform as conform
     from dropspin.comparisons.conformance.outcomes import CheckResult as CheckResult
+    from dropspin.comparisons.diagnosis.study import Diagnosis as Diagnosis
+    from dropspin.comparisons.diagnosis.study import diagnose as diagnose
     from dropspin.comparisons.engines.base import AsBuilt as AsBuilt
     from dropspin.comparisons.engines.base import BatchSimulation as BatchSimulation
     from dropspin.comparisons.engines.base import Diverged as Diverged

@@ -143,7 +143,7 @@ class Runs:
             given = os.path.relpath(scene, self.root) if os.path.isabs(scene) else os.fspath(scene)
             found = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
             if found.get("session") != self.session:
-                done = self._dropspin("run", given, *options, "-o", os.path.relpath(folder, self.root), "--json")
+                done = self.dropspin("run", given, *options, "-o", os.path.relpath(folder, self.root), "--json")
                 found = {"session": self.session, "rows": json.loads(done.stdout or "[]"), "error": _error(done)}
                 unfinished = kept.with_suffix(".unfinished")
                 unfinished.write_text(json.dumps(found), encoding="utf-8")
@@ -154,7 +154,7 @@ class Runs:
         self._results[name] = Result(found["rows"][0]["scene"], found["rows"], folder, given, names, tuple(dts))
         return self._results[name]
 
-    def _dropspin(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def dropspin(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run the installed command in the root directory; engines are found in pytest's `pythonpath` too."""
         paths = [*map(str, self.config.getini("pythonpath")), *filter(None, [os.environ.get("PYTHONPATH")])]
         environment = os.environ | {"PYTHONIOENCODING": "utf-8", "PYTHONPATH": os.pathsep.join(paths)}
@@ -344,6 +344,26 @@ def dropspin_check(request: pytest.FixtureRequest, dropspin_run: Callable[..., R
         return result
 
     return check
+
+
+@pytest.fixture
+def dropspin_model(pytestconfig: pytest.Config, tmp_path: Path) -> Callable[..., list[Row]]:
+    """Call with a model file and options of dropspin diagnose; fails the test if it has findings, but for allowed questions."""
+
+    def diagnose(file: str | os.PathLike[str], *options: str, allowed: Iterable[str] = ()) -> list[Row]:
+        __tracebackhide__ = True
+        runs, given = pytestconfig.stash[RUNS], [os.fspath(file), *options]
+        done = runs.dropspin("diagnose", *given, "-o", str(tmp_path / "diagnosis"), "--json")
+        if done.returncode not in (0, 1):
+            pytest.fail(_error(done), pytrace=False)
+        rows: list[Row] = json.loads(done.stdout)
+        found = [row for row in rows if row["finding"] and row["question"] not in set(allowed)]
+        if found:
+            lines = [f"{row['body']}, {row['finding']}: {row['question']}, {row['quantity']}: {row['settings']}" for row in found]
+            pytest.fail("\n".join([*lines, f"Reproduce: {shlex.join([NAME, 'diagnose', *given])}"]), pytrace=False)
+        return rows
+
+    return diagnose
 
 
 @pytest.fixture

@@ -27,6 +27,13 @@ def write_study(study: Study, folder: Path) -> Document:
     return document
 
 
+def write_parquet(study: Study, folder: Path) -> None:
+    """Write the rows of a study as Parquet."""
+    import pandas as pd
+
+    pd.DataFrame(study.rows()).to_parquet(folder / f"{study.study}.parquet")
+
+
 def write_history(history: History, folder: Path) -> Document:
     """Write every result of every run as `history.csv` and `history.json`, `history.md` with a plot per scene, and return the page."""
     results = history.results.drop(columns="verdict").assign(run=[history.names[number] for number in history.results["run"]])
@@ -50,12 +57,15 @@ def read_study(folder: str) -> Document:
     Raises:
         DropspinError: The folder has no study, or one from which no page can be made.
     """
+    from dropspin.reports.stories.diagnose import Diagnosed
     from dropspin.reports.stories.limits import Limits
     from dropspin.reports.stories.reproduce import Reproduction
     from dropspin.reports.stories.symmetries import Symmetries
     from dropspin.reports.stories.tradeoff import TradeOffs
 
-    studies: TypeAdapter[Study] = TypeAdapter(Annotated[Limits | Reproduction | Symmetries | TradeOffs, Field(discriminator="study")])
+    studies: TypeAdapter[Study] = TypeAdapter(
+        Annotated[Diagnosed | Limits | Reproduction | Symmetries | TradeOffs, Field(discriminator="study")]
+    )
     try:
         document = studies.validate_json(read_stored(Path(folder), SECTION)).document()
         charts = [chart_data(chart) for part in document.parts if isinstance(part, Charts) for chart in part.charts]

@@ -45,7 +45,7 @@ class MuJoCoSimulation(Simulation):
         self._steps = 0
 
     def advance(self, steps: int) -> None:
-        with _quiet():
+        with quiet():
             mujoco.mj_step(self.model, self._data, steps)
         self._steps += steps
         _raise_if_bad([self._data], f"within the first {self._steps} steps")
@@ -54,7 +54,7 @@ class MuJoCoSimulation(Simulation):
         return to_world(np.concatenate([self._data.qpos[:7], self._data.qvel[:6]])[None], self.axes)[0]
 
     def record(self, steps: int, every: int = 1) -> Array:
-        with _quiet():
+        with quiet():
             rows = self._each_step(steps) if every == 1 and steps else self._some_steps(steps, every)
         _raise_if_bad([self._data], f"in step {self._steps + _last_good_row(rows) * every + 1}")
         self._steps += (len(rows) - 1) * every
@@ -137,7 +137,7 @@ class MuJoCoBatch(BatchSimulation):
             self._now[worlds] = states[:, -1]
             self._datas.append(data)
 
-        with _quiet(), ThreadPoolExecutor(threads) as pool:
+        with quiet(), ThreadPoolExecutor(threads) as pool:
             list(pool.map(run, range(0, size, each)))
         _raise_if_bad(self._datas, f"within {steps} steps of a batch")
 
@@ -209,7 +209,7 @@ def to_world(rows: Array, axes: Array | None = None) -> Array:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Discard MuJoCo's warnings, which it else appends to a file in the working directory; its warning counters are read instead."""
     mujoco.set_mju_user_warning(lambda message: None)
     try:

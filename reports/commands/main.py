@@ -19,6 +19,7 @@ GROUPS = {
         "show": "Show a scene, or the settings of an engine for the scene.",
         "replay": "Show the motions of a run in 3D.",
         "report": "Write the report of a run again.",
+        "diagnose": "Measure what the settings of your own model do.",
         "calibrate": "Print the settings that give a coefficient of restitution at a time step.",
     },
     "Judge": {

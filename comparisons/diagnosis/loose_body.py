@@ -1,0 +1,237 @@
+"""One rigid body of a user's model, as the engine that owns the format has it in force: what is read from it, and how it is simulated.
+
+The body is simulated alone, above the surface that it may land on, which is the plane y = 0: y is up, and quaternions are [x, y, z, w].
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from dropspin.comparisons.diagnosis.source import Setting
+from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
+from dropspin.scenarios.bodies.inertia import principal_axes
+from dropspin.scenarios.bodies.mesh import is_closed
+from dropspin.scenarios.bodies.mesh_files import Faces
+from dropspin.scenarios.bodies.surface import depth_below_centre
+from dropspin.scenarios.rotations import multiply, rotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, Array
+from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, spin_about_axis
+
+AXES = np.eye(3)
+STILL = np.zeros(3)
+ROUNDING = 1e-14  # of products of inertia, relative to the moments
+TURNS = np.arange(150) * math.pi * (3.0 - math.sqrt(5.0))
+HEIGHTS = 1.0 - 2.0 * (np.arange(150) + 0.5) / 150
+AROUND = np.sqrt(1.0 - HEIGHTS**2)
+DIRECTIONS = np.concatenate([np.stack([AROUND * np.cos(TURNS), HEIGHTS, AROUND * np.sin(TURNS)], axis=1), AXES, -AXES])
+"""Directions that are spread evenly, and those of the axes, shape (156, 3)."""
+Changes = Mapping[str, str | float]
+"""Settings to change, by name: those of `LooseBody.remedies`."""
+
+
+class Part(NamedTuple):
+    """A geometry of the body: a solid shape of 1 kg, where its centre is relative to the centre of mass [m], and how it is turned."""
+
+    name: str
+    shape: Shape
+    position: Array
+    turn: Array
+
+
+class Drag(NamedTuple):
+    """The coefficients of a damping force, `linear` in N s/m and `quadratic` in N s²/m², or of a torque, in N m s and N m s²."""
+
+    linear: float = 0.0
+    quadratic: float = 0.0
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What an engine has in force for a body; `in_force` and `lowest` compute with it.
+
+    Attributes:
+        name: The body's name in the file, or its number.
+        engine: The engine and its version.
+        dt: The time step of the file, or the engine's default [s].
+        gravity: Magnitude of the acceleration of gravity [m/s²].
+        mass: [kg].
+        inertia: About the centre of mass, in the body frame [kg m²], shape (3, 3).
+        offset: The centre of mass in the frame that damping and armature act on [m], shape (3,).
+        parts: The geometries, visual ones included.
+        pose: The orientation of the body in the file, shape (4,).
+        resistance: The damping, a function of velocity and spin.
+        falls: The damping of a fall.
+        spins: The damping of a spin about each principal axis.
+        armature: What the settings add to the mass matrix: a mass [kg], and a moment about each axis [kg m²].
+        lifted: The share of the weight that the settings take away.
+        unknown: The setting by which forces act that no exact solution here includes; None if there is none.
+        surface: The name of what it lands on; empty for nothing.
+        friction: The coefficient of friction of both together.
+        restitution: The coefficient of restitution of both together; None if the engine has none.
+        margin: Height above the surface from which the contact acts [m].
+        rolling: Whether friction resists rolling.
+        rest_depth: Depth of a body at rest below the surface by the contact settings [m], negative above; NaN if it has no closed form.
+        written: The inertia that the file has [kg m²], shape (3, 3); None if it has none.
+        settings: Where settings that matter are written, by the engine's names.
+        ignored: What the engine read and does not use, or changes: name, what is written, what is in force.
+        unmodelled: What the file has beside the body that the simulations leave out.
+    """
+
+    name: str
+    engine: str
+    dt: float
+    gravity: float
+    mass: float
+    inertia: Array
+    offset: Array
+    parts: Sequence[Part]
+    pose: Array
+    resistance: Resistance
+    falls: Drag
+    spins: tuple[Drag, Drag, Drag]
+    armature: float
+    lifted: float
+    unknown: Setting | None
+    surface: str
+    friction: float
+    restitution: float | None
+    margin: float
+    rolling: bool
+    rest_depth: float
+    written: Array | None
+    settings: Mapping[str, Setting]
+    ignored: Sequence[tuple[str, Setting, str]]
+    unmodelled: Sequence[str]
+
+    def lowest(self, states: Array) -> Array:
+        """Heights of the body's lowest point at states, shape (n,) [m]."""
+        return lowest(self.parts, states)
+
+    @cached_property
+    def principal(self) -> tuple[Array, Array]:
+        """Principal moments [kg m²], shape (3,), and axes, the columns of shape (3, 3): those of the body where they are principal."""
+        return principal_axes(np.where(np.abs(self.inertia) > ROUNDING * np.trace(self.inertia), self.inertia, 0.0))
+
+    def start(self, *, height: float = 0.0, velocity: Array = STILL, spin: Array = STILL) -> Array:
+        """A state in the file's pose, with the lowest point at a height [m], shape (13,); `spin` is in the body frame."""
+        state = np.concatenate([np.zeros(3), self.pose, velocity, rotate(self.pose, spin)])
+        state[1] = height - (self.lowest(state[np.newaxis])[0] if self.parts else 0.0)
+        return state
+
+    def in_force(self, start: Array, times: Array, gravity: float) -> Array:
+        """The exact motion with the settings in force, shape (n, 13)."""
+        weight = -gravity * (1.0 - self.lifted) * UP
+        free = (self.mass, self.inertia, weight, self.resistance)
+        return free_motion(times, start, *free, armature=self.armature, centre=self.offset)
+
+    def fallen(self, time: float) -> float:
+        """The exact distance fallen from rest with the settings in force [m], after a time [s]."""
+        if not self.offset.any():
+            return float(fall(time, self.gravity * (1.0 - self.lifted), self.mass, self.armature, *self.falls)[0])
+        return float(-self.in_force(self.start(), np.array([0.0, time]), self.gravity)[-1, 1] + self.start()[1])
+
+    def spun(self, axis: int, speed: float, time: float) -> float:
+        """The exact speed of a spin about a principal axis with the settings in force [rad/s], after a time [s]."""
+        moments, axes = self.principal
+        if not self.offset.any():
+            return float(spin_about_axis(time, speed, moments[axis], self.armature, *self.spins[axis]))
+        start = self.start(spin=speed * axes[:, axis])
+        return float(np.linalg.norm(self.in_force(start, np.array([0.0, time]), 0.0)[-1, SPIN]))
+
+    @property
+    def points(self) -> Array:
+        """Points that bound the body, relative to the centre of mass, in the body frame [m], shape (n, 3)."""
+        found = []
+        for part in self.parts:
+            corners = (part.shape.hull[:, np.newaxis] + DIRECTIONS * part.shape.semi_axes).reshape(-1, 3)
+            found.append(part.position + rotate(part.turn, corners))
+        return np.concatenate(found)
+
+    @property
+    def solid(self) -> Array | None:
+        """The inertia about the centre of mass if the mass were spread evenly over the geometries [kg m²], shape (3, 3)."""
+        volumes = [volume(part.shape) for part in self.parts]
+        if not self.parts or not min(volumes) > 0.0:
+            return None
+        centre = np.average([part.position for part in self.parts], axis=0, weights=volumes)
+        found = np.zeros((3, 3))
+        for part, share in zip(self.parts, np.array(volumes) / sum(volumes), strict=True):
+            axes, arm = rotate(part.turn, AXES).T, part.position - centre
+            about = axes @ part.shape.inertia_tensor @ axes.T + arm @ arm * np.eye(3) - np.outer(arm, arm)
+            found += self.mass * share * about
+        return found
+
+
+def lowest(parts: Sequence[Part], states: Array) -> Array:
+    """Heights of the lowest point of geometries at states, shape (n,) [m]."""
+    heights = []
+    for part in parts:
+        turn = multiply(states[:, ORIENTATION], np.broadcast_to(part.turn, (len(states), 4)))
+        centre = rotate(states[:, ORIENTATION], part.position)[:, 1]
+        below = np.min(rotate(turn[:, np.newaxis], part.shape.hull)[..., 1], axis=1)
+        heights.append(centre + below - depth_below_centre(turn, part.shape.semi_axes))
+    found: Array = states[:, POSITION][:, 1] + np.min(heights, axis=0)
+    return found
+
+
+def volume(shape: Shape) -> float:
+    """Volume of a shape [m³]; NaN of a mesh that is not closed."""
+    if isinstance(shape, Sphere):
+        return 4.0 / 3.0 * math.pi * shape.radius**3
+    if isinstance(shape, Cylinder | Capsule):
+        caps = 4.0 / 3.0 * math.pi * shape.radius**3 if isinstance(shape, Capsule) else 0.0
+        return 2.0 * math.pi * shape.radius**2 * shape.half_length + caps
+    if isinstance(shape, Box | Ellipsoid):
+        return (8.0 if isinstance(shape, Box) else 4.0 / 3.0 * math.pi) * math.prod(shape.half_extents)
+    if isinstance(shape, Mesh) and shape.inertia == "solid":
+        return abs(shape.content)
+    return math.nan
+
+
+class LooseBody(ABC):
+    """A body of a user's model that can be simulated alone, in the process of its engine.
+
+    Attributes:
+        facts: What is in force.
+        remedies: By the name of a setting, the changes that take its effect away, and the text to paste.
+    """
+
+    facts: Facts
+    remedies: Mapping[str, tuple[Changes, str]]
+
+    @abstractmethod
+    def changed(self, changes: Changes) -> "LooseBody":
+        """The body with other settings."""
+
+    def elsewhere(self, dt: float, changes: Changes) -> tuple[int, bool]:
+        """The number of other bodies that changes apply to as well, and whether the whole model runs with them."""
+        return 0, True
+
+    @abstractmethod
+    def motions(self, starts: Array, dt: float, steps: int, gravity: Array, *, floor: bool) -> Array:
+        """States after each step, the starts first.
+
+        Args:
+            starts: The states at t = 0, of the centre of mass, shape (size, 13).
+            dt: Time step [s].
+            steps: Number of steps.
+            gravity: Acceleration [m/s²], shape (3,).
+            floor: Whether the surface is there.
+
+        Returns:
+            States, shape (size, 1 + steps, 13).
+
+        Raises:
+            Diverged: The simulation broke down.
+        """
+
+
+def mesh_shape(points: Array, faces: Faces) -> Shape:
+    """A mesh as a solid, or as a surface if it is not closed."""
+    inertia = "solid" if is_closed(points, faces) else "surface"
+    return Mesh.model_validate({"shape": "mesh", "points": points, "faces": faces, "mass": 1.0, "inertia": inertia})

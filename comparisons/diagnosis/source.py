@@ -1,0 +1,131 @@
+"""The text of a model file, MJCF or URDF: its elements with their lines, those of included files too, and where a setting was written."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+from xml.parsers import expat
+
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.files import read_file
+
+LARGEST_FILE = 50_000_000  # bytes
+MOST_ELEMENTS = 100_000
+NO_DEFAULTS = ("freejoint",)
+"""Elements of MJCF that no default class applies to."""
+
+
+class Setting(NamedTuple):
+    """A setting in the words of the model file.
+
+    Attributes:
+        text: The attribute and its value, such as `damping="0.01"`.
+        file: The file that has it; empty if no file does, and the value is the engine's default.
+        line: Its line.
+    """
+
+    text: str
+    file: str = ""
+    line: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.text} ({self.file}, line {self.line})" if self.file else f"{self.text} (the engine's default)"
+
+
+@dataclass(eq=False)
+class Element:
+    """An element of XML and where it is written."""
+
+    tag: str
+    attributes: dict[str, str]
+    file: str
+    line: int
+    parent: "Element | None" = None
+    children: list["Element"] = field(default_factory=list)
+
+    def every(self, *tags: str) -> Iterator["Element"]:
+        """The elements within it that have one of the tags, in the order of the file."""
+        for child in self.children:
+            if child.tag in tags:
+                yield child
+            yield from child.every(*tags)
+
+    def setting(self, attribute: str) -> Setting | None:
+        """An attribute of it, if it is written there."""
+        value = self.attributes.get(attribute)
+        return None if value is None else Setting(f'{attribute}="{value}"', self.file, self.line)
+
+
+def read_source(path: Path) -> Element:
+    """The root element of a model file, with included files in place of their elements.
+
+    Raises:
+        DropspinError: A file is missing, not XML, too large, declares entities, or includes itself.
+    """
+    elements = [0]
+    return _read(path, path.parent, (), elements)
+
+
+def _read(path: Path, home: Path, within: tuple[Path, ...], count: list[int]) -> Element:
+    if path.resolve() in within:
+        raise DropspinError(f"{path}: includes itself, by way of {within[-1].name}; remove the include.")
+    raw = read_file(path, str(path), "model", LARGEST_FILE)
+    parser, stack = expat.ParserCreate(), [Element("", {}, path.name, 0)]
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        count[0] += 1
+        if count[0] > MOST_ELEMENTS:
+            raise DropspinError(f"{path}: has more than {MOST_ELEMENTS:,} elements; give a smaller model.")
+        element = Element(tag, attributes, path.name, parser.CurrentLineNumber, stack[-1])
+        stack[-1].children.append(element)
+        stack.append(element)
+
+    def refuse(*declaration: object) -> None:
+        raise DropspinError(f"{path}: line {parser.CurrentLineNumber} declares a document type or entities, which models do not need.")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, lambda tag: stack.pop()
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(raw, True)
+    except (expat.ExpatError, ValueError) as error:
+        raise DropspinError(f"{path}: not XML: {error}.") from None
+    [root] = stack[0].children
+    root.parent = None
+    for include in list(root.every("include")):
+        parent, given = include.parent, include.attributes.get("file", "")
+        assert parent is not None
+        there = next((place / given for place in (home, path.parent) if (place / given).is_file()), home / given)
+        included = _read(there, home, (*within, path.resolve()), count).children
+        place = parent.children.index(include)
+        parent.children[place : place + 1] = included
+        for child in included:
+            child.parent = parent
+    return root
+
+
+def mjcf_setting(element: Element, attribute: str) -> Setting | None:
+    """Where an attribute of an element of MJCF was set: there, or in a default class that applies to it; None if nowhere."""
+    if attribute in element.attributes or element.tag in NO_DEFAULTS:
+        return element.setting(attribute)
+    name, place = element.attributes.get("class"), element.parent
+    while name is None and place is not None:
+        name, place = place.attributes.get("childclass"), place.parent
+    root = element
+    while root.parent is not None:
+        root = root.parent
+    classes = list(root.every("default"))
+    chosen = [one for one in classes if one.attributes.get("class") == name] if name else []
+    chosen = chosen or [one for one in classes if one.parent is root]
+    default: Element | None = chosen[-1] if chosen else None
+    while default is not None and default.tag == "default":
+        for child in reversed(default.children):
+            if child.tag == element.tag and attribute in child.attributes:
+                return child.setting(attribute)
+        default = default.parent
+    return None
+
+
+def option_setting(root: Element, tag: str, attribute: str, default: str) -> Setting:
+    """A global setting of a model, such as the time step: the last one written, or the engine's default."""
+    written = [element.setting(attribute) for element in root.every(tag) if attribute in element.attributes]
+    return written[-1] or Setting(default) if written else Setting(f'{attribute}="{default}"')

@@ -1,0 +1,267 @@
+"""The study of the command `dropspin diagnose`: every question about every loose body of a user's model, with the remedies tried."""
+
+import math
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.loose_body import LooseBody
+from dropspin.comparisons.diagnosis.questions import NOTEWORTHY, QUESTIONS, Answer, Finding
+from dropspin.comparisons.diagnosis.source import Setting
+from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.running.entries import present_entry
+from dropspin.comparisons.running.inputs import EngineEntry, ignore
+from dropspin.comparisons.running.parallel import results_in_parallel, started_crews
+from dropspin.comparisons.running.processes import EngineProcesses, ResourceLimits
+from dropspin.comparisons.running.recording import Breakdown
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.bodies.mesh_files import read_mesh
+
+RESOURCES = ResourceLimits(processor_time=60.0)
+READERS = {".xml": ("mujoco",), ".mjcf": ("mujoco",), ".urdf": ("mujoco", "pybullet"), ".obj": ("mujoco",), ".stl": ("mujoco",)}
+"""The engines that read a file, by its ending."""
+MESH = """<mujoco><asset><mesh name="mesh" file="{path}"/></asset><worldbody><geom type="plane" size="0 0 1"/>
+<body name="{name}"><freejoint/><geom type="mesh" mesh="mesh" density="{density:g}"/></body></worldbody></mujoco>"""
+HALVINGS = (1.0, 0.5, 0.25)
+SAFE = 0.85
+"""Factor on the time step at which an error of first order would be as large as a finding."""
+Found = TypeVar("Found")
+Question = Callable[[LooseBody, Sequence[float]], list[Answer]]
+
+
+class ModelFile(Protocol):
+    """A model file as an engine reads it."""
+
+    def bodies(self, wanted: Sequence[str], loose: bool) -> list[str]:
+        """The names of the bodies to diagnose."""
+
+    def body(self, name: str, on: str | None) -> LooseBody:
+        """One of them, above what it lands on."""
+
+
+@dataclass(frozen=True)
+class BodyDiagnosis:
+    """What was found of one body with one engine.
+
+    Attributes:
+        name: The body's name.
+        engine: The engine and its version.
+        dt: The time step of the file, or the engine's default [s].
+        mass: [kg].
+        shapes: Its shapes.
+        surface: What it lands on; empty for nothing.
+        friction: The coefficient of friction of both together.
+        answers: The answers to all questions, findings included.
+        settings: Where the settings are written, by name.
+        unmodelled: What the file has beside the body and the diagnosis leaves out.
+        breakdown: Why there are no answers; empty if there are.
+    """
+
+    name: str
+    engine: str
+    dt: float = math.nan
+    mass: float = math.nan
+    shapes: tuple[str, ...] = ()
+    surface: str = ""
+    friction: float = math.nan
+    answers: tuple[Answer, ...] = ()
+    settings: dict[str, Setting] | None = None
+    unmodelled: tuple[str, ...] = ()
+    breakdown: str = ""
+
+    @property
+    def findings(self) -> list[Answer]:
+        """The answers that are findings."""
+        return [answer for answer in self.answers if answer.finding]
+
+
+@dataclass(frozen=True)
+class Targets:
+    """What the user wants of a body: a coefficient of restitution and of friction; None for no target."""
+
+    restitution: float | None = None
+    friction: float | None = None
+
+    def judge(self, answer: Answer) -> Answer:
+        """An answer that misses its target as a finding."""
+        wanted = {"impact": self.restitution, "friction": self.friction}.get(answer.question)
+        if wanted is None or answer.unit != "1" or abs(answer.measured - wanted) <= NOTEWORTHY:
+            return answer
+        return replace(answer, finding="target", detail=f"the target is {wanted:g}")
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found of a model.
+
+    Attributes:
+        file: The file as the user gave it.
+        bodies: Each body with each engine.
+    """
+
+    file: str
+    bodies: tuple[BodyDiagnosis, ...]
+
+    @property
+    def failed(self) -> bool:
+        """Whether something is impossible, or a target is missed."""
+        return any(answer.finding in ("impossible", "target") for body in self.bodies for answer in body.answers)
+
+
+def diagnose(
+    file: str | Path,
+    engines: str | Sequence[str] = (),
+    bodies: str | Sequence[str] = (),
+    *,
+    on: str | None = None,
+    loose: bool = False,
+    density: float = 1000.0,
+    targets: Targets = Targets(),
+    resources: ResourceLimits = RESOURCES,
+    jobs: int | None = None,
+    on_progress: Callable[[str, float], None] = ignore,
+) -> Diagnosis:
+    """Measure what the settings of a model do to its bodies, against exact solutions.
+
+    Args:
+        file: An MJCF or URDF file, or a mesh (OBJ, STL).
+        engines: `mujoco`, `pybullet`; by default those that read the file.
+        bodies: The names of bodies; by default all that are free.
+        on: The name of the geometry that they land on; by default the first plane or box that they collide with.
+        loose: Whether to cut links loose that move on joints.
+        density: Density of a mesh [kg/m³].
+        targets: The restitution and the friction that are wanted.
+        resources: The processor time [s] and memory [bytes] that one body may use.
+        jobs: Number of bodies to diagnose at a time; by default, the number of processors.
+        on_progress: Called with what is being done and the share of the bodies that are done.
+
+    Returns:
+        The answers for each body and engine.
+
+    Raises:
+        DropspinError: The file is not a model, no engine reads it, or it has no such body.
+    """
+    given, path, wanted = str(file), Path(file), [bodies] if isinstance(bodies, str) else list(bodies)
+    ending = path.suffix.lower()
+    if ending not in READERS:
+        raise DropspinError(f"{given}: a model is a file {', '.join(READERS)}.")
+    chosen = [engines] if isinstance(engines, str) else list(engines) or list(READERS[ending])
+    for engine in chosen:
+        if engine not in READERS[ending]:
+            raise DropspinError(f"{engine} does not read {ending} files; use {' or '.join(READERS[ending])}.")
+    with tempfile.TemporaryDirectory() as folder:
+        if ending in (".obj", ".stl"):
+            path = _around_mesh(path, given, density, Path(folder))
+        entries = [present_entry(engine) for engine in chosen]
+        with started_crews(1, 1, entries, resources) as crews:
+            pieces = [(entry, name) for entry in entries for name in _checked(crews[0].call(entry, _bodies, path, given, wanted, loose))]
+        with started_crews(jobs, len(pieces), entries, resources) as crews:
+
+            def of_body(piece: tuple[EngineEntry, str], processes: EngineProcesses, report: Callable[[str], None]) -> BodyDiagnosis:
+                entry, name = piece
+                report(f"{name} with {entry.label}")
+                found = processes.call(entry, _diagnosed, path, given, name, on, targets)
+                return BodyDiagnosis(name, entry.label, breakdown=found.reason) if isinstance(found, Breakdown) else _checked(found)
+
+            return Diagnosis(given, tuple(results_in_parallel(pieces, of_body, crews, on_progress)))
+
+
+def _checked(found: Found | DropspinError | Breakdown) -> Found:
+    """What was found in an engine's process, unless the file is at fault."""
+    if isinstance(found, Breakdown):
+        raise DropspinError(f"the file cannot be read: {found.reason}.")
+    if isinstance(found, DropspinError):
+        raise found
+    return found
+
+
+def _around_mesh(path: Path, given: str, density: float, folder: Path) -> Path:
+    """A model with a body whose only geometry is a mesh, above a plane."""
+    read_mesh(path, given)
+    model = folder / "mesh.xml"
+    model.write_text(MESH.format(path=path.resolve(), name=path.stem, density=density), encoding="utf-8")
+    return model
+
+
+def _model(entry: EngineEntry, path: Path, given: str) -> ModelFile:
+    """A model as the engine of this process reads it."""
+    if entry.adapter.name == "mujoco":
+        from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
+
+        return MuJoCoModel(path, given)
+    from dropspin.comparisons.diagnosis.pybullet_body import PyBulletModel
+
+    return PyBulletModel(path, given)
+
+
+def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], loose: bool) -> list[str] | DropspinError:
+    """The names of the bodies to diagnose; runs in the engine's process."""
+    try:
+        return _model(entry, path, given).bodies(wanted, loose)
+    except DropspinError as error:  # of a type that may need more than a text
+        return DropspinError(str(error))
+
+
+def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | None, targets: Targets) -> BodyDiagnosis | DropspinError:
+    """The diagnosis of a body; runs in the engine's process."""
+    try:
+        body = _model(entry, path, given).body(name, on)
+    except DropspinError as error:
+        return DropspinError(str(error))
+    facts = body.facts
+    answers = inertia(facts) + [answer for question in QUESTIONS for answer in _answers(body, question)]
+    answers += [Answer("file", key, "", finding="changed", settings=(key,), detail=made) for key, _, made in facts.ignored]
+    return BodyDiagnosis(
+        name=name,
+        engine=facts.engine,
+        dt=facts.dt,
+        mass=facts.mass,
+        shapes=tuple(part.shape.shape for part in facts.parts),
+        surface=facts.surface,
+        friction=facts.friction,
+        answers=tuple(map(targets.judge, answers)),
+        settings={**facts.settings, **{key: setting for key, setting, _ in facts.ignored}},
+        unmodelled=tuple(facts.unmodelled),
+    )
+
+
+def _answers(body: LooseBody, question: Question) -> Iterator[Answer]:
+    """The answers to a question, each finding with the first remedy that removes it; of a breakdown, the reason."""
+    dt = body.facts.dt
+    try:
+        answers = question(body, [dt * factor for factor in HALVINGS])
+    except Diverged as error:
+        yield Answer(question.__name__, "breakdown", "", finding="time step", settings=("timestep",), detail=str(error))
+        return
+    for number, answer in enumerate(answers):
+        yield _remedied(body, question, number, answer) if answer.finding else answer
+
+
+def _remedied(body: LooseBody, question: Question, number: int, answer: Answer) -> Answer:
+    """A finding with the text that removes it, and the value measured with that; unchanged if no remedy does."""
+    dt = body.facts.dt
+    for setting in answer.settings:
+        changes, text, step = *body.remedies.get(setting, ({}, "")), dt
+        if setting == "timestep":
+            excess = abs(answer.measured - answer.in_force) / (100.0 if answer.unit == "%" else abs(answer.in_force)) / NOTEWORTHY
+            step = _rounded(dt * (SAFE / excess if excess > 1.0 else 0.25))
+            text = f'<option timestep="{step:g}"/>'
+        if text:
+            try:
+                again = question(body.changed(changes), [step])
+            except Diverged:
+                continue
+            if number < len(again) and not again[number].finding:
+                kind: Finding = "setting" if answer.finding == "model" and setting != "timestep" else answer.finding
+                others, runs = body.elsewhere(step, changes)
+                remedied = again[number].measured
+                return replace(answer, finding=kind, settings=(setting,), remedy=text, remedied=remedied, others=others, runs=runs)
+    return answer
+
+
+def _rounded(step: float) -> float:
+    """A time step [s] with two digits."""
+    return float(f"{step:.2g}")

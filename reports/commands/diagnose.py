@@ -1,0 +1,48 @@
+"""`dropspin diagnose`."""
+
+import os
+from typing import Any
+
+import click
+
+from dropspin.reports.commands.options import POSITIVE, as_json, engines_option, jobs_option, output_option, time_limit_option
+
+
+@click.command("diagnose")
+@click.argument("file", metavar="FILE")
+@engines_option
+@click.option("--body", "bodies", multiple=True, metavar="NAME", help="A body to diagnose; repeat for more. [default: all that are free]")
+@click.option("--on", metavar="GEOM", help="The plane or box that it lands on. [default: the first that it collides with]")
+@click.option("--loose", is_flag=True, help="Cut links loose that move on joints.")
+@click.option("--density", default=1000.0, type=POSITIVE, metavar="KG/M3", help="Density of a mesh.")
+@click.option("--restitution", type=click.FloatRange(0.0, 1.0), metavar="E", help="The coefficient of restitution that is wanted.")
+@click.option("--friction", type=POSITIVE, metavar="MU", help="The coefficient of friction that is wanted.")
+@time_limit_option(60.0, "an engine may use for one body")
+@jobs_option("bodies to diagnose")
+@output_option("out/diagnosis", "for the tables and the report")
+@as_json
+def diagnose_command(file: str, output: str, restitution: float | None, friction: float | None, json_output: bool, **options: Any) -> int:
+    """Measure what the settings of your model do: an MJCF or URDF file, or a mesh (.obj, .stl).
+
+    Each free body is simulated alone, with the file's own settings, above the surface that it lands on: how it falls, spins, lands,
+    rests, slides and rolls, beside the exact values with these settings and without them. Each remedy that is printed was tried.
+
+    Exit code: 0 nothing is impossible, 1 something is, or a target is missed, 2 bad input.
+    """
+    from dropspin.comparisons.diagnosis.study import Targets, diagnose
+    from dropspin.comparisons.results.folder import study_folder
+    from dropspin.reports.html.study import study_page
+    from dropspin.reports.stories.diagnose import Diagnosed
+    from dropspin.reports.study_files import write_parquet, write_study
+    from dropspin.reports.terminal.progress import share_bar
+    from dropspin.reports.terminal.rows import print_json_or
+
+    with study_folder(output) as folder:
+        with share_bar(os.path.basename(file)) as on_progress:
+            found = diagnose(file, targets=Targets(restitution, friction), **options, on_progress=on_progress)
+        study = Diagnosed(diagnosis=found)
+        document = write_study(study, folder)
+        write_parquet(study, folder)
+        (folder / "report.html").write_text(study_page(document), encoding="utf-8")
+    print_json_or(json_output, study.rows(), document, os.path.join(output, "report.html"))
+    return int(found.failed)

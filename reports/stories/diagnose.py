@@ -1,0 +1,220 @@
+"""The output of `dropspin diagnose`: for one body, its answers beside the exact values; for several, a table of all; then the findings."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import groupby
+from typing import Any, Literal
+
+import numpy as np
+
+from dropspin.comparisons.diagnosis.questions import Answer
+from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
+from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
+from dropspin.reports.plots.chart import Chart, Line
+from dropspin.reports.stories.numbers import formatted, in_ms, with_unit
+from dropspin.reports.stories.study import Study
+from dropspin.scenarios.text import counted
+
+KINDS = {
+    "impossible": "impossible",
+    "changed": "changed by the engine",
+    "time step": "time step",
+    "setting": "setting",
+    "model": "engine",
+    "target": "target missed",
+}
+"""The words for the kinds of findings."""
+SEVERAL = re.compile(" about | at ")
+"""What stands before the axis or the speed in a quantity."""
+SETTINGS = {"unknown": "a fluid or dry friction"}
+
+
+class Diagnosed(Study):
+    """What `dropspin diagnose` found."""
+
+    study: Literal["diagnosis"] = "diagnosis"
+    diagnosis: Diagnosis
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every answer, with where its settings are written."""
+        found = []
+        for body in self.diagnosis.bodies:
+            for answer in body.answers:
+                values = asdict(answer) | {"settings": "; ".join(_settings(body, answer))}
+                found.append({"file": self.diagnosis.file, "body": body.name, "engine": body.engine, "dt": body.dt, **values})
+        return found
+
+    def document(self) -> Document:
+        """The answers of one body or a table of several, the findings, and the difference between two engines."""
+        bodies, parts = self.diagnosis.bodies, list[Part]()
+        by_name = {name: list(group) for name, group in groupby(sorted(bodies, key=lambda body: body.name), lambda body: body.name)}
+        is_short = len(bodies) > 2
+        if is_short:
+            parts.append(Table([_overview(body) for body in bodies], ["mass", "lands on"]))
+        for group in by_name.values():
+            for body in group:
+                parts += _body_parts(body, is_short)
+            if len(group) > 1:
+                parts += [Heading(f"{group[0].name}: the engines differ"), Table(differences(group))]
+        return Document(f"Diagnosis of {self.diagnosis.file}", parts, [Paragraph(summary(self.diagnosis))])
+
+
+def _body_parts(body: BodyDiagnosis, is_short: bool) -> list[Part]:
+    """What a page says of a body; a terminal that shows a table of all bodies shows the findings alone."""
+    lands = f"; lands on {body.surface}, friction {body.friction:g}" if body.surface else "; lands on nothing"
+    head = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg; {body.engine}, time step {in_ms(body.dt)}{lands}."
+    if body.breakdown:
+        return [Paragraph(f"{body.name}: {body.breakdown}.", style="bold")]
+    on_terminal = not is_short
+    parts: list[Part] = [Heading(body.name), Paragraph(head, on_terminal=on_terminal), Table(answer_rows(body), on_terminal=on_terminal)]
+    parts.append(Sentences([f"{body.name}: {sentence}" if is_short else sentence for sentence in sentences(body)], numbered=True))
+    left = [f"Not modelled: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
+    return [*parts, Sentences(left, on_terminal=on_terminal), Charts(f"{body.name} {body.engine.split()[0]}", charts(body))]
+
+
+def _overview(body: BodyDiagnosis) -> dict[str, str]:
+    kinds = [KINDS[answer.finding] for answer in body.findings]
+    found = ", ".join(f"{kind} ({kinds.count(kind)})" if kinds.count(kind) > 1 else kind for kind in dict.fromkeys(kinds))
+    return {
+        "body": body.name,
+        "engine": body.engine.split()[0],
+        "mass": f"{body.mass:.3g} kg",
+        "lands on": body.surface or "–",
+        "findings": body.breakdown or found or "none",
+    }
+
+
+def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
+    """The answers with a value; those about several axes or speeds in one row if they are equal, and the moments of inertia in one row."""
+    rows = []
+    moments = [answer for answer in body.answers if answer.question == "inertia" and answer.unit == "kg m²"]
+    ratios = [formatted(answer.measured / answer.physical) for answer in moments]
+    if moments:
+        rows.append(_row(body, "inertia", "moments / solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
+    shown = [answer for answer in body.answers if answer not in moments and answer.question != "file"]
+    shown = [answer for answer in shown if answer.question != "inertia" or answer.finding]
+    for _, group in groupby(shown, lambda answer: (answer.question, _cells(answer), SEVERAL.split(answer.quantity)[0])):
+        first, *others = group
+        quantity = ", ".join([first.quantity, *(SEVERAL.split(other.quantity)[-1] for other in others)])
+        rows.append(_row(body, first.question, quantity, *_cells(first), KINDS.get(first.finding, "")))
+    return rows
+
+
+def _row(body: BodyDiagnosis, question: str, quantity: str, measured: str, in_force: str, physical: str, cause: str) -> dict[str, str]:
+    cells = {f"at {in_ms(body.dt)}": measured, "with settings": in_force, "without": physical, "finding": cause}
+    return {"what": f"{question}: {quantity}", **cells}
+
+
+def _cells(answer: Answer) -> tuple[str, str, str]:
+    """The measured value, with the range over start phases, and both exact ones."""
+    measured = answer.detail if answer.detail and not math.isfinite(answer.measured) else _value(answer.measured, answer.unit)
+    if answer.most - answer.least > 0.0:
+        measured += f" ({formatted(answer.least)} to {formatted(answer.most)})"
+    return measured, _value(answer.in_force, answer.unit), _value(answer.physical, answer.unit)
+
+
+def _value(value: float, unit: str) -> str:
+    """A value with its unit, small lengths and times in mm and ms; nothing for one that is not known."""
+    if math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "never" if unit == "s" else "none"
+    if unit in ("m", "s", "m/s") and 0.0 < abs(value) < 0.1:
+        value, unit = 1e3 * value, f"m{unit}"
+    if unit == "%":
+        return "0 %" if abs(value) < 1e-3 else f"{value:+.3g} %"
+    return with_unit(f"{value:.4g}" if abs(value) >= 1e-3 else formatted(value), unit)
+
+
+def sentences(body: BodyDiagnosis) -> list[str]:
+    """A sentence for each finding: what is wrong, the settings in the words of the file with their lines, and the remedy that was tried."""
+    found = []
+    for _, group in groupby(body.findings, lambda answer: (answer.question, answer.finding, answer.settings, answer.remedy)):
+        same = list(group)
+        first = same[0]
+        what = "; ".join(
+            f"{', '.join([quantities[0], *(SEVERAL.split(quantity)[-1] for quantity in quantities[1:])])} {told}"
+            for told, quantities in grouped_quantities(same).items()
+        )
+        where = ", ".join(_settings(body, first))
+        remedy = f" Remedy, tried: {first.remedy}" if first.remedy else ""
+        if first.remedy and math.isfinite(first.remedied):
+            remedy += f" gives {', '.join(dict.fromkeys(_value(answer.remedied, _unit_after(answer)) for answer in same))}"
+        found.append(
+            f"{first.question.capitalize()}, {KINDS[first.finding]}: {what}"
+            + (f": {where}." if where else ".")
+            + (f"{remedy}." if remedy else "")
+        )
+    return found
+
+
+def grouped_quantities(answers: Sequence[Answer]) -> dict[str, list[str]]:
+    """The quantities of answers by what is said of them."""
+    found: dict[str, list[str]] = {}
+    for answer in answers:
+        found.setdefault(_told(answer), []).append(answer.quantity)
+    return found
+
+
+def _unit_after(answer: Answer) -> str:
+    """The unit of a value that was measured with a remedy: a spin that does not decay has no time to 1/e, but a share that is kept."""
+    return "1" if answer.unit == "s" and answer.question == "spin" else answer.unit
+
+
+def _told(answer: Answer) -> str:
+    measured, in_force, physical = _cells(answer)
+    if answer.finding == "impossible":
+        return f"is {measured}, at most 1 is possible"
+    if answer.finding in ("changed", "target"):
+        return f"{measured} ({answer.detail})" if measured and measured != answer.detail else answer.detail
+    wanted = in_force if answer.finding in ("time step", "model") and in_force else physical
+    limit = f", {_value(answer.limit, answer.unit)} as dt → 0" if answer.finding == "time step" and math.isfinite(answer.limit) else ""
+    return f"is {measured}" + (f" instead of {wanted}" if wanted else "") + limit
+
+
+def _settings(body: BodyDiagnosis, answer: Answer) -> list[str]:
+    known = body.settings or {}
+    return [str(known[name]) if name in known else SETTINGS.get(name, name) for name in answer.settings]
+
+
+def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
+    """The answers in which engines differ, a column for each."""
+    by_quantity: dict[str, dict[str, str]] = {}
+    for body in bodies:
+        for answer in body.answers:
+            row = by_quantity.setdefault(f"{answer.question}: {answer.quantity}", {})
+            row[f"{body.engine.split()[0]}, {in_ms(body.dt)}"] = _cells(answer)[0] or _value(answer.in_force, answer.unit)
+    engines = [f"{body.engine.split()[0]}, {in_ms(body.dt)}" for body in bodies]
+    rows = [{"what": what, **{engine: row.get(engine, "–") for engine in engines}} for what, row in by_quantity.items()]
+    return [row for row in rows if len({row[engine] for engine in engines}) > 1]
+
+
+def summary(diagnosis: Diagnosis) -> str:
+    """The number of findings and of bodies that have any."""
+    findings = [answer for body in diagnosis.bodies for answer in body.findings]
+    kinds = [KINDS[answer.finding] for answer in findings]
+    text = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
+    broken = sum(bool(body.breakdown) for body in diagnosis.bodies)
+    return f"{counted(len(findings), 'finding')}{f' ({text})' if text else ''}{f'; {broken} without a result' if broken else ''}."
+
+
+def charts(body: BodyDiagnosis) -> list[Chart]:
+    """The rebound over the impact speed, with its range over start phases."""
+    impacts = [answer for answer in body.answers if answer.question == "impact" and answer.quantity.startswith("rebound")]
+    if not impacts:
+        return []
+    speeds = np.array([float(answer.quantity.split()[-2]) for answer in impacts])
+    lines = [
+        Line(
+            f"at {in_ms(body.dt)}",
+            speeds,
+            np.array([answer.measured for answer in impacts]),
+            marker="o",
+            low=np.array([answer.least for answer in impacts]),
+            high=np.array([answer.most for answer in impacts]),
+        ),
+        Line("as dt → 0", speeds, np.array([answer.limit for answer in impacts]), dashes="dashed", marker="s"),
+    ]
+    return [Chart("impact speed [m/s]", "rebound speed / impact speed", lines)]

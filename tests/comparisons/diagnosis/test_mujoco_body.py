@@ -1,0 +1,220 @@
+"""What the settings of MJCF and URDF files do in MuJoCo, compared with closed forms and with MuJoCo alone."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
+from dropspin.comparisons.diagnosis.questions import QUESTIONS, fall, impact, rest, slide, spin, tumble
+from dropspin.comparisons.diagnosis.study import _answers
+from dropspin.scenarios import DropspinError
+
+FREE = '<body name="b" pos="0 0 1"><freejoint/>{}</body>'
+PLANE = '<geom name="floor" type="plane" size="1 1 .1"/>'
+
+
+def body_of(tmp_path, world, option="", head="", name=None, on=None, file="model.xml"):
+    text = world if world.startswith("<robot") else f"<mujoco>{head}<option {option}/><worldbody>{PLANE}{world}</worldbody></mujoco>"
+    (tmp_path / file).write_text(text)
+    model = MuJoCoModel(tmp_path / file, file)
+    return model.body(name or model.bodies([], False)[0], on)
+
+
+def ladder(body):
+    return [body.facts.dt, body.facts.dt / 2.0, body.facts.dt / 4.0]
+
+
+def by_quantity(answers):
+    return {answer.quantity: answer for answer in answers}
+
+
+def findings_of(body):
+    return [answer for question in QUESTIONS for answer in _answers(body, question) if answer.finding]
+
+
+def test_healthy_ball_has_no_finding(tmp_path):
+    option = 'timestep="1e-3" integrator="RK4" cone="elliptic" impratio="100"'
+    body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), option)
+    assert findings_of(body) == []
+    assert not any(answer.finding for answer in inertia(body.facts))
+
+
+def test_damping_of_a_free_joint_is_named_and_its_time_constants_are_exact(tmp_path):
+    world = '<body name="egg" pos="0 0 1"><joint type="free" damping="0.02"/><geom type="ellipsoid" size=".02 .03 .05"/></body>'
+    body = body_of(tmp_path, world)
+    moments, mass = np.diag(body.facts.inertia), body.facts.mass
+    answers = spin(body, ladder(body))
+    assert [answer.in_force for answer in answers] == pytest.approx((moments / 0.02).tolist(), rel=1e-12)
+    h = body.facts.dt  # MuJoCo's implicit damper divides a spin by 1 + h/τ in each step
+    assert [answer.measured for answer in answers] == pytest.approx([h / math.log1p(h * 0.02 / moment) for moment in moments], rel=1e-6)
+    assert {answer.finding for answer in answers} == {"setting"}
+    [fallen, terminal] = fall(body, ladder(body))
+    assert terminal.in_force == pytest.approx(mass * 9.81 / 0.02, rel=1e-12)
+    rate = 0.02 / mass
+    assert fallen.in_force == pytest.approx(9.81 / rate * (1.0 - (1.0 - math.exp(-rate)) / rate), rel=1e-9)
+    found = findings_of(body)
+    assert {str(body.facts.settings[name]) for answer in found for name in answer.settings} == {'damping="0.02" (model.xml, line 1)'}
+    assert {answer.remedy for answer in found} == {"<freejoint/>"}
+    assert [answer.remedied for answer in found if answer.question == "spin"] == pytest.approx([1.0] * 3, rel=1e-9)
+
+
+def test_armature_slows_the_fall_and_is_found_in_a_default_class(tmp_path):
+    head = '<default>\n<default class="a">\n<joint armature="0.5"/>\n</default></default>'
+    world = '<body name="b" pos="0 0 1" childclass="a"><joint type="free"/><geom type="box" size=".1 .1 .1" mass="1"/></body>'
+    body = body_of(tmp_path, world, head=head)
+    [answer] = fall(body, ladder(body))
+    assert (answer.finding, answer.settings) == ("setting", ("armature",))
+    assert answer.in_force == pytest.approx(0.5 * 9.81 / 1.5, rel=1e-9)
+    assert str(body.facts.settings["armature"]) == 'armature="0.5" (model.xml, line 3)'
+
+
+def test_gain_of_energy_is_a_time_step_error_that_rk4_removes(tmp_path):
+    world = FREE.format('<geom type="box" size=".008 .044 .089" mass=".09"/>')
+    body = body_of(tmp_path, world)
+    [stated, worst, speed, step] = tumble(body, ladder(body))
+    assert stated.measured == pytest.approx(4.148, abs=2e-3)  # by MuJoCo alone: 100 (E(1 s)/E(0) - 1)
+    assert stated.finding == "time step"
+    assert abs(stated.limit) < 0.01
+    assert worst.measured > 6.4
+    assert 3.0 < speed.measured < 10.0
+    assert 4e-4 < step.measured < 6e-4
+    [found] = [answer for answer in _answers(body, tumble) if answer.finding]
+    assert found.remedy == '<option integrator="RK4"/>'
+    assert abs(found.remedied) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("geom", "option", "points"),
+    [
+        ('<geom size=".05"/>', "", 1),
+        ('<geom size=".05" condim="4"/>', "", 1),
+        ('<geom size=".05" condim="6"/>', 'cone="elliptic"', 1),
+        ('<geom type="box" size=".05 .05 .05"/>', "", 4),
+        ('<geom type="cylinder" size=".05 .05"/>', "", 3),
+        ('<geom size=".05" margin=".002"/>', "", 1),
+        ('<geom size=".05" solref="-2000 -80"/>', "", 1),
+    ],
+)
+def test_depth_at_rest_is_exact(tmp_path, geom, option, points):
+    body = body_of(tmp_path, FREE.format(geom), option)
+    depth = by_quantity(rest(body, ladder(body)))["depth"]
+    assert body._points(body.facts.pose) == points
+    assert depth.measured == pytest.approx(depth.in_force, abs=1e-8)
+
+
+def test_margin_lifts_a_body(tmp_path):
+    body = body_of(tmp_path, FREE.format('<geom size=".02" margin=".001"/>'))
+    [found] = [answer for answer in _answers(body, rest) if answer.finding]
+    assert (found.settings, found.remedy) == (("margin",), 'margin="0"')
+    assert found.measured == pytest.approx(0.00036718184 - 0.001, abs=1e-8)
+    assert found.remedied == pytest.approx(0.00036718184, abs=1e-8)
+
+
+def test_default_contact_returns_the_speed_of_a_critically_damped_spring(tmp_path):
+    body = body_of(tmp_path, FREE.format('<geom size=".05"/>'), 'timestep="1e-4"')
+    answers = by_quantity(impact(body, [body.facts.dt]))
+    assert answers["fastest upward / impact speed at 1 m/s"].measured == pytest.approx(math.exp(-2.0), abs=0.02)  # without gravity
+    assert answers["rebound / impact speed at 1 m/s"].measured == 0.0
+    assert answers["contact at 1 m/s"].detail == "does not leave"
+
+
+def test_coarse_step_scatters_the_rebound_over_start_phases(tmp_path):
+    body = body_of(tmp_path, FREE.format('<geom type="box" size=".025 .025 .025"/>'), 'timestep="0.01"')
+    [found] = [answer for answer in _answers(body, impact) if answer.finding]
+    assert (found.finding, found.settings) == ("time step", ("timestep",))
+    assert found.most - found.least > 0.1
+    assert abs(found.limit) < 0.01
+
+
+def test_raised_time_constant_of_a_contact_is_said(tmp_path):
+    body = body_of(tmp_path, FREE.format('<geom size=".05" solref="0.001 1" priority="1"/>'))
+    [(name, setting, made)] = body.facts.ignored
+    assert (name, setting.text) == ("solref", 'solref="0.001 1"')
+    assert made == "its time constant is raised to 0.004 s, two time steps"
+
+
+def test_pyramid_is_named_where_friction_depends_on_direction(tmp_path):
+    world = FREE.format('<geom name="puck" type="cylinder" size=".1 .02" mass="2" friction=".3"/>') + (
+        '<geom name="table" type="box" size="1 1 .2" pos="5 0 .2" friction=".1"/>'
+    )
+    body = body_of(tmp_path, world, on="table")
+    assert body.facts.friction == pytest.approx(0.3)
+    answers = by_quantity(_answers(body, slide))
+    assert answers["stop from 0.5 m/s"].finding == ""
+    assert answers["stop from 0.5 m/s"].in_force == pytest.approx(0.25 / (2.0 * 0.3 * 9.81))
+    diagonal = answers["stop from 0.5 m/s at 45°"]
+    assert diagonal.measured / diagonal.in_force == pytest.approx(math.sqrt(2.0), abs=0.05)
+    assert (diagonal.finding, diagonal.settings, diagonal.remedy) == ("setting", ("cone",), '<option cone="elliptic"/>')
+
+
+def test_impossible_inertia_is_measured_against_the_shape(tmp_path):
+    inertial = '<inertial pos="0 0 0" mass=".1" diaginertia="1e5 1e5 1e5"/>'
+    body = body_of(tmp_path, FREE.format(f'{inertial}<geom type="box" size=".015 .015 .12"/>'))
+    answer = by_quantity(inertia(body.facts))["largest moment / possible"]
+    assert answer.finding == "impossible"
+    assert answer.measured == pytest.approx(1e5 / (0.1 * (0.015**2 + 0.12**2)), rel=1e-9)
+
+
+def test_compilers_change_of_an_inertia_is_said(tmp_path):
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 2.5"/>'
+    world = FREE.format(f'{inertial}<geom type="box" size="2 2 2"/>')
+    body = body_of(tmp_path, world, head='<compiler balanceinertia="true"/>')
+    [(name, setting, made)] = body.facts.ignored
+    assert (name, setting.text) == ("inertia", 'diaginertia="1 1 2.5"')
+    assert 'balanceinertia="true" (model.xml, line 1)' in made
+    assert by_quantity(inertia(body.facts))["largest moment / sum of others"].measured == pytest.approx(1.25)
+
+
+def test_root_of_a_urdf_is_welded_and_cut_loose(tmp_path):
+    tensor = '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>'
+    link = f'<contact><restitution value="0.5"/></contact><inertial><mass value="1"/>{tensor}</inertial>'
+    shape = '<collision><geometry><sphere radius="0.5"/></geometry></collision>'
+    body = body_of(tmp_path, f'<robot name="r"><link name="ball">{link}{shape}</link></robot>', file="ball.urdf")
+    assert [name for name, *_ in body.facts.ignored] == ["base", "restitution"]
+    assert body.facts.surface == "a plane with default settings"
+    assert np.diag(body.facts.inertia) == pytest.approx([0.1] * 3)
+
+
+def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
+    part = '<body pos=".1 .05 0" euler="0 0 30"><geom type="capsule" size=".02 .05" mass=".3"/></body>'
+    world = f'<body name="b" pos="0 0 1" euler="20 0 0"><joint type="free" damping=".01" armature=".02"/><geom size=".05" mass="1"/>{part}</body>'
+    body = body_of(tmp_path, world)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml"))
+    data = mujoco.MjData(model)
+    start = body.facts.start(height=5.0, velocity=np.array([0.3, 0.1, 0.2]), spin=np.array([1.0, 2.0, 3.0]))
+    motion = body.motions(start[np.newaxis], 2e-3, 200, np.array([0.0, -9.81, 0.0]), floor=False)[0]
+    data.qvel[3:6] = [1.0, 2.0, 3.0]
+    mujoco.mj_forward(model, data)
+    turn = data.xmat[1].reshape(3, 3)
+    arm = data.subtree_com[1] - data.qpos[:3]
+    data.qvel[:3] = np.array([0.3, -0.2, 0.1]) - np.cross(turn @ data.qvel[3:6], arm)  # y is up there, z here
+    first = data.subtree_com[1].copy()
+    mujoco.mj_step(model, data, 200)
+    mujoco.mj_forward(model, data)
+    x, y, z = data.subtree_com[1] - first
+    assert (motion[-1] - motion[0])[:3] == pytest.approx([x, z, -y], abs=1e-12)
+    exact = body.facts.in_force(start, np.array([0.0, 0.4]), 9.81)[-1]
+    finer = body.motions(start[np.newaxis], 1e-4, 4000, np.array([0.0, -9.81, 0.0]), floor=False)[0, -1]
+    assert finer == pytest.approx(exact, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<mujoco>", "not XML"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><mujoco/>', "declares a document type"),
+        ('<mujoco><include file="bad.xml"/></mujoco>', "includes itself"),
+        ('<mujoco><include file="none.xml"/></mujoco>', "none.xml"),
+        ('<mujoco><worldbody><body><freejoint/><geom size="-1"/></body></worldbody></mujoco>', "MuJoCo does not compile it"),
+        ('<mujoco><worldbody><body><freejoint/><geom size="nan"/></body></worldbody></mujoco>', "MuJoCo does not compile it"),
+        ("<mujoco/>", "no body moves"),
+        ('<mujoco><worldbody><body name="arm"><joint/><geom size=".1"/></body></worldbody></mujoco>', "--loose"),
+    ],
+)
+def test_wrong_file_ends_in_one_line(tmp_path, text, message):
+    (tmp_path / "bad.xml").write_text(text)
+    with pytest.raises(DropspinError, match=message) as error:
+        MuJoCoModel(tmp_path / "bad.xml", "bad.xml").bodies([], False)
+    assert "\n" not in str(error.value)

@@ -79,8 +79,9 @@ class MuJoCoModel:
         mujoco.mj_kinematics(self.model, self.data)
 
     def names(self, kind: Any, number: int) -> dict[str, int]:
-        """The numbers of objects by name; an object without a name has its number as a name."""
-        return {mujoco.mj_id2name(self.model, kind, one) or f"#{one}": one for one in range(number)}
+        """The numbers of objects by name; one without a name is called by its kind and number."""
+        what = "body" if kind == BODY else "geom"
+        return {mujoco.mj_id2name(self.model, kind, one) or f"{what} {one}": one for one in range(number)}
 
     @cached_property
     def heads(self) -> dict[str, int]:
@@ -390,7 +391,7 @@ class MuJoCoBody(LooseBody):
             lifted=float(old.body_gravcomp[head]),
             unknown=self._unknown_forces(),
             surface="" if touching is None else next(key for key, geom in model.names(GEOM, old.ngeom).items() if geom == self._surface),
-            friction=0.0 if touching is None else float(touching["friction"][0]),
+            friction=0.0 if touching is None or touching["condim"] == 1 else float(touching["friction"][0]),
             restitution=None,
             margin=0.0 if touching is None else float(touching["margin"] - touching["gap"]),
             rolling=touching is not None and touching["condim"] == 6 and bool(np.any(touching["friction"][3:])),

@@ -28,6 +28,7 @@ KINDS = {
 """The words for the kinds of findings."""
 SEVERAL = re.compile(" about | at ")
 """What stands before the axis or the speed in a quantity."""
+MOST_NAMES = 4
 SETTINGS = {"unknown": "a fluid or dry friction"}
 
 
@@ -53,25 +54,42 @@ class Diagnosed(Study):
         is_short = len(bodies) > 2
         if is_short:
             parts.append(Table([_overview(body) for body in bodies], ["mass", "lands on"]))
+            parts.append(Sentences(of_several(bodies), on_page=False))
         for group in by_name.values():
             for body in group:
-                parts += _body_parts(body, is_short)
+                parts += _body_parts(body, on_terminal=not is_short)
             if len(group) > 1:
                 parts += [Heading(f"{group[0].name}: the engines differ"), Table(differences(group))]
         return Document(f"Diagnosis of {self.diagnosis.file}", parts, [Paragraph(summary(self.diagnosis))])
 
 
-def _body_parts(body: BodyDiagnosis, is_short: bool) -> list[Part]:
-    """What a page says of a body; a terminal that shows a table of all bodies shows the findings alone."""
+def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
+    """What a page says of a body; a terminal that shows a table of several bodies does not show it."""
+    if body.breakdown:
+        return [Paragraph(f"{body.name}: {body.breakdown}.", style="bold", on_terminal=on_terminal)]
     lands = f"; lands on {body.surface}, friction {body.friction:g}" if body.surface else "; lands on nothing"
     head = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg; {body.engine}, time step {in_ms(body.dt)}{lands}."
-    if body.breakdown:
-        return [Paragraph(f"{body.name}: {body.breakdown}.", style="bold")]
-    on_terminal = not is_short
-    parts: list[Part] = [Heading(body.name), Paragraph(head, on_terminal=on_terminal), Table(answer_rows(body), on_terminal=on_terminal)]
-    parts.append(Sentences([f"{body.name}: {sentence}" if is_short else sentence for sentence in sentences(body)], numbered=True))
     left = [f"Not modelled: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
-    return [*parts, Sentences(left, on_terminal=on_terminal), Charts(f"{body.name} {body.engine.split()[0]}", charts(body))]
+    return [
+        Heading(body.name),
+        Paragraph(head, on_terminal=on_terminal),
+        Table(answer_rows(body), on_terminal=on_terminal),
+        Sentences([*sentences(body), *left], numbered=True, on_terminal=on_terminal),
+        Charts(f"{body.name} {body.engine.split()[0]}", charts(body)),
+    ]
+
+
+def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
+    """The findings of several bodies; those with the same finding together."""
+    names: dict[str, list[str]] = {}
+    for body in bodies:
+        for sentence in sentences(body):
+            names.setdefault(sentence, []).append(body.name)
+    return [f"{_listed(owners)}: {sentence}" for sentence, owners in names.items()]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= MOST_NAMES else f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} more"
 
 
 def _overview(body: BodyDiagnosis) -> dict[str, str]:

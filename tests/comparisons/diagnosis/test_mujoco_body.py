@@ -2,9 +2,9 @@
 
 import math
 
-import mujoco
 import numpy as np
 import pytest
+
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
 from dropspin.comparisons.diagnosis.questions import QUESTIONS, fall, impact, rest, slide, spin, tumble
@@ -179,8 +179,11 @@ def test_root_of_a_urdf_is_welded_and_cut_loose(tmp_path):
 
 def test_welded_parts_and_an_offset_centre_move_as_in_mujoco(tmp_path):
     part = '<body pos=".1 .05 0" euler="0 0 30"><geom type="capsule" size=".02 .05" mass=".3"/></body>'
-    world = f'<body name="b" pos="0 0 1" euler="20 0 0"><joint type="free" damping=".01" armature=".02"/><geom size=".05" mass="1"/>{part}</body>'
+    joint = '<joint type="free" damping=".01" armature=".02"/>'
+    world = f'<body name="b" pos="0 0 1" euler="20 0 0">{joint}<geom size=".05" mass="1"/>{part}</body>'
     body = body_of(tmp_path, world)
+    import mujoco
+
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml"))
     data = mujoco.MjData(model)
     start = body.facts.start(height=5.0, velocity=np.array([0.3, 0.1, 0.2]), spin=np.array([1.0, 2.0, 3.0]))

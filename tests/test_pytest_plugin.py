@@ -30,7 +30,7 @@ def _imported(tmp_path_factory):
 @pytest.fixture
 def repository(pytester, monkeypatch):
     """A user's repository with engines and a scene; the plugin's command runs in this process."""
-    monkeypatch.setattr(pytest_plugin.Runs, "_dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=runs.root))
+    monkeypatch.setattr(pytest_plugin.Runs, "dropspin", lambda runs, *arguments: dropspin(*arguments, cwd=runs.root))
     return fill(pytester)
 
 

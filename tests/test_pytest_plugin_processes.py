@@ -35,7 +35,7 @@ def command(runs, *arguments):
     row |= {"value": 0.002, "lower": None, "upper": 1e-6, "unit": "1", "verdict": "failed", "reason": "nothing changes"}
     return subprocess.CompletedProcess([], 1, json.dumps([row, row | {"metric": "energy_drift", "verdict": "passed"}]), "")
 
-pytest_plugin.Runs._dropspin = command
+pytest_plugin.Runs.dropspin = command
 """
 
 

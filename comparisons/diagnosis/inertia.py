@@ -1,5 +1,7 @@
 """The inertia of a body: whether its shape can have it, and that of a solid of uniform density."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Facts
@@ -17,12 +19,14 @@ def inertia(facts: Facts) -> list[Answer]:
     if moments[0] + moments[1] < moments[2] / ROUNDING or moments[0] <= 0.0:
         ratio = float(moments[2] / (moments[0] + moments[1]))
         answers.append(Answer("inertia", "largest moment / sum of others", "1", ratio, physical=1.0, finding="impossible"))
-    possible = largest_possible(facts, given)
+    possible, solid = largest_possible(facts, given), facts.solid
     if possible is not None:
         factor = float(moments[2] / possible)
         finding: Finding = "impossible" if factor > ROUNDING else ""
         answers.append(Answer("inertia", "largest moment / possible", "1", factor, physical=1.0, finding=finding))
-    solid = facts.solid
+    if solid is not None and any(answer.finding for answer in answers):
+        text = f"the inertia of a solid, {', '.join(f'{value:.3g}' for value in np.linalg.eigvalsh(solid))} kg m²"
+        answers = [replace(answer, remedy=text, settings=("inertia",)) for answer in answers]
     for number, axis in enumerate(facts.principal[1].T):
         of_solid = np.nan if solid is None else float(axis @ solid @ axis)
         answers.append(Answer("inertia", f"moment {number + 1}", "kg m²", facts.principal[0][number], physical=of_solid))

@@ -122,7 +122,7 @@ def diagnose(
     targets: Targets = Targets(),
     resources: ResourceLimits = RESOURCES,
     jobs: int | None = None,
-    on_progress: Callable[[str, float], None] = ignore,
+    on_progress: Callable[[str, float], None] | None = None,
 ) -> Diagnosis:
     """Measure what the settings of a model do to its bodies, against exact solutions.
 
@@ -166,7 +166,7 @@ def diagnose(
                 found = processes.call(entry, _diagnosed, path, given, name, on, targets)
                 return BodyDiagnosis(name, entry.label, breakdown=found.reason) if isinstance(found, Breakdown) else _checked(found)
 
-            return Diagnosis(given, tuple(results_in_parallel(pieces, of_body, crews, on_progress)))
+            return Diagnosis(given, tuple(results_in_parallel(pieces, of_body, crews, on_progress or ignore)))
 
 
 def _checked(found: Found | DropspinError | Breakdown) -> Found:
@@ -213,6 +213,8 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
         return DropspinError(str(error))
     facts = body.facts
     answers = inertia(facts) + [answer for question in QUESTIONS for answer in _answers(body, question)]
+    if facts.surface:
+        answers.append(Answer("friction", "coefficient of both together", "1", facts.friction))
     answers += [Answer("file", key, "", finding="changed", settings=(key,), detail=made) for key, _, made in facts.ignored]
     return BodyDiagnosis(
         name=name,

@@ -157,8 +157,9 @@ def sentences(body: BodyDiagnosis) -> list[str]:
             for told, quantities in grouped_quantities(same).items()
         )
         where = ", ".join(_settings(body, first))
-        remedy = f" Remedy, tried: {first.remedy}" if first.remedy else ""
-        if first.remedy and math.isfinite(first.remedied):
+        is_tried = math.isfinite(first.remedied)
+        remedy = f" Remedy{', tried' if is_tried else ''}: {first.remedy}" if first.remedy else ""
+        if is_tried:
             remedy += f" gives {', '.join(dict.fromkeys(_value(answer.remedied, _unit_after(answer)) for answer in same))}"
         found.append(
             f"{first.question.capitalize()}, {KINDS[first.finding]}: {what}"
@@ -184,7 +185,7 @@ def _unit_after(answer: Answer) -> str:
 def _told(answer: Answer) -> str:
     measured, in_force, physical = _cells(answer)
     if answer.finding == "impossible":
-        return f"is {measured}, at most 1 is possible"
+        return f"is {measured}, and at most 1 for a body of this shape"
     if answer.finding in ("changed", "target"):
         return f"{measured} ({answer.detail})" if measured and measured != answer.detail else answer.detail
     wanted = in_force if answer.finding in ("time step", "model") and in_force else physical
@@ -194,7 +195,7 @@ def _told(answer: Answer) -> str:
 
 def _settings(body: BodyDiagnosis, answer: Answer) -> list[str]:
     known = body.settings or {}
-    return [str(known[name]) if name in known else SETTINGS.get(name, name) for name in answer.settings]
+    return [str(known.get(name, SETTINGS.get(name))) for name in answer.settings if name in known or name in SETTINGS]
 
 
 def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:

@@ -1,0 +1,83 @@
+"""`dropspin diagnose`: a table of several bodies, files, targets, exit codes and wrong files."""
+
+import json
+
+import pandas as pd
+import pytest
+from support.cli import dropspin
+
+WORLD = """<mujoco model="two"><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
+<body name="heavy" pos="0 0 1"><freejoint/><inertial pos="0 0 0" mass=".1" diaginertia="1 1 1"/><geom type="box" size=".05 .05 .05"/></body>
+<body name="damped" pos="1 0 1"><joint type="free" damping=".01"/><geom size=".05"/></body>
+<body name="arm" pos="3 0 1"><joint type="hinge"/><geom size=".05"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture
+def model(tmp_path):
+    (tmp_path / "two.xml").write_text(WORLD)
+    return tmp_path
+
+
+def test_table_findings_and_files_of_several_bodies(model):
+    done = dropspin("diagnose", "two.xml", "--loose", cwd=model)
+    assert done.returncode == 1, done.stderr  # an inertia is impossible
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines[:4]] == ["body", "heavy", "damped", "arm"]
+    assert "arm" in lines[3]
+    [impossible] = [line for line in lines if line.startswith("heavy: Inertia, impossible")]
+    assert 'diaginertia="1 1 1" (two.xml, line 2)' in impossible
+    assert any(line.startswith("damped: Spin, setting:") and "Remedy, tried: <freejoint/> gives 1." in line for line in lines)
+    folder = model / "out/diagnosis"
+    assert {"report.html", "diagnosis.json", "diagnosis.csv", "diagnosis.md", "diagnosis.parquet"} <= {
+        path.name for path in folder.iterdir()
+    }
+    rows = json.loads((folder / "diagnosis.json").read_text())
+    assert len(rows) == len(pd.read_parquet(folder / "diagnosis.parquet"))
+    assert {row["body"] for row in rows} == {"heavy", "damped", "arm"}
+    assert "Diagnosis of two.xml" in (folder / "report.html").read_text()
+
+
+def test_one_body_has_its_answers_and_a_missed_target_fails(model):
+    asked = ("diagnose", "two.xml", "--body", "damped", "-o", "one")
+    done = dropspin(*asked, cwd=model)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) <= 40
+    assert done.stdout.startswith("damped: sphere, 0.5236 kg; MuJoCo")
+    missed = dropspin(*asked, "--restitution", "0.5", "--friction", "0.3", "--json", cwd=model)
+    assert missed.returncode == 1
+    targets = [row for row in json.loads(missed.stdout) if row["finding"] == "target"]
+    assert {row["question"] for row in targets} == {"impact", "friction"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.xml"], "none.xml: No such file"),
+        (["."], "a model is a file"),
+        (["two.xml", "-e", "wang"], "wang does not read .xml files; use mujoco"),
+        (["two.xml", "--body", "heavi"], "heavy"),
+        (["two.xml", "--on", "flor"], "floor"),
+        (["two.xml", "--body", "heavy", "--on", "geom 4"], "neither a plane nor a box"),
+        (["many.xml"], "more than 100,000 elements"),
+        (["bare.xml"], "Error opening file"),
+    ],
+)
+def test_wrong_file_or_name_ends_in_one_line(model, arguments, message):
+    (model / "many.xml").write_text(f"<mujoco><worldbody>{'<geom/>' * 100_001}</worldbody></mujoco>")
+    mesh = '<asset><mesh name="m" file="none.stl"/></asset><worldbody><body><freejoint/><geom type="mesh" mesh="m"/></body></worldbody>'
+    (model / "bare.xml").write_text(f"<mujoco>{mesh}</mujoco>")
+    done = dropspin("diagnose", *arguments, cwd=model)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+
+
+def test_mesh_is_a_solid_of_a_density(tmp_path):
+    corners = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.2) for z in (0, 0.3)]
+    faces = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"]
+    (tmp_path / "brick.obj").write_text("\n".join([*corners, *(f"f {face}" for face in faces)]))
+    done = dropspin("diagnose", "brick.obj", "--density", "500", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    moments = [row["measured"] for row in json.loads(done.stdout) if row["unit"] == "kg m²"]
+    assert sorted(moments) == pytest.approx([0.0125, 0.025, 0.0325], rel=1e-4)

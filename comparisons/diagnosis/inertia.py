@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from dropspin.comparisons.diagnosis.loose_body import Facts
-from dropspin.comparisons.diagnosis.questions import Answer, Finding
+from dropspin.comparisons.diagnosis.questions import Answer, Finding, Remedy
 from dropspin.scenarios.state import Array
 
 ROUNDING = 1.001  # moments are often given with three or four digits
@@ -26,7 +26,7 @@ def inertia(facts: Facts) -> list[Answer]:
         answers.append(Answer("inertia", "largest moment / possible", "1", factor, physical=1.0, finding=finding))
     if solid is not None and any(answer.finding for answer in answers):
         text = f"the inertia of a solid, {', '.join(f'{value:.3g}' for value in np.linalg.eigvalsh(solid))} kg m²"
-        answers = [replace(answer, remedy=text, settings=("inertia",)) for answer in answers]
+        answers = [replace(answer, remedies=(Remedy(text),), settings=("inertia",)) for answer in answers]
     for number, axis in enumerate(facts.principal[1].T):
         of_solid = np.nan if solid is None else float(axis @ solid @ axis)
         answers.append(Answer("inertia", f"moment {number + 1}", "kg m²", facts.principal[0][number], physical=of_solid))

@@ -6,7 +6,7 @@ Each question is a function of a body and of time steps, of which the first is j
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,22 @@ LONGEST = 1_000_000
 """Steps of one question at most."""
 
 
+class Remedy(NamedTuple):
+    """A change that removes a finding.
+
+    Attributes:
+        text: What to write.
+        value: The value measured with it; NaN if it was not tried.
+        others: The number of other bodies of the model that it applies to as well.
+        runs: Whether the whole model runs with it.
+    """
+
+    text: str
+    value: float = math.nan
+    others: int = 0
+    runs: bool = True
+
+
 @dataclass(frozen=True)
 class Answer:
     """A measured value of a body, beside the exact ones.
@@ -54,10 +70,7 @@ class Answer:
         most: The largest.
         finding: The kind of finding; empty if it is none.
         settings: The names of the settings that cause it.
-        remedy: A text to paste.
-        remedied: The value measured with it.
-        others: The number of other bodies of the model that the remedy applies to as well.
-        runs: Whether the whole model runs with the remedy.
+        remedies: What removes the finding.
         detail: A sentence's part that explains a value that is not a number.
     """
 
@@ -72,10 +85,7 @@ class Answer:
     most: float = math.nan
     finding: Finding = ""
     settings: tuple[str, ...] = ()
-    remedy: str = ""
-    remedied: float = math.nan
-    others: int = 0
-    runs: bool = True
+    remedies: tuple[Remedy, ...] = ()
     detail: str = ""
 
 
@@ -146,14 +156,19 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     if np.ptp(moments) < 1e-9 * moments.max() or is_slowed:
         return []
     start, free = facts.start(spin=SPEED * OBLIQUE), 0.0
-    gains = [_gain(body, start, dt) for dt in dts]
-    exact = float(_energy_gain(body, start, facts.in_force(start, np.array([0.0, TURN]), 0.0)[-1]))
+    ends = [_turned(body, start, dt) for dt in dts]
+    gains = [float(_energy_gain(body, start, end)) for end in ends]
+    steps = round(TURN / dts[0])
+    after = facts.in_force(start, np.array([0.0, steps * dts[0]]), 0.0)[-1]
+    exact = float(_energy_gain(body, start, after))
     of_stated = judged(body, "tumble", f"energy in 1 s, {SPEED:g} rad/s", "%", dts, gains, [exact] * len(dts), free)
     tried = np.concatenate([DIRECTIONS[DIRECTIONS[:, 1] >= 0.0], DIAGONALS, [OBLIQUE]])
     starts = np.array([facts.start(spin=SPEED * (axes @ direction)) for direction in tried])
     by_direction = _energy_gain(body, starts, _turned(body, starts, dts[0]))
     worst = int(np.argmax(np.abs(by_direction)))
-    answers = [of_stated, Answer("tumble", f"worst, {_vector(tried[worst])}", "%", float(by_direction[worst]))]
+    turned = 2.0 * math.degrees(math.acos(min(1.0, abs(float(ends[0][ORIENTATION] @ after[ORIENTATION])))))
+    answers = [of_stated, Answer("tumble", "orientation error", "°", turned, in_force=0.0)]
+    answers += [Answer("tumble", f"worst, {_vector(tried[worst])}", "%", float(by_direction[worst]))]
     if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY or of_stated.finding:
         speed = _threshold(lambda w: _gain(body, facts.start(spin=w * (axes @ tried[worst])), dts[0]), SLOWEST, FASTEST)
         answers.append(Answer("tumble", "1 % a second from", "rad/s", speed))

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 
 from dropspin.comparisons.diagnosis.inertia import inertia
 from dropspin.comparisons.diagnosis.loose_body import LooseBody
-from dropspin.comparisons.diagnosis.questions import NOTEWORTHY, QUESTIONS, Answer, Finding
+from dropspin.comparisons.diagnosis.questions import NOTEWORTHY, QUESTIONS, Answer, Finding, Remedy
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.comparisons.engines.base import Diverged
 from dropspin.comparisons.running.entries import present_entry
@@ -186,7 +186,7 @@ def _around_mesh(path: Path, given: str, density: float, folder: Path) -> Path:
     return model
 
 
-def _model(entry: EngineEntry, path: Path, given: str) -> ModelFile:
+def _file(entry: EngineEntry, path: Path, given: str) -> ModelFile:
     """A model as the engine of this process reads it."""
     if entry.adapter.name == "mujoco":
         from dropspin.comparisons.diagnosis.mujoco_body import MuJoCoModel
@@ -200,7 +200,7 @@ def _model(entry: EngineEntry, path: Path, given: str) -> ModelFile:
 def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], loose: bool) -> list[str] | DropspinError:
     """The names of the bodies to diagnose; runs in the engine's process."""
     try:
-        return _model(entry, path, given).bodies(wanted, loose)
+        return _file(entry, path, given).bodies(wanted, loose)
     except DropspinError as error:  # of a type that may need more than a text
         return DropspinError(str(error))
 
@@ -208,7 +208,7 @@ def _bodies(entry: EngineEntry, path: Path, given: str, wanted: Sequence[str], l
 def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | None, targets: Targets) -> BodyDiagnosis | DropspinError:
     """The diagnosis of a body; runs in the engine's process."""
     try:
-        body = _model(entry, path, given).body(name, on)
+        body = _file(entry, path, given).body(name, on)
     except DropspinError as error:
         return DropspinError(str(error))
     facts = body.facts
@@ -231,7 +231,7 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
 
 
 def _answers(body: LooseBody, question: Question) -> Iterator[Answer]:
-    """The answers to a question, each finding with the first remedy that removes it; of a breakdown, the reason."""
+    """The answers to a question, each finding with the remedies that remove it; of a breakdown, the reason."""
     dt = body.facts.dt
     try:
         answers = question(body, [dt * factor for factor in HALVINGS])
@@ -243,8 +243,8 @@ def _answers(body: LooseBody, question: Question) -> Iterator[Answer]:
 
 
 def _remedied(body: LooseBody, question: Question, number: int, answer: Answer) -> Answer:
-    """A finding with the text that removes it, and the value measured with that; unchanged if no remedy does."""
-    dt = body.facts.dt
+    """A finding with the changes that remove it, each with the value measured with it; the finding is then of the first one's setting."""
+    dt, found = body.facts.dt, {}
     for setting in answer.settings:
         changes, text, step = *body.remedies.get(setting, ({}, "")), dt
         if setting == "timestep":
@@ -257,11 +257,11 @@ def _remedied(body: LooseBody, question: Question, number: int, answer: Answer) 
             except Diverged:
                 continue
             if number < len(again) and not again[number].finding:
-                kind: Finding = "setting" if answer.finding == "model" and setting != "timestep" else answer.finding
-                others, runs = body.elsewhere(step, changes)
-                remedied = again[number].measured
-                return replace(answer, finding=kind, settings=(setting,), remedy=text, remedied=remedied, others=others, runs=runs)
-    return answer
+                found[setting] = Remedy(text, again[number].measured, *body.elsewhere(step, changes))
+    if not found:
+        return answer
+    kind: Finding = "setting" if answer.finding == "model" and "timestep" not in found else answer.finding
+    return replace(answer, finding=kind, settings=tuple(found)[:1], remedies=tuple(found.values()))
 
 
 def _rounded(step: float) -> float:

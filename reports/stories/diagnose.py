@@ -43,7 +43,8 @@ class Diagnosed(Study):
         found = []
         for body in self.diagnosis.bodies:
             for answer in body.answers:
-                values = asdict(answer) | {"settings": "; ".join(_settings(body, answer))}
+                remedies = "; ".join(_remedies([answer]))
+                values = asdict(answer) | {"settings": "; ".join(_settings(body, answer)), "remedies": remedies}
                 found.append({"file": self.diagnosis.file, "body": body.name, "engine": body.engine, "dt": body.dt, **values})
         return found
 
@@ -111,7 +112,7 @@ def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
     ratios = [formatted(answer.measured / answer.physical) for answer in moments]
     if moments:
         rows.append(_row(body, "inertia", "moments / solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
-    shown = [answer for answer in body.answers if answer not in moments and answer.question != "file"]
+    shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
     shown = [answer for answer in shown if answer.question != "inertia" or answer.finding]
     for _, group in groupby(shown, lambda answer: (answer.question, _cells(answer), SEVERAL.split(answer.quantity)[0])):
         first, *others = group
@@ -149,23 +150,34 @@ def _value(value: float, unit: str) -> str:
 def sentences(body: BodyDiagnosis) -> list[str]:
     """A sentence for each finding: what is wrong, the settings in the words of the file with their lines, and the remedy that was tried."""
     found = []
-    for _, group in groupby(body.findings, lambda answer: (answer.question, answer.finding, answer.settings, answer.remedy)):
+    for _, group in groupby(body.findings, lambda answer: (answer.question, answer.finding, answer.settings, _texts(answer))):
         same = list(group)
-        first = same[0]
-        what = "; ".join(
-            f"{', '.join([quantities[0], *(SEVERAL.split(quantity)[-1] for quantity in quantities[1:])])} {told}"
-            for told, quantities in grouped_quantities(same).items()
-        )
-        where = ", ".join(_settings(body, first))
-        is_tried = math.isfinite(first.remedied)
-        remedy = f" Remedy{', tried' if is_tried else ''}: {first.remedy}" if first.remedy else ""
-        if is_tried:
-            remedy += f" gives {', '.join(dict.fromkeys(_value(answer.remedied, _unit_after(answer)) for answer in same))}"
-        found.append(
-            f"{first.question.capitalize()}, {KINDS[first.finding]}: {what}"
-            + (f": {where}." if where else ".")
-            + (f"{remedy}." if remedy else "")
-        )
+        what = "; ".join(f"{_together(quantities)} {told}" for told, quantities in grouped_quantities(same).items())
+        where = ", ".join(_settings(body, same[0]))
+        sentence = f"{same[0].question.capitalize()}, {KINDS[same[0].finding]}: {what}" + (f": {where}." if where else ".")
+        found.append(" ".join([sentence, *_remedies(same)]))
+    return found
+
+
+def _texts(answer: Answer) -> tuple[str, ...]:
+    return tuple(remedy.text for remedy in answer.remedies)
+
+
+def _together(quantities: Sequence[str]) -> str:
+    """Quantities that differ in an axis or a speed, as one."""
+    return ", ".join([quantities[0], *(SEVERAL.split(quantity)[-1] for quantity in quantities[1:])])
+
+
+def _remedies(answers: Sequence[Answer]) -> list[str]:
+    """A sentence for each remedy of equal findings, with the values measured with it."""
+    found = []
+    for same in zip(*(answer.remedies for answer in answers), strict=True):
+        values = {_value(remedy.value, _unit_after(answer)): None for remedy, answer in zip(same, answers, strict=True)}
+        text = f"Remedy: {same[0].text}" if math.isnan(same[0].value) else f"Remedy, tried: {same[0].text} gives {', '.join(values)}"
+        if same[0].others or not same[0].runs:
+            others, runs = counted(same[0].others, "other body", "other bodies"), "runs" if same[0].runs else "breaks down"
+            text += f" (it applies to {others} too, and the whole model {runs} with it)"
+        found.append(f"{text}.")
     return found
 
 

@@ -1,0 +1,179 @@
+"""A model file as MuJoCo compiles it: its bodies, what they may land on, and the contacts of two geometries."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from dropspin.comparisons.diagnosis.loose_body import Changes
+from dropspin.comparisons.diagnosis.source import read_source
+from dropspin.comparisons.engines.mujoco_simulation import quiet
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.truths.soft_rest import GeomSettings, mixed
+
+BODY, GEOM = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
+PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
+SURFACES = (PLANE, BOX)
+"""The kinds of geometries that a body may land on."""
+INTEGRATORS = {"Euler": 0, "RK4": 1, "implicit": 2, "implicitfast": 3}
+CONES = {"pyramidal": 0, "elliptic": 1}
+OPTIONS = [name for name in dir(mujoco.MjSpec().option) if not name.startswith("_")]
+ADDED = "a plane with default settings"
+"""The surface of a file that has none."""
+
+
+class MuJoCoFile:
+    """A model file as MuJoCo compiles it.
+
+    Args:
+        path: The MJCF or URDF file.
+        given: Its name for messages.
+
+    Raises:
+        DropspinError: MuJoCo does not compile it.
+    """
+
+    def __init__(self, path: Path, given: str) -> None:
+        self.source = read_source(path)
+        self.is_urdf = self.source.tag == "robot"
+        self.refusal = ""
+        try:
+            self._spec = mujoco.MjSpec.from_file(str(path))
+            if self.is_urdf:  # the root link would become a part of the world
+                self._spec.compiler.fusestatic = False
+            self._spec.worldbody.add_geom(name=ADDED, type=PLANE, size=[0.0, 0.0, 1.0])
+            try:
+                self.model = self._spec.compile()
+            except ValueError as error:
+                if "balanceinertia" not in str(error):
+                    raise
+                self.refusal, self._spec.compiler.balanceinertia = one_line(error), True
+                self.model = self._spec.compile()
+        except (ValueError, mujoco.FatalError) as error:
+            raise DropspinError(f"{given}: MuJoCo does not compile it: {one_line(error)}.") from None
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_kinematics(self.model, self.data)
+        flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit
+        self.gravity = np.zeros(3) if flags & bit.mjDSBL_GRAVITY else np.array(self.model.opt.gravity)
+        self.has_contacts = not flags & (bit.mjDSBL_CONTACT | bit.mjDSBL_CONSTRAINT)
+
+    def names(self, kind: Any, number: int) -> dict[str, int]:
+        """The numbers of objects by name; one without a name is called by its kind and number."""
+        what = "body" if kind == BODY else "geom"
+        return {mujoco.mj_id2name(self.model, kind, one) or f"{what} {one}": one for one in range(number)}
+
+    @cached_property
+    def heads(self) -> dict[str, int]:
+        """The bodies that move against their parents, by name; of a URDF file, whose root is welded to the world, that too."""
+        welded, bodies = self.model.body_weldid, self.names(BODY, self.model.nbody)
+        static = [body for body in bodies.values() if body and welded[body] == 0]
+        found = {name: body for name, body in bodies.items() if body and welded[body] == body}
+        return {name: body for name, body in bodies.items() if body in static[:1]} | found if self.is_urdf else found
+
+    def bodies(self, wanted: Sequence[str], loose: bool) -> list[str]:
+        """The names of the bodies that are free, or that are asked for, or of all that move.
+
+        Raises:
+            UnknownName: There is no such body.
+            DropspinError: No body is free.
+        """
+        for name in wanted:
+            if name not in self.heads:
+                raise UnknownName("the model's body", name, self.heads)
+        heavy = [name for name, body in self.heads.items() if sum(self.model.body_mass[one] for one in self.group(body)) > 0.0]
+        found = wanted or [name for name in heavy if loose or self.is_free(self.heads[name]) or (self.is_urdf and len(heavy) == 1)]
+        if not found:
+            there = f"the bodies {', '.join(heavy)} move on joints" if heavy else "no body moves"
+            raise DropspinError(f"no body is free: {there}; name one with --body, or give --loose to cut each loose.")
+        return list(found)
+
+    def runs(self, dt: float, changes: Changes) -> bool:
+        """Whether the whole model runs for a tenth of a second with other options."""
+        spec = self._spec.copy()
+        set_options(spec.option, self.model.opt, dt, changes)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        with quiet():
+            mujoco.mj_step(model, data, math.ceil(0.1 / dt))
+        return not any(warning.number for warning in data.warning[-3:])
+
+    def group(self, head: int) -> list[int]:
+        """A body and what is welded to it."""
+        welded = self.model.body_weldid
+        return [body for body in range(1, self.model.nbody) if welded[body] == welded[head] and body >= head]
+
+    def is_free(self, body: int) -> bool:
+        """Whether a body has a free joint, and nothing is jointed to it."""
+        model = self.model
+        has_joint = model.body_jntnum[body] == 1 and model.jnt_type[model.body_jntadr[body]] == mujoco.mjtJoint.mjJNT_FREE
+        return bool(has_joint and np.sum(model.body_rootid == body) == len(self.group(body)))
+
+    def surface(self, wanted: str | None, own: Sequence[int]) -> int | None:
+        """The geometry that some geometries land on: the one named, or the first plane or else box of the world that they collide with.
+
+        Raises:
+            DropspinError: There is no such geometry, or it is neither a plane nor a box.
+        """
+        model = self.model
+        others = {name: geom for name, geom in self.names(GEOM, model.ngeom).items() if geom not in own}
+        if wanted is not None:
+            if wanted not in others:
+                raise UnknownName("the model's geometry", wanted, others)
+            if int(model.geom_type[others[wanted]]) not in map(int, SURFACES):
+                raise DropspinError(f"--on {wanted}: is neither a plane nor a box; name one of these.")
+            return others[wanted]
+        still = [geom for geom in others.values() if model.body_weldid[model.geom_bodyid[geom]] == 0]
+        ranked = [geom for kind in SURFACES for geom in still if model.geom_type[geom] == kind and geom != others[ADDED]]
+        return next((geom for geom in [*ranked, others[ADDED]] if any(self.contact(one, geom) for one in own)), None)
+
+    def contact(self, first: int, second: int) -> dict[str, Any] | None:
+        """The settings of a contact of two geometries, as MuJoCo mixes them; None if they do not collide."""
+        model = self.model
+        for pair in range(model.npair):
+            if {model.pair_geom1[pair], model.pair_geom2[pair]} == {first, second}:
+                names = ("friction", "solref", "solreffriction", "solimp", "margin", "gap")
+                return {"condim": model.pair_dim[pair]} | {name: getattr(model, f"pair_{name}")[pair] for name in names}
+        types, affinities = model.geom_contype, model.geom_conaffinity
+        bodies = [model.geom_bodyid[geom] for geom in (first, second)]
+        excluded = [(bodies[0] << 16) + bodies[1], (bodies[1] << 16) + bodies[0]]
+        if not (types[first] & affinities[second] or types[second] & affinities[first]) or np.isin(model.exclude_signature, excluded).any():
+            return None
+        both = mixed(self._settings_of(first), self._settings_of(second))
+        return {
+            "condim": both.condim,
+            "solref": np.array(both.solref),
+            "solimp": np.array(both.solimp),
+            "friction": np.array(both.friction)[[0, 0, 1, 2, 2]],
+            "margin": both.margin,
+            "gap": model.geom_gap[[first, second]].sum(),
+        }
+
+    def _settings_of(self, geom: int) -> GeomSettings:
+        model, names = self.model, ("solref", "solimp", "friction", "condim", "margin", "priority", "solmix")
+        return GeomSettings(**{name: plain(getattr(model, f"geom_{name}")[geom]) for name in names})
+
+
+def plain(value: Any) -> Any:
+    """Numbers of a compiled model as a tuple, or as a number."""
+    return tuple(value.tolist()) if np.ndim(value) else value.item()
+
+
+def set_options(option: Any, compiled: Any, dt: float, changes: Changes) -> None:
+    """Give a specification the options of a compiled model, but for the time step [s] and changes; without the automatic reset."""
+    for name in OPTIONS:
+        setattr(option, name, getattr(compiled, name))
+    option.timestep = dt
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    option.integrator = INTEGRATORS[str(changes["integrator"])] if "integrator" in changes else compiled.integrator
+    option.cone = CONES[str(changes["cone"])] if "cone" in changes else compiled.cone
+    option.impratio = changes.get("impratio", compiled.impratio)
+
+
+def one_line(error: Exception) -> str:
+    """The message of an error of MuJoCo, in one line."""
+    return " ".join(str(error).removeprefix("Error:").split()).rstrip(".")

@@ -49,7 +49,7 @@ class BodyText:
             values = next(inertial.every("inertia"), inertial).attributes
             xx, yy, zz, xy, xz, yz = (float(values.get(name, 0.0)) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
         elif "diaginertia" in values:
-            xx, yy, zz, xy, xz, yz = map(float, [*values["diaginertia"].split(), 0.0, 0.0, 0.0])
+            xx, yy, zz, xy, xz, yz = (*map(float, values["diaginertia"].split()), 0.0, 0.0, 0.0)
         elif "fullinertia" in values:
             xx, yy, zz, xy, xz, yz = map(float, values["fullinertia"].split())
         else:

@@ -69,7 +69,7 @@ class BodyText:
         name = "" if self._surface is None else mujoco.mj_id2name(self._file.model, GEOM, self._surface)
         there = [geom for geom in root.every("geom") if geom.attributes.get("name") == name and geom not in own] if name else []
         there = there or [geom for geom in root.every("geom") if geom not in own]
-        places = {"gravcomp": [body], "damping": [joint], "armature": [joint], "frictionloss": [joint]}
+        places: dict[str, list[Element | None]] = {"gravcomp": [body], "damping": [joint], "armature": [joint], "frictionloss": [joint]}
         places |= {name: [*own, *there[:1]] for name in ("margin", "solref", "solimp", "friction", "condim")}
         inertial = next(body.every("inertial"), None)
         written = {name: [mjcf_setting(one, name) for one in elements if one is not None] for name, elements in places.items()}

@@ -14,11 +14,11 @@ import numpy as np
 
 from dropspin.comparisons.diagnosis.source import Setting
 from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
+from dropspin.scenarios.bodies.hull import hull_corners
 from dropspin.scenarios.bodies.inertia import principal_axes
 from dropspin.scenarios.bodies.mesh import is_closed
 from dropspin.scenarios.bodies.mesh_files import Faces
-from dropspin.scenarios.bodies.surface import depth_below_centre
-from dropspin.scenarios.rotations import multiply, rotate
+from dropspin.scenarios.rotations import rotate, unrotate
 from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, UP, Array
 from dropspin.scenarios.truths.settings import Resistance, fall, free_motion, spin_about_axis
 
@@ -110,7 +110,11 @@ class Facts:
 
     def lowest(self, states: Array) -> Array:
         """Heights of the body's lowest point at states, shape (n,) [m]."""
-        return lowest(self.parts, states)
+        return self._support.lowest(states)
+
+    @cached_property
+    def _support(self) -> "Support":
+        return Support(self.parts)
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:
@@ -167,16 +171,26 @@ class Facts:
         return found
 
 
-def lowest(parts: Sequence[Part], states: Array) -> Array:
-    """Heights of the lowest point of geometries at states, shape (n,) [m]."""
-    heights = []
-    for part in parts:
-        turn = multiply(states[:, ORIENTATION], np.broadcast_to(part.turn, (len(states), 4)))
-        centre = rotate(states[:, ORIENTATION], part.position)[:, 1]
-        below = np.min(rotate(turn[:, np.newaxis], part.shape.hull)[..., 1], axis=1)
-        heights.append(centre + below - depth_below_centre(turn, part.shape.semi_axes))
-    found: Array = states[:, POSITION][:, 1] + np.min(heights, axis=0)
-    return found
+class Support:
+    """The lowest points of geometries together: of the corners of all that have flat faces, and of the ellipsoids about other corners."""
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        corners = [part.position + rotate(part.turn, part.shape.hull) for part in parts]
+        is_round = [bool(part.shape.semi_axes.any()) for part in parts]
+        flat = np.concatenate([np.empty((0, 3)), *(one for one, rounded in zip(corners, is_round, strict=True) if not rounded)])
+        self._flat = flat[hull_corners(flat)] if len(flat) else flat
+        rounded = [(one, part) for one, part, is_ in zip(corners, parts, is_round, strict=True) if is_]
+        self._centres = np.concatenate([np.empty((0, 3)), *(one for one, _ in rounded)])
+        stretches = [part.shape.semi_axes[:, np.newaxis] * rotate(part.turn, AXES).T for one, part in rounded for _ in one]
+        self._stretches = np.array(stretches).reshape(-1, 3, 3)
+
+    def lowest(self, states: Array) -> Array:
+        """Heights of the lowest point at states, shape (n,) [m]."""
+        up = unrotate(states[:, ORIENTATION], np.broadcast_to(UP, (len(states), 3)))
+        depths = np.linalg.norm(np.einsum("kij,nj->nki", self._stretches, up), axis=-1)
+        heights = np.concatenate([up @ self._flat.T, up @ self._centres.T - depths], axis=1)
+        found: Array = states[:, POSITION][:, 1] + heights.min(axis=1)
+        return found
 
 
 def volume(shape: Shape) -> float:

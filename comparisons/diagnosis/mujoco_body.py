@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, lowest, mesh_shape
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, Support, mesh_shape
 from dropspin.comparisons.diagnosis.mujoco_file import BOX, CONES, GEOM, OPTIONS, PLANE, MuJoCoFile, plain, set_options
 from dropspin.comparisons.diagnosis.mujoco_text import BodyText
 from dropspin.comparisons.diagnosis.source import Setting, option_setting
@@ -320,7 +320,7 @@ class MuJoCoBody(LooseBody):
         data, size = mujoco.MjData(model), float(model.stat.extent)
         parts = [self._part(number) for number in range(self._alone.ngeom)]
         data.qpos[:] = [*(-rotate(pose, self._offset)), *np.roll(pose, 1)]
-        data.qpos[1] -= lowest(parts, np.concatenate([np.zeros(3), pose, np.zeros(6)])[np.newaxis])[0] + FLAT * size
+        data.qpos[1] -= Support(parts).lowest(np.concatenate([np.zeros(3), pose, np.zeros(6)])[np.newaxis])[0] + FLAT * size
         mujoco.mj_forward(model, data)
         places = data.contact.pos[:, [0, 2]]
         is_even = len(places) > 0 and bool(np.abs(places.mean(axis=0)).max() < 1e-6 * size)

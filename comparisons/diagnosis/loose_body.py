@@ -35,12 +35,16 @@ Changes = Mapping[str, str | float]
 
 
 class Part(NamedTuple):
-    """A geometry of the body: a solid shape of 1 kg, where its centre is relative to the centre of mass [m], and how it is turned."""
+    """A geometry of the body: a solid shape of 1 kg, where its centre is relative to the centre of mass [m], and how it is turned.
+
+    One that does not collide bounds the body's inertia, and nothing else.
+    """
 
     name: str
     shape: Shape
     position: Array
     turn: Array
+    collides: bool = True
 
 
 class Drag(NamedTuple):
@@ -114,7 +118,12 @@ class Facts:
 
     @cached_property
     def _support(self) -> "Support":
-        return Support(self.parts)
+        return Support(self.colliding)
+
+    @property
+    def colliding(self) -> Sequence[Part]:
+        """The geometries that collide; all if none does."""
+        return [part for part in self.parts if part.collides] or self.parts
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:
@@ -159,12 +168,13 @@ class Facts:
     @property
     def solid(self) -> Array | None:
         """The inertia about the centre of mass if the mass were spread evenly over the geometries [kg m²], shape (3, 3)."""
-        volumes = [volume(part.shape) for part in self.parts]
-        if not self.parts or not min(volumes) > 0.0:
+        parts = self.colliding
+        volumes = [volume(part.shape) for part in parts]
+        if not parts or not min(volumes) > 0.0:
             return None
-        centre = np.average([part.position for part in self.parts], axis=0, weights=volumes)
+        centre = np.average([part.position for part in parts], axis=0, weights=volumes)
         found = np.zeros((3, 3))
-        for part, share in zip(self.parts, np.array(volumes) / sum(volumes), strict=True):
+        for part, share in zip(parts, np.array(volumes) / sum(volumes), strict=True):
             axes, arm = rotate(part.turn, AXES).T, part.position - centre
             about = axes @ part.shape.inertia_tensor @ axes.T + arm @ arm * np.eye(3) - np.outer(arm, arm)
             found += self.mass * share * about
@@ -213,10 +223,12 @@ class LooseBody(ABC):
     Attributes:
         facts: What is in force.
         remedies: By the name of a setting, the changes that take its effect away, and the text to paste.
+        time_step: The text to paste for a time step [s].
     """
 
     facts: Facts
     remedies: Mapping[str, tuple[Changes, str]]
+    time_step = '<option timestep="{:g}"/>'
 
     @abstractmethod
     def changed(self, changes: Changes) -> "LooseBody":

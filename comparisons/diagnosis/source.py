@@ -55,6 +55,24 @@ class Element:
         value = self.attributes.get(attribute)
         return None if value is None else Setting(f'{attribute}="{value}"', self.file, self.line)
 
+    def number(self, attribute: str, default: float) -> float:
+        """The value of an attribute that is a number.
+
+        Raises:
+            DropspinError: It is no number.
+        """
+        try:
+            return float(self.attributes.get(attribute, default))
+        except ValueError:
+            written = f'{attribute}="{self.attributes[attribute]}"'
+            raise DropspinError(f"{self.file}: line {self.line}: {written} is not a number.") from None
+
+    @property
+    def words(self) -> Setting:
+        """The element with all its attributes."""
+        values = "".join(f' {name}="{text}"' for name, text in self.attributes.items())
+        return Setting(f"<{self.tag}{values}>", self.file, self.line)
+
 
 def read_source(path: Path) -> Element:
     """The root element of a model file, with included files in place of their elements.

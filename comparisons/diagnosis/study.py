@@ -4,6 +4,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -221,7 +222,7 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
         engine=facts.engine,
         dt=facts.dt,
         mass=facts.mass,
-        shapes=tuple(part.shape.shape for part in facts.parts),
+        shapes=tuple(part.shape.shape for part in facts.colliding),
         surface=facts.surface,
         friction=facts.friction,
         answers=tuple(map(targets.judge, answers)),
@@ -245,13 +246,16 @@ def _answers(body: LooseBody, question: Question) -> Iterator[Answer]:
 def _remedied(body: LooseBody, question: Question, number: int, answer: Answer) -> Answer:
     """A finding with the changes that remove it, each with the value measured with it; the finding is then of the first one's setting."""
     dt, found = body.facts.dt, {}
-    for setting in answer.settings:
+    for setting, finer in product(answer.settings, (False, True)):
         changes, text, step = *body.remedies.get(setting, ({}, "")), dt
         if setting == "timestep":
-            excess = abs(answer.measured - answer.in_force) / (100.0 if answer.unit == "%" else abs(answer.in_force)) / NOTEWORTHY
+            excess = abs(answer.measured - answer.in_force) / (100.0 if answer.unit == "%" else abs(answer.in_force) or 1.0) / NOTEWORTHY
             step = _rounded(dt * (SAFE / excess if excess > 1.0 else 0.25))
-            text = f'<option timestep="{step:g}"/>'
-        if text:
+            text = body.time_step.format(step)
+        elif finer and answer.finding == "model":
+            step = _rounded(0.125 * dt)
+            text = text and f"{text}, {body.time_step.format(step)}"
+        if text and finer == (step != dt) and setting not in found:
             try:
                 again = question(body.changed(changes), [step])
             except Diverged:

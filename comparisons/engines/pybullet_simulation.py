@@ -61,7 +61,7 @@ class PyBulletSimulation(Simulation):
         """
         self._scene, self._dt, self.velocity_lag = scene, dt, 0.5 * dt
         self._is_maximal, self._idle = form["coordinates"] == "maximal", _idle.setdefault(form["profile"], [])
-        self._bullet, self._uses = self._idle.pop() if self._idle else (_Connection(), 0)
+        self._bullet, self._uses = self._idle.pop() if self._idle else (Connection(), 0)
         tensor = scene.body.inertia_tensor
         self._to_body = None if is_diagonal(tensor) else conjugate(principal_frame(tensor)[1])
         self.settings = {"version": version("pybullet"), **form, **parameters, **dynamics}
@@ -188,7 +188,7 @@ class PyBulletSimulation(Simulation):
         self._idle.append((self._bullet, 0))
 
 
-class _Connection:
+class Connection:
     """A connection to a physics server in this process: PyBullet's functions with its number."""
 
     def __init__(self) -> None:
@@ -202,7 +202,7 @@ class _Connection:
         return partial(found, physicsClientId=self.client) if callable(found) else found
 
 
-_idle: dict[str, list[tuple[_Connection, int]]] = {}
+_idle: dict[str, list[tuple[Connection, int]]] = {}
 """Unused connections, by profile, and how often each was used since it was reset; they give the bits that new ones give."""
 
 

@@ -71,12 +71,13 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
     lands = f"; lands on {body.surface}, friction {body.friction:g}" if body.surface else "; lands on nothing"
     head = f"{body.name}: {', '.join(body.shapes) or 'no shape'}, {body.mass:.4g} kg; {body.engine}, time step {in_ms(body.dt)}{lands}."
     left = [f"Not modelled: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
+    drawn = charts(body)
     return [
         Heading(body.name),
         Paragraph(head, on_terminal=on_terminal),
         Table(answer_rows(body), on_terminal=on_terminal),
         Sentences([*sentences(body), *left], numbered=True, on_terminal=on_terminal),
-        Charts(f"{body.name} {body.engine.split()[0]}", charts(body)),
+        *([Charts(f"{body.name} {body.engine.split()[0]}", drawn)] if drawn else []),
     ]
 
 

@@ -1,0 +1,231 @@
+"""Bodies of URDF files that PyBullet loads with its defaults, with the values that it has in force.
+
+A body is simulated above plane.urdf of pybullet_data, turned so that y is up. Its frame is that of its first link, as the file has it, not
+the inertial frame whose pose PyBullet reports.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pybullet_data  # type: ignore[import-untyped]
+
+from dropspin.comparisons.diagnosis.inertia import inertia
+from dropspin.comparisons.diagnosis.loose_body import Changes, Drag, Facts, LooseBody, Part, Support
+from dropspin.comparisons.diagnosis.pybullet_links import MARGIN, Ignored, read_links
+from dropspin.comparisons.diagnosis.pybullet_server import load, server
+from dropspin.comparisons.diagnosis.source import Setting
+from dropspin.comparisons.diagnosis.urdf_file import UrdfFile
+from dropspin.comparisons.engines.base import Diverged
+from dropspin.comparisons.engines.packages import version
+from dropspin.comparisons.engines.pybullet_simulation import CHUNK, Z_TO_Y
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.errors import UnknownName
+from dropspin.scenarios.rotations import conjugate, cross, multiply, rotate, unrotate
+from dropspin.scenarios.state import ORIENTATION, POSITION, SPIN, VELOCITY, Array
+from dropspin.scenarios.truths.settings import Resistance, bullet_damping
+
+STEP, GRAVITY, DAMPING = 1.0 / 240.0, 9.81, 0.04
+"""Bullet's time step [s], the acceleration of gravity that is set, and Bullet's damping of a multibody, by velocity and by spin."""
+SURFACE = "plane.urdf"
+PLANE = os.path.join(os.path.dirname(pybullet_data.__file__), SURFACE)
+FAR = [0.0, 1e3, 0.0]
+SLOP = 1e-5  # m; the depth that Bullet's contacts leave
+DEFAULTS = {
+    "timestep": f"fixedTimeStep=1/{round(1.0 / STEP)}",
+    "damping": f"linearDamping=angularDamping={DAMPING:g}",
+    "contactERP": "contactERP=0.08",
+    "margin": f"a margin of {MARGIN:g} m around convex hulls",
+    "friction": "lateralFriction=0.5",
+}
+WRITTEN = (
+    ("lateral_friction", "value", "friction"),
+    ("restitution", "value", "restitution"),
+    ("rolling_friction", "value", "rolling"),
+    ("inertia", "ixx", "inertia"),
+    ("mass", "value", "mass"),
+)
+"""Elements and attributes of URDF, and the names of their settings."""
+
+
+class PyBulletModel(UrdfFile):
+    """A URDF file as PyBullet loads it; arguments and errors are those of a URDF file."""
+
+    def __init__(self, path: Path, given: str) -> None:
+        super().__init__(path, given)
+        server().clear()
+        load(given, str(path))
+
+    def body(self, name: str, on: str | None) -> LooseBody:
+        """One of the bodies, above what it lands on."""
+        if on not in (None, SURFACE):
+            raise UnknownName("PyBullet's surface", str(on), [SURFACE])
+        return PyBulletBody(self, name, {})
+
+
+class PyBulletBody(LooseBody):
+    """A link, with what is fixed to it.
+
+    Args:
+        model: The file.
+        name: The link's name.
+        changes: Settings that differ from PyBullet's: `damping`, `inertia`, `contactERP`, and `restitution`, that of the surface.
+
+    Raises:
+        DropspinError: PyBullet gives the body no mass or no inertia.
+    """
+
+    time_step = "setTimeStep({:g})"
+
+    def __init__(self, model: PyBulletModel, name: str, changes: Changes) -> None:
+        self._model, self._name, self._changes = model, name, changes
+        self._file = str(model.path) if len(model.heads) == 1 else model.cut_loose(name)
+        body, self._plane = self._world(True)
+        self._links = read_links(model, body)
+        first = self._links[0]
+        if first.mass == 0.0:
+            raise DropspinError(f"{model.given}: link {name} has no mass, so that PyBullet holds it still.")
+        self._masses = np.array([link.mass for link in self._links])
+        own = np.sum([link.inertia for link in self._links], axis=0)
+        if not (np.isfinite([*self._masses, *own.flat]).all() and self._masses.sum() > 0.0 and np.linalg.det(own) > 0.0):
+            moments = ", ".join(f"{moment:g}" for moment in first.dynamics[2])
+            raise DropspinError(f"{model.given}: PyBullet gives link {name} the mass {first.mass:g} kg and the moments {moments} kg m².")
+        centres = np.array([link.position for link in self._links])
+        centre = np.average(centres, axis=0, weights=self._masses)
+        self._arms, self._arm = centres - centre, unrotate(first.turn, centre - first.position)
+        self.facts = self._facts(centre, own)
+        self.remedies = {
+            "damping": ({"damping": 0.0}, "changeDynamics(body, -1, linearDamping=0, angularDamping=0)"),
+            "inertia": ({"inertia": "file"}, "loadURDF(..., flags=URDF_USE_INERTIA_FROM_FILE)"),
+            "contactERP": ({"contactERP": 0.0}, "setPhysicsEngineParameter(contactERP=0)"),
+        }
+        if first.restitution > 0.0:
+            self.remedies["restitution"] = ({"restitution": 1.0}, "changeDynamics(plane, -1, restitution=1)")
+
+    def changed(self, changes: Changes) -> LooseBody:
+        return PyBulletBody(self._model, self._name, {**self._changes, **changes})
+
+    def motions(self, starts: Array, dt: float, steps: int, gravity: Array, *, floor: bool) -> Array:
+        body, _ = self._world(floor)
+        bullet, inertial = server(), self._links[0].turn
+        bullet.setTimeStep(dt)
+        bullet.setGravity(*map(float, gravity))
+        turns = multiply(starts[:, ORIENTATION], np.broadcast_to(inertial, (len(starts), 4)))
+        arms = rotate(turns, self._arm)
+        places, speeds = starts[:, POSITION] - arms, starts[:, VELOCITY] - cross(starts[:, SPIN], arms)
+        rows = np.empty((len(starts), 1 + steps, 13))
+        rows[:, 0] = np.concatenate([places, turns, speeds, starts[:, SPIN]], axis=1)
+        for row in rows:
+            start = row[0].tolist()
+            bullet.resetBasePositionAndOrientation(body, FAR, start[ORIENTATION])
+            bullet.performCollisionDetection()  # which forgets the contacts of the last motion
+            bullet.resetBasePositionAndOrientation(body, start[POSITION], start[ORIENTATION])
+            bullet.resetBaseVelocity(body, start[VELOCITY], start[SPIN])
+            for first in range(1, 1 + steps, CHUNK):
+                row[first : first + CHUNK] = bullet.states(body, min(CHUNK, 1 + steps - first))
+        if not np.isfinite(rows).all():
+            raise Diverged(f"PyBullet's state became NaN within {steps} steps of {dt:g} s")
+        arms = rotate(rows[..., ORIENTATION], np.broadcast_to(self._arm, (*rows.shape[:2], 3)))
+        rows[..., POSITION] += arms
+        rows[..., VELOCITY] += cross(rows[..., SPIN], arms)
+        rows[..., ORIENTATION] = multiply(rows[..., ORIENTATION], np.broadcast_to(conjugate(inertial), (*rows.shape[:2], 4)))
+        return rows
+
+    def _world(self, floor: bool) -> tuple[int, int]:
+        """The numbers of the body and of the surface in a world with nothing else; it stays until another one is needed."""
+        bullet, changes = server(), self._changes
+        if bullet.holds != (self, floor):
+            bullet.clear()
+            if "contactERP" in changes:
+                bullet.setPhysicsEngineParameter(contactERP=changes["contactERP"])
+            body = load(self._model.given, self._file, bullet.URDF_USE_INERTIA_FROM_FILE if "inertia" in changes else 0)
+            if "damping" in changes:
+                bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
+            plane = bullet.loadURDF(PLANE, baseOrientation=Z_TO_Y.tolist()) if floor else -1
+            if floor and "restitution" in changes:
+                bullet.changeDynamics(plane, -1, restitution=changes["restitution"])
+            bullet.holds, bullet.numbers = (self, floor), (body, plane)
+        return bullet.numbers
+
+    def _facts(self, centre: Array, own: Array) -> Facts:
+        """What is in force; `own` is the sum of the links' tensors about their own centres of mass."""
+        mass, squares = float(self._masses.sum()), np.sum(self._masses * np.sum(self._arms**2, axis=1))
+        kappa = 0.0 if "damping" in self._changes else DAMPING
+        plane = server().getDynamicsInfo(self._plane, -1)
+        parts = [part for link in self._links for part in link.parts(self._model, centre)]
+        touching = next((link for link in self._links if link.geometry), self._links[0])
+        margin = MARGIN if parts and _bottom(parts).shape.shape == "mesh" else 0.0
+        facts = Facts(
+            name=self._name,
+            engine=f"PyBullet {version('pybullet')}",
+            dt=STEP,
+            gravity=GRAVITY,
+            mass=mass,
+            inertia=own + squares * np.eye(3) - (self._arms.T * self._masses) @ self._arms,
+            offset=np.zeros(3),
+            parts=parts,
+            pose=Z_TO_Y,
+            resistance=self._resistance(own, kappa),
+            falls=Drag(kappa * mass, kappa * mass),
+            spins=(Drag(), Drag(), Drag()),
+            armature=0.0,
+            lifted=0.0,
+            unknown=None,
+            surface=SURFACE if parts else "",
+            friction=touching.dynamics[1] * plane[1],
+            restitution=touching.restitution * plane[5],
+            margin=margin,
+            rolling=touching.dynamics[6] > 0.0,
+            rest_depth=SLOP - margin if touching.dynamics[9] < 0.0 else math.nan,
+            written=self._links[0].written if len(self._links) == 1 else None,
+            settings=self._settings(),
+            ignored=self._ignored(plane[5]),
+            unmodelled=["joints"] if len(self._model.heads) > 1 else [],
+        )
+        if not parts or any(answer.finding for answer in inertia(facts)):
+            parts = [*parts, *(part for link in self._links for part in link.visual_parts(self._model, centre))]
+        x, y, z = (self._drag(axis, own, kappa) for axis in facts.principal[1].T)
+        return replace(facts, spins=(x, y, z), parts=parts)
+
+    def _drag(self, axis: Array, own: Array, kappa: float) -> Drag:
+        """The damping of a spin about an axis: each link is damped by its own speed, ω times its distance from the axis."""
+        distances, about = np.linalg.norm(np.cross(self._arms, axis), axis=1), axis @ own @ axis
+        return Drag(*(kappa * float(about + self._masses @ distances**power) for power in (2, 3)))
+
+    def _resistance(self, own: Array, kappa: float) -> Resistance:
+        """The damping; of several links, as if the body turned without moving, and moved without turning."""
+        base, arms, masses = bullet_damping(self._masses.sum(), own, kappa, kappa), self._arms, self._masses
+
+        def resistance(velocity: Array, spin: Array) -> tuple[Array, Array]:
+            force, torque = base(velocity, spin)
+            speeds = np.cross(spin, arms)
+            weights = kappa * masses * (1.0 + np.linalg.norm(speeds, axis=1))
+            return force, torque - weights @ np.cross(arms, speeds)
+
+        return resistance
+
+    def _settings(self) -> dict[str, Setting]:
+        """The settings that matter, in the words of the file or as PyBullet's defaults."""
+        found = {name: Setting(text) for name, text in DEFAULTS.items()}
+        for tag, attribute, name in WRITTEN:
+            for element in self._model.links[self._name].every(tag):
+                found |= {name: setting} if (setting := element.setting(attribute)) else {}
+        return found
+
+    def _ignored(self, restitution: float) -> Sequence[Ignored]:
+        """What the file says and PyBullet changes or does not use; `restitution` is that of the surface."""
+        found = list(self._links[0].ignored(SURFACE, restitution))
+        for link in self._links[1:]:
+            name = link.element.attributes["name"]
+            found += [(f"{key} of {name}", setting, made) for key, setting, made in link.ignored(SURFACE, restitution)]
+        joints = [joint for joint in self._model.joints(self._name) if joint.attributes["type"] == "floating"]
+        return found + [("joint", joint.words, "a fixed joint") for joint in joints]
+
+
+def _bottom(parts: Sequence[Part]) -> Part:
+    """The geometry that is the lowest one in the file's pose, with the margins of convex hulls."""
+    state = np.concatenate([np.zeros(3), Z_TO_Y, np.zeros(6)])[np.newaxis]
+    return min(parts, key=lambda part: float(Support([part]).lowest(state)[0]) - MARGIN * (part.shape.shape == "mesh"))

@@ -1,0 +1,189 @@
+"""The links of a body as PyBullet loads them: mass, inertia and collision geometry in force, and what of the file is not in force."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from dropspin.comparisons.diagnosis.loose_body import Part, mesh_shape
+from dropspin.comparisons.diagnosis.pybullet_server import load, server
+from dropspin.comparisons.diagnosis.source import Element, Setting
+from dropspin.comparisons.diagnosis.urdf_file import UrdfFile
+from dropspin.comparisons.engines.pybullet_simulation import Z_TO_Y
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.bodies import Box, Capsule, Cylinder, Shape, Sphere
+from dropspin.scenarios.bodies.hull import convex_hull
+from dropspin.scenarios.rotations import conjugate, multiply, rotate
+from dropspin.scenarios.state import Array
+
+MARGIN = 1e-3  # m; what Bullet adds to convex hulls
+SAME = 0.01
+"""Relative difference up to which a moment of inertia is the one that was written."""
+OF_CONTACT = ("friction", "lateral_friction", "restitution", "rolling_friction", "spinning_friction")
+"""Elements that PyBullet reads within <contact> alone."""
+Ignored = tuple[str, Setting, str]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link, with its centre of mass and its inertial frame in the frame of the body's first link.
+
+    Attributes:
+        element: The link in the file.
+        dynamics: What PyBullet's getDynamicsInfo returns.
+        geometry: What PyBullet's getCollisionShapeData returns.
+        position: The centre of mass [m], shape (3,).
+        turn: The rotation of the inertial frame, shape (4,).
+    """
+
+    element: Element
+    dynamics: Sequence[Any]
+    geometry: Sequence[Any]
+    position: Array
+    turn: Array
+
+    @property
+    def mass(self) -> float:
+        """[kg]."""
+        return float(self.dynamics[0])
+
+    @property
+    def restitution(self) -> float:
+        """The coefficient of restitution, which Bullet multiplies with that of the surface."""
+        return float(self.dynamics[5])
+
+    @property
+    def inertia(self) -> Array:
+        """The inertia about the centre of mass [kg m²], shape (3, 3)."""
+        return self._turned(np.diag(self.dynamics[2]))
+
+    @property
+    def written(self) -> Array | None:
+        """The inertia that the file has [kg m²], shape (3, 3); None if it has none."""
+        element = next(self.element.every("inertia"), None)
+        if element is None:
+            return None
+        xx, yy, zz, xy, xz, yz = (element.number(name, 0.0) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+        return self._turned(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+
+    def _turned(self, tensor: Array) -> Array:
+        axes = rotate(self.turn, np.eye(3)).T
+        turned: Array = axes @ tensor @ axes.T
+        return turned
+
+    def parts(self, file: UrdfFile, centre: Array) -> Iterator[Part]:
+        """The geometries that collide, relative to the body's centre of mass."""
+        for element, part in self._placed(file, centre, "collision", self.geometry, (self.position, self.turn)):
+            if part is None:
+                raise DropspinError(f"{file.given}: line {element.line}: a geometry that is not a solid of finite size.")
+            yield part
+
+    def visual_parts(self, file: UrdfFile, centre: Array) -> Iterator[Part]:
+        """The solid visual geometries, relative to the body's centre of mass."""
+        turn = multiply(self.turn, conjugate(np.array(self.dynamics[4])))
+        frame = self.position - rotate(turn, np.array(self.dynamics[3])), turn
+        for _, part in self._placed(file, centre, "visual", _visual(file, self.element), frame):
+            if part is not None:
+                yield part._replace(collides=False)
+
+    def _placed(
+        self, file: UrdfFile, centre: Array, tag: str, geometry: Sequence[Any], frame: tuple[Array, Array]
+    ) -> Iterator[tuple[Element, Part | None]]:
+        """Geometries that PyBullet has in a frame, each with its element in the file; None for one that is not a solid."""
+        origin, turn = frame
+        for (_, _, kind, sizes, _, place, own), element in zip(geometry, self.element.every(tag), strict=True):
+            shape, turns = _shape(file, kind, sizes, element), multiply(turn, np.array(own))
+            if shape is None:
+                yield element, None
+                continue
+            position = origin + rotate(turn, np.array(place)) - centre + rotate(turns, shape.centre)
+            name = element.attributes.get("name", self.element.attributes["name"])
+            along = multiply(turns, conjugate(Z_TO_Y)) if isinstance(shape, Capsule | Cylinder) else turns
+            yield element, Part(name, shape, position, along)
+
+    def ignored(self, surface: str, restitution: float) -> Iterator[Ignored]:
+        """What the file says of the link and PyBullet changes or does not use.
+
+        Args:
+            surface: The surface's name.
+            restitution: That of the surface.
+        """
+        written = self.written
+        if written is None:
+            yield "inertial", Setting("no inertial", self.element.file, self.element.line), f"{self.mass:g} kg"
+        elif np.abs(written - self.inertia).max() > SAME * np.abs(written).max():
+            moments = ", ".join(f"{moment:.3g}" for moment in self.dynamics[2])
+            made = f"that of the bounding box of the collision geometry: {moments} kg m²"
+            yield "inertia", next(self.element.every("inertia")).words, made
+        for element in self.element.every(*OF_CONTACT):
+            is_read = element.parent is not None and element.parent.tag == "contact"
+            if not is_read:
+                yield element.tag, element.words, "not read, because it is not within <contact>"
+            elif element.tag == "restitution" and self.restitution * restitution != self.restitution:
+                yield element.tag, element.words, f"{self.restitution * restitution:g}, the product with {restitution:g} of {surface}"
+        for collision in self.element.every("collision"):
+            for element in collision.every("cylinder"):
+                yield "cylinder", element.words, f"the convex hull of 64 points, with a margin of {MARGIN:g} m"
+        if not self.geometry and next(self.element.every("visual"), None) is not None:
+            yield "collision", self.element.words, "nothing that collides"
+
+
+def read_links(file: UrdfFile, body: int) -> list[Link]:
+    """The links of a body that was just loaded, so that the frame of the first one is that of the world."""
+    bullet, found = server(), []
+    for number in range(-1, bullet.getNumJoints(body)):
+        if number < 0:
+            name, pose = bullet.getBodyInfo(body)[0], bullet.getBasePositionAndOrientation(body)
+        else:
+            name, pose = bullet.getJointInfo(body, number)[12], bullet.getLinkState(body, number, computeForwardKinematics=True)
+        read = bullet.getDynamicsInfo(body, number), bullet.getCollisionShapeData(body, number)
+        found.append(Link(file.links[name.decode()], *read, np.array(pose[0]), np.array(pose[1])))
+    return found
+
+
+@cache
+def _visual(file: UrdfFile, link: Element) -> Sequence[Any]:
+    """The visual geometries of a link, as PyBullet has them if they collide."""
+    text = "".join(
+        file.written(element).replace("<visual", "<collision").replace("</visual", "</collision") for element in link.every("visual")
+    )
+    number = load(file.given, f'<robot name="visual"><link name="visual">{text}</link></robot>')
+    found: Sequence[Any] = server().getCollisionShapeData(number, -1)
+    server().removeBody(number)
+    return found
+
+
+def _shape(file: UrdfFile, kind: int, sizes: Sequence[float], element: Element) -> Shape | None:
+    """A geometry as a shape, None if it is not a solid of finite size; `sizes` are those that PyBullet has."""
+    bullet = server()
+    solid: dict[str, Any] = {"mass": 1.0, "inertia": "solid"}
+    used = [abs(size) for size in sizes[: {bullet.GEOM_SPHERE: 1, bullet.GEOM_CAPSULE: 2}.get(kind, 3)]]
+    if not all(0.0 < size < math.inf for size in used):
+        return None
+    if kind == bullet.GEOM_SPHERE:
+        return Sphere(shape="sphere", radius=used[0], **solid)
+    if kind == bullet.GEOM_BOX:
+        return Box(shape="box", half_extents=(0.5 * used[0], 0.5 * used[1], 0.5 * used[2]), **solid)
+    if kind == bullet.GEOM_CAPSULE:
+        return Capsule(shape="capsule", half_length=0.5 * used[0], radius=used[1], **solid)
+    return _hull(file, element) if kind == bullet.GEOM_MESH else None
+
+
+@cache
+def _hull(file: UrdfFile, element: Element) -> Shape | None:
+    """The convex hull that PyBullet makes of a mesh or a cylinder, for which a body that has it alone is loaded; None if it is flat."""
+    bullet, geometry = server(), file.written(next(element.every("geometry")))
+    number = load(file.given, f'<robot name="hull"><link name="hull"><collision>{geometry}</collision></link></robot>')
+    points = np.array(bullet.getMeshData(number, -1)[1])
+    bullet.removeBody(number)
+    hull = convex_hull(points) if len(points) > 3 else None
+    if hull is None:
+        return None
+    faces = hull.simplices.astype(np.int64)
+    outward = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    inside_out = np.sum(outward * hull.equations[:, :3], axis=1) < 0.0
+    faces[inside_out] = faces[inside_out, ::-1]
+    return mesh_shape(points, faces)

@@ -1,0 +1,97 @@
+"""A URDF file: its links, what is fixed to what, and a file of one link that is cut loose."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from dropspin.comparisons.diagnosis.source import Element, read_source
+from dropspin.scenarios import DropspinError
+from dropspin.scenarios.errors import UnknownName
+
+FIXED = ("fixed", "floating")
+"""Types of joints of which PyBullet makes fixed ones."""
+
+
+class UrdfFile:
+    """A URDF file.
+
+    Args:
+        path: The file.
+        given: Its name for messages.
+
+    Raises:
+        DropspinError: It is no URDF file, or not one link of it is the root.
+    """
+
+    def __init__(self, path: Path, given: str) -> None:
+        self.path, self.given = path, given
+        source = read_source(path)
+        self.links = {link.attributes.get("name", ""): link for link in source.children if link.tag == "link"}
+        self._parents = {_end(joint, "child"): joint for joint in source.children if joint.tag == "joint"}
+        roots = [name for name in self.links if name not in self._parents]
+        if len(roots) != 1:  # PyBullet ends the process
+            raise DropspinError(f"{given}: has {len(roots)} links without a parent ({', '.join(roots[:5])}); a URDF file has one.")
+
+    @cached_property
+    def heads(self) -> dict[str, list[str]]:
+        """The root and the links that move against their parents, each with the links that are fixed to it."""
+        found: dict[str, list[str]] = {}
+        for name in self.links:
+            head = name
+            for _ in self.links:
+                joint = self._parents.get(head)
+                if joint is None or joint.attributes.get("type") not in FIXED:
+                    break
+                head = _end(joint, "parent")
+            found.setdefault(head, []).append(name)
+        return found
+
+    def bodies(self, wanted: Sequence[str], loose: bool) -> list[str]:
+        """The names of the bodies that are free, or that are asked for, or of all that move.
+
+        Raises:
+            UnknownName: There is no such body.
+            DropspinError: No body is free.
+        """
+        for name in wanted:
+            if name not in self.heads:
+                raise UnknownName("the model's body", name, self.heads)
+        if not wanted and not loose and len(self.heads) > 1:
+            raise DropspinError(f"no body is free: {', '.join(self.heads)} are joined; name one with --body, or give --loose.")
+        found = list(wanted) or [name for name in self.heads if _is_heavy(self.links[name])]
+        if not found:
+            raise DropspinError(f"{self.given}: no link that moves has mass, so that PyBullet holds them still.")
+        return found
+
+    def joints(self, head: str) -> list[Element]:
+        """The joints between a body and the links that are fixed to it."""
+        return [self._parents[name] for name in self.heads[head] if name != head]
+
+    def cut_loose(self, head: str) -> str:
+        """A URDF file of a body and of what is fixed to it, with the meshes' absolute paths."""
+        links = [self.links[name] for name in self.heads[head]]
+        return f'<robot name="loose">{"".join(map(self.written, [*links, *self.joints(head)]))}</robot>'
+
+    def written(self, element: Element) -> str:
+        """An element as XML, without materials, which may refer to others."""
+        values = {key: self._mesh(text) if key == "filename" else text for key, text in element.attributes.items()}
+        within = "".join(self.written(child) for child in element.children if child.tag != "material")
+        return f"<{element.tag} {' '.join(f'{key}={quoteattr(text)}' for key, text in values.items())}>{within}</{element.tag}>"
+
+    def _mesh(self, filename: str) -> str:
+        """The path of a mesh, looked for as PyBullet does: in the folders above the file."""
+        name = filename.removeprefix("package://").removeprefix("model://")
+        places = [Path.cwd(), *self.path.resolve().parents]
+        return next((str(place / name) for place in places if (place / name).is_file()), name)
+
+
+def _end(joint: Element, which: str) -> str:
+    """The parent or the child of a joint."""
+    return next((end.attributes.get("link", "") for end in joint.every(which)), "")
+
+
+def _is_heavy(link: Element) -> bool:
+    """Whether PyBullet gives a link mass: 1 kg if none is written."""
+    mass = next(link.every("mass"), None)
+    return mass.number("value", 1.0) > 0.0 if mass is not None else link.attributes.get("name") != "world"

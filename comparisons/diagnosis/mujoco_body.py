@@ -250,7 +250,7 @@ class MuJoCoBody(LooseBody):
             armature=self._armature,
             lifted=float(old.body_gravcomp[head]),
             unknown=self._unknown_forces(),
-            surface="" if touching is None else next(key for key, geom in file.names(GEOM, old.ngeom).items() if geom == self._surface),
+            surface="" if touching is None or self._surface is None else self._names[self._surface],
             friction=0.0 if touching is None or touching["condim"] == 1 else float(touching["friction"][0]),
             restitution=None,
             margin=0.0 if touching is None else float(touching["margin"] - touching["gap"]),
@@ -284,11 +284,12 @@ class MuJoCoBody(LooseBody):
             position = position + rotate(turn, shape.centre)
         if isinstance(shape, Capsule | Cylinder):  # along y here, along z there
             turn = multiply(turn, np.roll(UPWARD, -1))
-        return Part(self._name_of(number), shape, position, turn)
+        geom = int(model.geom(number).name.split()[1])
+        return Part(self._names[geom], shape, position, turn, not self._pairs or geom in self._pairs)
 
-    def _name_of(self, number: int) -> str:
-        geom = int(self._alone.geom(number).name.split()[1])
-        return next(name for name, one in self._file.names(GEOM, self._file.model.ngeom).items() if one == geom)
+    @cached_property
+    def _names(self) -> list[str]:
+        return list(self._file.names(GEOM, self._file.model.ngeom))
 
     def _unknown_forces(self) -> Setting | None:
         """The setting of a fluid or of dry friction in the joint, if there is one."""
@@ -318,10 +319,11 @@ class MuJoCoBody(LooseBody):
             return 0
         model = self._built(self._file.model.opt.timestep, np.zeros(3), True)
         data, size = mujoco.MjData(model), float(model.stat.extent)
-        parts = [self._part(number) for number in range(self._alone.ngeom)]
+        parts = [part for number in range(self._alone.ngeom) if (part := self._part(number)).collides]
         data.qpos[:] = [*(-rotate(pose, self._offset)), *np.roll(pose, 1)]
         data.qpos[1] -= Support(parts).lowest(np.concatenate([np.zeros(3), pose, np.zeros(6)])[np.newaxis])[0] + FLAT * size
-        mujoco.mj_forward(model, data)
+        with quiet():
+            mujoco.mj_forward(model, data)
         places = data.contact.pos[:, [0, 2]]
         is_even = len(places) > 0 and bool(np.abs(places.mean(axis=0)).max() < 1e-6 * size)
         return len(places) if is_even and np.ptp(np.linalg.norm(places, axis=1)) < 1e-6 * size else 0

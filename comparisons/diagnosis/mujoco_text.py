@@ -101,18 +101,10 @@ class BodyText:
         if self._file.is_urdf:
             element = self.element
             if self._file.model.body_weldid[self._head] == 0:
-                yield "base", element_words(element), "welded to the world"
+                yield "base", Setting("the root link") if element is None else element.words, "welded to the world"
             for tag in ("restitution", "rolling_friction", "spinning_friction"):
                 for found in [] if element is None else element.every(tag):
-                    yield tag, element_words(found), "not read"
-
-
-def element_words(element: Element | None) -> Setting:
-    """An element as a setting."""
-    if element is None:
-        return Setting("the root link")
-    value = "".join(f' {name}="{text}"' for name, text in element.attributes.items())
-    return Setting(f"<{element.tag}{value}>", element.file, element.line)
+                    yield tag, found.words, "not read"
 
 
 def digits(values: Sequence[float]) -> str:

@@ -13,7 +13,7 @@ from dropspin.comparisons.diagnosis.questions import Answer
 from dropspin.comparisons.diagnosis.study import BodyDiagnosis, Diagnosis
 from dropspin.reports.document import Charts, Document, Heading, Paragraph, Part, Sentences, Table
 from dropspin.reports.plots.chart import Chart, Line
-from dropspin.reports.stories.numbers import formatted, in_ms, with_unit
+from dropspin.reports.stories.numbers import formatted, grouped, in_ms, with_unit
 from dropspin.reports.stories.study import Study
 from dropspin.scenarios.text import counted
 
@@ -49,18 +49,19 @@ class Diagnosed(Study):
         return found
 
     def document(self) -> Document:
-        """The answers of one body or a table of several, the findings, and the difference between two engines."""
+        """The answers of one body, or a table of several; what differs between engines; and the findings."""
         bodies, parts = self.diagnosis.bodies, list[Part]()
-        by_name = {name: list(group) for name, group in groupby(sorted(bodies, key=lambda body: body.name), lambda body: body.name)}
-        is_short = len(bodies) > 2
-        if is_short:
+        by_name = grouped(bodies, lambda body: body.name)
+        if len(by_name) > 1:
             parts.append(Table([_overview(body) for body in bodies], ["mass", "lands on"]))
+        for of_name in by_name.values():
+            for body in of_name:
+                parts += _body_parts(body, on_terminal=len(bodies) == 1)
+            if len(of_name) > 1:
+                is_alone = len(by_name) == 1
+                parts += [Heading(f"{of_name[0].name}: the engines differ"), Table(differences(of_name), on_terminal=is_alone)]
+        if len(bodies) > 1:
             parts.append(Sentences(of_several(bodies), on_page=False))
-        for group in by_name.values():
-            for body in group:
-                parts += _body_parts(body, on_terminal=not is_short)
-            if len(group) > 1:
-                parts += [Heading(f"{group[0].name}: the engines differ"), Table(differences(group))]
         return Document(f"Diagnosis of {self.diagnosis.file}", parts, [Paragraph(summary(self.diagnosis))])
 
 
@@ -82,12 +83,14 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
 
 
 def of_several(bodies: Sequence[BodyDiagnosis]) -> list[str]:
-    """The findings of several bodies; those with the same finding together."""
-    names: dict[str, list[str]] = {}
+    """The findings of several bodies, or of one in several engines; those with the same finding together."""
+    owners: dict[str, list[str]] = {}
+    engines, names = {body.engine for body in bodies}, {body.name for body in bodies}
     for body in bodies:
-        for sentence in sentences(body):
-            names.setdefault(sentence, []).append(body.name)
-    return [f"{_listed(owners)}: {sentence}" for sentence, owners in names.items()]
+        owner = " ".join([body.name] * (len(names) > 1) + [body.engine.split()[0]] * (len(engines) > 1))
+        for sentence in [f"{body.breakdown}."] if body.breakdown else sentences(body):
+            owners.setdefault(sentence, []).append(owner)
+    return [f"{_listed(of_sentence)}: {sentence}" for sentence, of_sentence in owners.items()]
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -215,7 +218,7 @@ def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
     """The answers in which engines differ, a column for each."""
     by_quantity: dict[str, dict[str, str]] = {}
     for body in bodies:
-        for answer in body.answers:
+        for answer in (one for one in body.answers if one.question != "file"):
             row = by_quantity.setdefault(f"{answer.question}: {answer.quantity}", {})
             row[f"{body.engine.split()[0]}, {in_ms(body.dt)}"] = _cells(answer)[0] or _value(answer.in_force, answer.unit)
     engines = [f"{body.engine.split()[0]}, {in_ms(body.dt)}" for body in bodies]

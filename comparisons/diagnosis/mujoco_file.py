@@ -43,17 +43,8 @@ class MuJoCoFile:
         self.is_urdf = self.source.tag == "robot"
         self.refusal = ""
         try:
-            self._spec = mujoco.MjSpec.from_file(str(path))
-            if self.is_urdf:  # the root link would become a part of the world
-                self._spec.compiler.fusestatic = False
-            self._spec.worldbody.add_geom(name=ADDED, type=PLANE, size=[0.0, 0.0, 1.0])
-            try:
-                self.model = self._spec.compile()
-            except ValueError as error:
-                if "balanceinertia" not in str(error):
-                    raise
-                self.refusal, self._spec.compiler.balanceinertia = one_line(error), True
-                self.model = self._spec.compile()
+            with quiet():
+                self.model = self._compiled(path)
         except (ValueError, mujoco.FatalError) as error:
             raise DropspinError(f"{given}: MuJoCo does not compile it: {one_line(error)}.") from None
         self.data = mujoco.MjData(self.model)
@@ -61,6 +52,20 @@ class MuJoCoFile:
         flags, bit = self.model.opt.disableflags, mujoco.mjtDisableBit
         self.gravity = np.zeros(3) if flags & bit.mjDSBL_GRAVITY else np.array(self.model.opt.gravity)
         self.has_contacts = not flags & (bit.mjDSBL_CONTACT | bit.mjDSBL_CONSTRAINT)
+
+    def _compiled(self, path: Path) -> Any:
+        """The model, with an additional plane; an impossible inertia is balanced, and `refusal` has MuJoCo's reason."""
+        self._spec = mujoco.MjSpec.from_file(str(path))
+        if self.is_urdf:  # the root link would become a part of the world
+            self._spec.compiler.fusestatic = False
+        self._spec.worldbody.add_geom(name=ADDED, type=PLANE, size=[0.0, 0.0, 1.0])
+        try:
+            return self._spec.compile()
+        except ValueError as error:
+            if "balanceinertia" not in str(error):
+                raise
+            self.refusal, self._spec.compiler.balanceinertia = one_line(error), True
+            return self._spec.compile()
 
     def names(self, kind: Any, number: int) -> dict[str, int]:
         """The numbers of objects by name; one without a name is called by its kind and number."""

@@ -12,17 +12,19 @@ from dropspin.scenarios.bodies.possible_moments import largest_multiple
 from dropspin.scenarios.state import Array
 
 ROUNDING = 1.001  # moments are often given with three or four digits
+SMALL = 1e-3
+"""Share of the largest moment below which products of inertia are left out."""
 
 
 def inertia(facts: Facts) -> list[Answer]:
     """The moments in force beside those of a solid; what is impossible in those of the file, or of the engine if the file has none."""
     solid, answers = facts.solid, list(_impossible(facts, facts.inertia if facts.written is None else facts.written))
     if solid is not None:
-        text = f"the inertia of a solid, {', '.join(f'{value:.3g}' for value in np.linalg.eigvalsh(solid))} kg m²"
+        text = f"the inertia of a uniform solid, {_components(solid)}"
         answers = [replace(answer, remedies=(Remedy(text),)) for answer in answers]
     for number, axis in enumerate(facts.principal[1].T):
         of_solid = np.nan if solid is None else float(axis @ solid @ axis)
-        answers.append(Answer("inertia", f"moment {number + 1}", "kg m²", facts.principal[0][number], physical=of_solid))
+        answers.append(Answer("inertia", f"principal moment {number + 1}", "kg m²", facts.principal[0][number], physical=of_solid))
     return answers
 
 
@@ -31,12 +33,22 @@ def _impossible(facts: Facts, given: Array) -> Iterator[Answer]:
     least, middle, largest = np.linalg.eigvalsh(given).tolist()
     common: dict[str, Any] = {"unit": "1", "physical": 1.0, "finding": "impossible", "settings": ("inertia",)}
     if least <= 0.0 or largest > ROUNDING * (least + middle):
-        yield Answer("inertia", "largest moment / sum of others", measured=largest / (least + middle), **common)
+        yield Answer("inertia", "largest moment / sum of others", measured=largest / (least + middle), detail="any body", **common)
     elif facts.parts:
         squares = (0.5 * np.trace(given) * np.eye(3) - given) / facts.mass
         excess = 1.0 / largest_multiple(facts.points, squares, 1.0 / ROUNDING)
         if excess > ROUNDING:
-            yield Answer("inertia", "largest moment / possible", measured=max(1.0, largest / largest_possible(facts, given)), **common)
+            excess = max(1.0, largest / largest_possible(facts, given))
+            yield Answer("inertia", "largest moment / largest possible", measured=excess, detail="this mass and shape", **common)
+
+
+def _components(tensor: Array) -> str:
+    """A tensor [kg m²], shape (3, 3), about the body's axes; without its products where they are small."""
+    found = f"ixx, iyy, izz = {', '.join(f'{value:.3g}' for value in np.diag(tensor))}"
+    products = tensor[[0, 0, 1], [1, 2, 2]]
+    if np.abs(products).max() > SMALL * tensor.max():
+        found += f", ixy, ixz, iyz = {', '.join(f'{value:.3g}' for value in products)}"
+    return f"{found} kg m²"
 
 
 def largest_possible(facts: Facts, tensor: Array) -> float:

@@ -39,7 +39,7 @@ class MuJoCoFile:
     """
 
     def __init__(self, path: Path, given: str) -> None:
-        self.source = read_source(path)
+        self.source, self.given = read_source(path), given
         self.is_urdf = self.source.tag == "robot"
         self.refusal = ""
         try:
@@ -93,8 +93,10 @@ class MuJoCoFile:
         heavy = [name for name, body in self.heads.items() if sum(self.model.body_mass[one] for one in self.group(body)) > 0.0]
         found = wanted or [name for name in heavy if loose or self.is_free(self.heads[name]) or (self.is_urdf and len(heavy) == 1)]
         if not found:
-            there = f"the bodies {', '.join(heavy)} move on joints" if heavy else "no body moves"
-            raise DropspinError(f"no body is free: {there}; name one with --body, or give --loose to cut each loose.")
+            if not heavy:
+                raise DropspinError(f"{self.given}: no body moves and has mass; give a body a free joint and a mass.")
+            there = f"{', '.join(heavy)} move on joints"
+            raise DropspinError(f"{self.given}: no body is free: {there}; name one with --body, or give --loose for all.")
         return list(found)
 
     def runs(self, dt: float, changes: Changes) -> bool:

@@ -74,8 +74,9 @@ class BodyText:
         inertial = next(body.every("inertial"), None)
         written = {name: [mjcf_setting(one, name) for one in elements if one is not None] for name, elements in places.items()}
         if inertial is not None:
-            inertial = next(inertial.every("inertia"), inertial)  # of URDF
-            written["inertia"] = [inertial.setting(name) for name in ("ixx", "diaginertia", "fullinertia", "mass")]
+            tensor = next(inertial.every("inertia"), None)  # of URDF
+            names = ("diaginertia", "fullinertia", "mass")
+            written["inertia"] = [inertial.setting(name) for name in names] if tensor is None else [tensor.words]
         for name, settings in written.items():
             first = next((setting for setting in settings if setting is not None), None)
             found |= {} if first is None else {name: first}
@@ -91,7 +92,7 @@ class BodyText:
         settings, written, root = self.settings, self.written, self._file.source
         if raised:
             constant = 2.0 * self._file.model.opt.timestep
-            yield "solref", settings.get("solref", Setting("solref")), f"its time constant is raised to {constant:g} s, two time steps"
+            yield "solref", settings.get("solref", Setting("solref")), f"raised to a time constant of {constant:g} s, two time steps"
         if written is not None:
             wanted, has = np.linalg.eigvalsh(written), np.linalg.eigvalsh(inertia)
             if np.abs(wanted - has).max() > SAME * np.abs(wanted).max():

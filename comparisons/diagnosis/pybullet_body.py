@@ -222,7 +222,7 @@ class PyBulletBody(LooseBody):
             name = link.element.attributes["name"]
             found += [(f"{key} of {name}", setting, made) for key, setting, made in link.ignored(SURFACE, restitution)]
         joints = [joint for joint in self._model.joints(self._name) if joint.attributes["type"] == "floating"]
-        return found + [("joint", joint.words, "a fixed joint") for joint in joints]
+        return found + [("joint", joint.words, "replaced by a fixed joint") for joint in joints]
 
 
 def _bottom(parts: Sequence[Part]) -> Part:

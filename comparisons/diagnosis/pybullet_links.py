@@ -116,19 +116,19 @@ class Link:
             yield "inertial", Setting("no inertial", self.element.file, self.element.line), f"{self.mass:g} kg"
         elif np.abs(written - self.inertia).max() > SAME * np.abs(written).max():
             moments = ", ".join(f"{moment:.3g}" for moment in self.dynamics[2])
-            made = f"that of the bounding box of the collision geometry: {moments} kg m²"
+            made = f"replaced by that of the bounding box of the collision geometry: {moments} kg m²"
             yield "inertia", next(self.element.every("inertia")).words, made
         for element in self.element.every(*OF_CONTACT):
             is_read = element.parent is not None and element.parent.tag == "contact"
             if not is_read:
                 yield element.tag, element.words, "not read, because it is not within <contact>"
             elif element.tag == "restitution" and self.restitution * restitution != self.restitution:
-                yield element.tag, element.words, f"{self.restitution * restitution:g}, the product with {restitution:g} of {surface}"
+                yield element.tag, element.words, f"is {self.restitution * restitution:g}, the product with {restitution:g} of {surface}"
         for collision in self.element.every("collision"):
             for element in collision.every("cylinder"):
-                yield "cylinder", element.words, f"the convex hull of 64 points, with a margin of {MARGIN:g} m"
+                yield "cylinder", element.words, f"replaced by the convex hull of 64 points, with a margin of {MARGIN:g} m"
         if not self.geometry and next(self.element.every("visual"), None) is not None:
-            yield "collision", self.element.words, "nothing that collides"
+            yield "collision", self.element.words, "missing: the link collides with nothing"
 
 
 def read_links(file: UrdfFile, body: int) -> list[Link]:

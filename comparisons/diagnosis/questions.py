@@ -76,7 +76,7 @@ class Answer:
         finding: The kind of finding; empty if it is none.
         settings: The names of the settings that cause it.
         remedies: What removes the finding.
-        detail: A sentence's part that explains a value that is not a number.
+        detail: A sentence's part that explains the value, or replaces one that is not a number.
     """
 
     question: str
@@ -128,7 +128,7 @@ def spin(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
             ends = [_turned(body, start, dt) for dt in dts]
             kept = [float(np.linalg.norm(end[SPIN])) / SPEED for end in ends]
             exact = [facts.spun(number, SPEED, TURN) / SPEED] * len(dts)
-            answers.append(judged(body, "spin", f"kept in 1 s {name}", "1", dts, kept, exact, 1.0))
+            answers.append(judged(body, "spin", f"fraction kept in 1 s {name}", "1", dts, kept, exact, 1.0))
     return answers
 
 
@@ -166,7 +166,7 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     steps = round(TURN / dts[0])
     after = facts.in_force(start, np.array([0.0, steps * dts[0]]), 0.0)[-1]
     exact = float(_energy_gain(body, start, after))
-    of_stated = judged(body, "tumble", f"energy in 1 s, {SPEED:g} rad/s", "%", dts, gains, [exact] * len(dts), free)
+    of_stated = judged(body, "tumble", f"energy change in 1 s, {SPEED:g} rad/s", "%", dts, gains, [exact] * len(dts), free)
     if of_stated.finding == "setting":  # of damping, which no direction and no step is without
         return [of_stated]
     tried = np.concatenate([DIRECTIONS[DIRECTIONS[:, 1] >= 0.0], DIAGONALS, [OBLIQUE]])
@@ -174,14 +174,14 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     by_direction = _energy_gain(body, starts, _turned(body, starts, dts[0]))
     worst = int(np.argmax(np.abs(by_direction)))
     turned = 2.0 * math.degrees(math.acos(min(1.0, abs(float(ends[0][ORIENTATION] @ after[ORIENTATION])))))
-    answers = [of_stated, Answer("tumble", "orientation error", "°", turned, in_force=0.0)]
-    answers += [Answer("tumble", f"worst, {_vector(tried[worst])}", "%", float(by_direction[worst]))]
+    answers = [of_stated, Answer("tumble", "attitude error", "°", turned, in_force=0.0)]
+    answers += [Answer("tumble", f"worst axis {_vector(tried[worst])}", "%", float(by_direction[worst]))]
     if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY or of_stated.finding:
         speed = _threshold(lambda w: _gain(body, facts.start(spin=w * (axes @ tried[worst])), dts[0]), SLOWEST, FASTEST)
-        answers.append(Answer("tumble", "1 % a second from", "rad/s", speed))
+        answers.append(Answer("tumble", "spin for 1 % in 1 s", "rad/s", speed))
     if of_stated.finding == "time step":
         step = _threshold(lambda dt: _gain(body, start, dt), 1e-2 * dts[0], dts[0])
-        answers.append(Answer("tumble", "1 % a second at dt =", "s", step))
+        answers.append(Answer("tumble", "dt for 1 % in 1 s", "s", step))
     return answers
 
 
@@ -256,11 +256,11 @@ def impact(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         )
         if speed == 1.0 and one is body:
             longest = float(np.max(times[0]))
-            detail = "does not leave" if math.isinf(longest) else ""
+            detail = f"> {WATCHED:g} s" if math.isinf(longest) else ""
             ratio = float(np.mean(upward[0]))
             ends = float(min(upward[0])), float(max(upward[0]))
-            at_1 = [Answer("impact", "fastest upward / impact speed at 1 m/s", "1", ratio, least=ends[0], most=ends[1])]
-            at_1 += [Answer("impact", "depth at 1 m/s", "m", float(np.max(depths[0])))]
+            at_1 = [Answer("impact", "largest upward / impact speed at 1 m/s", "1", ratio, least=ends[0], most=ends[1])]
+            at_1 += [Answer("impact", "penetration at 1 m/s", "m", float(np.max(depths[0])))]
             at_1.append(Answer("impact", "contact at 1 m/s", "s", longest, detail=detail))
     return answers + at_1
 
@@ -315,8 +315,8 @@ def rest(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     speed = float(np.linalg.norm(np.ptp(last[:, POSITION], axis=0))) / 0.5
     tipped = _tilt(states) > UNTURNED
     return [
-        Answer("rest", "depth", "m", depth, facts.rest_depth, 0.0, finding=finding, settings=("margin",) * floats),
-        Answer("rest", "drift", "m/s", speed, physical=0.0, detail="tips over" if tipped else ""),
+        Answer("rest", "penetration", "m", depth, facts.rest_depth, 0.0, finding=finding, settings=("margin",) * floats),
+        Answer("rest", "drift speed", "m/s", speed, physical=0.0, detail="tips over" if tipped else ""),
     ]
 
 
@@ -336,7 +336,7 @@ def slide(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         return []
     along, across = found
     answers = [
-        judged(body, "slide", f"stop from {SLIDE:g} m/s{name}", "m", dts, stops, [exact] * len(dts), free)
+        judged(body, "slide", f"stopping distance from {SLIDE:g} m/s{name}", "m", dts, stops, [exact] * len(dts), free)
         for name, stops in (("", along), (" at 45°", across))
     ]
     # Soft contacts take some time to carry a load that shifts: a shorter slide says more of that than of friction.
@@ -392,7 +392,7 @@ def _creep(body: LooseBody, dt: float) -> list[Answer]:
     half = len(states) // 2
     moved = float(np.linalg.norm((states[-1] - states[half])[POSITION]))
     speed = moved / (dt * (len(states) - 1 - half))
-    return [Answer("slide", f"creep on {math.degrees(slope):.3g}°", "m/s", speed, physical=0.0)]
+    return [Answer("slide", f"creep on a slope of {math.degrees(slope):.3g}°", "m/s", speed, physical=0.0)]
 
 
 def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
@@ -413,7 +413,7 @@ def roll(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
         start = end.copy()
         start[VELOCITY], start[SPIN] = [1.0, 0.0, 0.0], [0.0, 0.0, -1.0 / radius]
         kept.append(body.motions(start[np.newaxis], dt, round(1.0 / dt), -facts.gravity * UP, floor=True)[0, -1, VELOCITY][0])
-    name = "kept in 1 s, from 1 m/s"
+    name = "fraction kept in 1 s, from 1 m/s"
     if facts.rolling or not facts.friction:
         return [Answer("roll", name, "1", kept[0], physical=1.0)]
     heavy = facts.mass + facts.armature + (inertia + facts.armature) / radius**2

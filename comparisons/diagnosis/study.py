@@ -148,7 +148,7 @@ def diagnose(
     given, path, wanted = str(file), Path(file), [bodies] if isinstance(bodies, str) else list(bodies)
     ending = path.suffix.lower()
     if ending not in READERS:
-        raise DropspinError(f"{given}: a model is a file {', '.join(READERS)}.")
+        raise DropspinError(f"{given}: is not a model file; give one that ends in {', '.join(READERS)}.")
     chosen = [engines] if isinstance(engines, str) else list(engines) or list(READERS[ending])
     for engine in chosen:
         if engine not in READERS[ending]:
@@ -215,7 +215,7 @@ def _diagnosed(entry: EngineEntry, path: Path, given: str, name: str, on: str | 
     facts = body.facts
     answers = inertia(facts) + [answer for question in QUESTIONS for answer in _answers(body, question)]
     if facts.surface:
-        answers.append(Answer("friction", "coefficient of both together", "1", facts.friction))
+        answers.append(Answer("friction", "coefficient of the contact", "1", facts.friction))
     answers += [Answer("file", key, "", finding="changed", settings=(key,), detail=made) for key, _, made in facts.ignored]
     return BodyDiagnosis(
         name=name,

@@ -58,7 +58,8 @@ class UrdfFile:
             if name not in self.heads:
                 raise UnknownName("the model's body", name, self.heads)
         if not wanted and not loose and len(self.heads) > 1:
-            raise DropspinError(f"no body is free: {', '.join(self.heads)} are joined; name one with --body, or give --loose.")
+            joined = f"{', '.join(self.heads)} are joined"
+            raise DropspinError(f"{self.given}: no body is free: {joined}; name one with --body, or give --loose for all.")
         found = list(wanted) or [name for name in self.heads if _is_heavy(self.links[name])]
         if not found:
             raise DropspinError(f"{self.given}: no link that moves has mass, so that PyBullet holds them still.")

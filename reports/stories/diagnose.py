@@ -29,6 +29,10 @@ KINDS = {
 SEVERAL = re.compile(" about | at ")
 """What stands before the axis or the speed in a quantity."""
 MOST_NAMES = 4
+COLUMNS = (
+    "dt = …: measured at this time step. Exact: the exact solution with the damping, armature and margin in force. "
+    "Ideal: the exact solution without these. In parentheses: the range over eight phases of the impact within a time step."
+)
 SETTINGS = {"unknown": "a fluid or dry friction"}
 
 
@@ -52,6 +56,7 @@ class Diagnosed(Study):
         """The answers of one body, or a table of several; what differs between engines; and the findings."""
         bodies, parts = self.diagnosis.bodies, list[Part]()
         by_name = grouped(bodies, lambda body: body.name)
+        parts.append(Paragraph(COLUMNS, on_terminal=False))
         if len(by_name) > 1:
             parts.append(Table([_overview(body) for body in bodies], ["mass", "lands on"]))
         for of_name in by_name.values():
@@ -74,7 +79,7 @@ def _body_parts(body: BodyDiagnosis, *, on_terminal: bool) -> list[Part]:
     left = [f"Not modelled: {', '.join(body.unmodelled)} of the file."] if body.unmodelled else []
     drawn = charts(body)
     return [
-        Heading(body.name),
+        Heading(f"{body.name} in {body.engine.split()[0]}"),
         Paragraph(head, on_terminal=on_terminal),
         Table(answer_rows(body), on_terminal=on_terminal),
         Sentences([*sentences(body), *left], numbered=True, on_terminal=on_terminal),
@@ -115,7 +120,7 @@ def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
     moments = [answer for answer in body.answers if answer.question == "inertia" and answer.unit == "kg m²"]
     ratios = [formatted(answer.measured / answer.physical) for answer in moments]
     if moments:
-        rows.append(_row(body, "inertia", "moments / solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
+        rows.append(_row(body, "inertia", "moments / uniform solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
     shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
     shown = [answer for answer in shown if answer.question != "inertia" or answer.finding]
     for _, group in groupby(shown, lambda answer: (answer.question, _cells(answer), SEVERAL.split(answer.quantity)[0])):
@@ -126,7 +131,7 @@ def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
 
 
 def _row(body: BodyDiagnosis, question: str, quantity: str, measured: str, in_force: str, physical: str, cause: str) -> dict[str, str]:
-    cells = {f"at {in_ms(body.dt)}": measured, "with settings": in_force, "without": physical, "finding": cause}
+    cells = {f"dt = {in_ms(body.dt)}": measured, "exact": in_force, "ideal": physical, "finding": cause}
     return {"what": f"{question}: {quantity}", **cells}
 
 
@@ -176,7 +181,7 @@ def _remedies(answers: Sequence[Answer]) -> list[str]:
     """A sentence for each remedy of equal findings, with the values measured with it."""
     found = []
     for same in zip(*(answer.remedies for answer in answers), strict=True):
-        values = {_value(remedy.value, _unit_after(answer)): None for remedy, answer in zip(same, answers, strict=True)}
+        values = {_value_after(remedy.value, answer): None for remedy, answer in zip(same, answers, strict=True)}
         text = f"Remedy: {same[0].text}" if math.isnan(same[0].value) else f"Remedy, tried: {same[0].text} gives {', '.join(values)}"
         if same[0].others or not same[0].runs:
             others, runs = counted(same[0].others, "other body", "other bodies"), "runs" if same[0].runs else "breaks down"
@@ -193,15 +198,15 @@ def grouped_quantities(answers: Sequence[Answer]) -> dict[str, list[str]]:
     return found
 
 
-def _unit_after(answer: Answer) -> str:
-    """The unit of a value that was measured with a remedy: a spin that does not decay has no time to 1/e, but a share that is kept."""
-    return "1" if answer.unit == "s" and answer.question == "spin" else answer.unit
+def _value_after(value: float, answer: Answer) -> str:
+    """A value that was measured with a remedy: a spin that does not decay has no time to 1/e, but a fraction that is kept."""
+    return f"a fraction of {value:.4g} kept in 1 s" if answer.unit == "s" and answer.question == "spin" else _value(value, answer.unit)
 
 
 def _told(answer: Answer) -> str:
     measured, in_force, physical = _cells(answer)
     if answer.finding == "impossible":
-        return f"is {measured}, and at most 1 for a body of this shape"
+        return f"is {measured}, but at most 1 for {answer.detail}"
     if answer.finding in ("changed", "target"):
         return f"{measured} ({answer.detail})" if measured and measured != answer.detail else answer.detail
     wanted = in_force if answer.finding in ("time step", "model") and in_force else physical
@@ -220,8 +225,8 @@ def differences(bodies: Sequence[BodyDiagnosis]) -> list[dict[str, str]]:
     for body in bodies:
         for answer in (one for one in body.answers if one.question != "file"):
             row = by_quantity.setdefault(f"{answer.question}: {answer.quantity}", {})
-            row[f"{body.engine.split()[0]}, {in_ms(body.dt)}"] = _cells(answer)[0] or _value(answer.in_force, answer.unit)
-    engines = [f"{body.engine.split()[0]}, {in_ms(body.dt)}" for body in bodies]
+            row[f"{body.engine.split()[0]}, dt = {in_ms(body.dt)}"] = _cells(answer)[0] or _value(answer.in_force, answer.unit)
+    engines = [f"{body.engine.split()[0]}, dt = {in_ms(body.dt)}" for body in bodies]
     rows = [{"what": what, **{engine: row.get(engine, "–") for engine in engines}} for what, row in by_quantity.items()]
     return [row for row in rows if len({row[engine] for engine in engines}) > 1]
 
@@ -236,14 +241,14 @@ def summary(diagnosis: Diagnosis) -> str:
 
 
 def charts(body: BodyDiagnosis) -> list[Chart]:
-    """The rebound over the impact speed, with its range over start phases."""
+    """The rebound over the impact speed, with its range over start phases, if there is a rebound."""
     impacts = [answer for answer in body.answers if answer.question == "impact" and answer.quantity.startswith("rebound")]
-    if not impacts:
+    if not any(answer.most > 0.0 for answer in impacts):
         return []
     speeds = np.array([float(answer.quantity.split()[-2]) for answer in impacts])
     lines = [
         Line(
-            f"at {in_ms(body.dt)}",
+            f"dt = {in_ms(body.dt)}",
             speeds,
             np.array([answer.measured for answer in impacts]),
             marker="o",

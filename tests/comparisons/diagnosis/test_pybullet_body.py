@@ -118,8 +118,8 @@ def test_an_inertia_that_is_not_in_force_is_named(tmp_path):
     np.testing.assert_allclose(block.facts.principal[0], [0.05 / 12 * s for s in (0.0034, 0.0234, 0.025)])
     [(name, setting, made)] = block.facts.ignored
     assert (name, setting.file, setting.line) == ("inertia", "model.urdf", 1)
-    assert made == "that of the bounding box of the collision geometry: 1.42e-05, 9.75e-05, 0.000104 kg m²"
-    assert named(inertia(block.facts), "largest moment / possible").measured == pytest.approx(3200.0)
+    assert made == "replaced by that of the bounding box of the collision geometry: 1.42e-05, 9.75e-05, 0.000104 kg m²"
+    assert named(inertia(block.facts), "largest moment / largest possible").measured == pytest.approx(3200.0)
     np.testing.assert_allclose(block.changed({"inertia": "file"}).facts.inertia, np.eye(3))
     same = body(tmp_path, link(BOX, "1", (0.0034 / 12, 0.0234 / 12, 0.025 / 12)))
     assert same.facts.ignored == []
@@ -134,7 +134,7 @@ def test_restitution_is_the_product_with_that_of_the_plane(tmp_path):
     assert ball.facts.restitution == 0.0
     [(name, setting, made)] = ball.facts.ignored
     assert (name, str(setting)) == ("restitution", '<restitution value="0.5"> (model.urdf, line 2)')
-    assert made == "0, the product with 0 of plane.urdf"
+    assert made == "is 0, the product with 0 of plane.urdf"
     assert ball.changed({"restitution": 1.0}).facts.ignored == []
     answers = impact(ball, DTS[:1])
     assert named(answers, "rebound / impact speed at 3 m/s").measured == 0.0
@@ -215,7 +215,7 @@ def test_what_pybullet_does_not_use_is_named(tmp_path):
     assert {name: made for name, _, made in odd.facts.ignored if name != "inertia"} == {
         "lateral_friction": "not read, because it is not within <contact>",
         "inertial of b": "1 kg",
-        "joint": "a fixed joint",
+        "joint": "replaced by a fixed joint",
     }
 
 

@@ -1,11 +1,15 @@
 """`dropspin diagnose`: a table of several bodies, files, targets, exit codes and wrong files."""
 
 import json
+import re
+import shutil
+from pathlib import Path
 
 import pandas as pd
 import pytest
 from support.cli import dropspin
 
+DOCS = Path(__file__).parents[3] / "docs"
 WORLD = """<mujoco model="two"><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
 <body name="heavy" pos="0 0 1"><freejoint/><inertial pos="0 0 0" mass=".1" diaginertia="1 1 1"/><geom type="box" size=".05 .05 .05"/></body>
 <body name="damped" pos="1 0 1"><joint type="free" damping=".01"/><geom size=".05"/></body>
@@ -27,7 +31,8 @@ def test_table_findings_and_files_of_several_bodies(model):
     assert "arm" in lines[3]
     [impossible] = [line for line in lines if line.startswith("heavy: Inertia, impossible")]
     assert 'diaginertia="1 1 1" (two.xml, line 2)' in impossible
-    assert any(line.startswith("damped: Spin, setting:") and "Remedy, tried: <freejoint/> gives 1." in line for line in lines)
+    [spin] = [line for line in lines if line.startswith("damped: Spin, setting:")]
+    assert spin.endswith("Remedy, tried: <freejoint/> gives a fraction of 1 kept in 1 s.")
     folder = model / "out/diagnosis"
     assert {"report.html", "diagnosis.json", "diagnosis.csv", "diagnosis.md", "diagnosis.parquet"} <= {
         path.name for path in folder.iterdir()
@@ -54,7 +59,7 @@ def test_one_body_has_its_answers_and_a_missed_target_fails(model):
     ("arguments", "message"),
     [
         (["none.xml"], "none.xml: No such file"),
-        (["."], "a model is a file"),
+        (["."], "is not a model file"),
         (["two.xml", "-e", "wang"], "wang does not read .xml files; use mujoco"),
         (["two.xml", "--body", "heavi"], "heavy"),
         (["two.xml", "--on", "flor"], "floor"),
@@ -71,6 +76,18 @@ def test_wrong_file_or_name_ends_in_one_line(model, arguments, message):
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [("cup.xml",), ("brick.urdf", "-e", "mujoco")])
+def test_page_shows_what_the_command_prints(tmp_path, arguments):
+    page = (DOCS / "diagnose.md").read_text(encoding="utf-8")
+    shutil.copy(DOCS / "diagnose" / arguments[0], tmp_path)
+    done = dropspin("diagnose", *arguments, cwd=tmp_path, COLUMNS="200")
+    printed = " ".join(done.stdout.split())
+    section = page.partition(f"`dropspin diagnose {' '.join(arguments)}` prints")[2].partition("\n## ")[0]
+    shown = [line for block in re.findall(r"^```text\n(.*?)^```$", section, re.DOTALL | re.MULTILINE) for line in block.splitlines()]
+    assert len(shown) >= 4
+    assert [line for line in shown if " ".join(line.split()) not in printed] == []
 
 
 def test_mesh_is_a_solid_of_a_density(tmp_path):

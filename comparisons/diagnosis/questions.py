@@ -178,10 +178,10 @@ def tumble(body: LooseBody, dts: Sequence[float]) -> list[Answer]:
     answers += [Answer("tumble", f"worst axis {_vector(tried[worst])}", "%", float(by_direction[worst]))]
     if abs(by_direction[worst] - exact) > 100.0 * NOTEWORTHY or of_stated.finding:
         speed = _threshold(lambda w: _gain(body, facts.start(spin=w * (axes @ tried[worst])), dts[0]), SLOWEST, FASTEST)
-        answers.append(Answer("tumble", "spin for 1 % in 1 s", "rad/s", speed))
+        answers.append(Answer("tumble", "spin for 1 %", "rad/s", speed))
     if of_stated.finding == "time step":
         step = _threshold(lambda dt: _gain(body, start, dt), 1e-2 * dts[0], dts[0])
-        answers.append(Answer("tumble", "dt for 1 % in 1 s", "s", step))
+        answers.append(Answer("tumble", "dt for 1 %", "s", step))
     return answers
 
 

@@ -13,10 +13,10 @@ from dropspin.reports.commands.options import POSITIVE, as_json, engines_option,
 @engines_option
 @click.option("--body", "bodies", multiple=True, metavar="NAME", help="A body to diagnose; repeat for more. [default: all that are free]")
 @click.option("--on", metavar="GEOM", help="The plane or box that it lands on. [default: the first that it collides with]")
-@click.option("--loose", is_flag=True, help="Cut links loose that move on joints.")
+@click.option("--loose", is_flag=True, help="Also diagnose links on joints, each cut from its joint.")
 @click.option("--density", default=1000.0, type=POSITIVE, metavar="KG/M3", help="Density of a mesh.")
-@click.option("--restitution", type=click.FloatRange(0.0, 1.0), metavar="E", help="The coefficient of restitution that is wanted.")
-@click.option("--friction", type=POSITIVE, metavar="MU", help="The coefficient of friction that is wanted.")
+@click.option("--restitution", type=click.FloatRange(0.0, 1.0), metavar="E", help="Target for the coefficient of restitution.")
+@click.option("--friction", type=POSITIVE, metavar="MU", help="Target for the coefficient of friction.")
 @time_limit_option(60.0, "an engine may use for one body")
 @jobs_option("bodies to diagnose")
 @output_option("out/diagnosis", "for the tables and the report")
@@ -25,9 +25,9 @@ def diagnose_command(file: str, output: str, restitution: float | None, friction
     """Measure what the settings of your model do: an MJCF or URDF file, or a mesh (.obj, .stl).
 
     Each free body is simulated alone, with the file's own settings, above the surface that it lands on: how it falls, spins, lands,
-    rests, slides and rolls, beside the exact values with these settings and without them. Each remedy that is printed was tried.
+    rests, slides and rolls, compared with exact solutions with these settings and without them. Remedies marked "tried" were tried.
 
-    Exit code: 0 nothing is impossible, 1 something is, or a target is missed, 2 bad input.
+    Exit code: 0 no impossible inertia and no missed target, 1 otherwise, 2 bad input.
     """
     from dropspin.comparisons.diagnosis.study import Targets, diagnose
     from dropspin.comparisons.results.folder import study_folder

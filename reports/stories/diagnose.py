@@ -120,7 +120,7 @@ def answer_rows(body: BodyDiagnosis) -> list[dict[str, str]]:
     moments = [answer for answer in body.answers if answer.question == "inertia" and answer.unit == "kg m²"]
     ratios = [formatted(answer.measured / answer.physical) for answer in moments]
     if moments:
-        rows.append(_row(body, "inertia", "moments / uniform solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
+        rows.append(_row(body, "inertia", "moments / solid's", ", ".join(dict.fromkeys(ratios)), "", "1", ""))
     shown = [answer for answer in body.answers if answer not in moments and answer.question not in ("file", "friction")]
     shown = [answer for answer in shown if answer.question != "inertia" or answer.finding]
     for _, group in groupby(shown, lambda answer: (answer.question, _cells(answer), SEVERAL.split(answer.quantity)[0])):

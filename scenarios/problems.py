@@ -14,6 +14,8 @@ from dropspin.scenarios.errors import SceneError, did_you_mean
 from dropspin.scenarios.model import Scenario
 
 INDEX = Path(__file__).parent / "problems.toml"
+UNKNOWN = "none known"
+"""Stands in lists for the exact solution of a problem that has none."""
 IDENTIFIER = r"(?i)(ds-[0-9]+)(\.[0-9]+)?"
 
 
@@ -25,14 +27,15 @@ class Problem(NamedTuple):
         scene: The name of its scene in the catalogue.
         version: The version of its definition, from 1.
         digest: `Scenario.digest` of the definition.
-        truth: The name of its exact solution, for lists; `truth_for` computes the impacts too, which takes half a second.
+        truth: The name of its exact solution, for lists, or that none is known; `truth_for` computes the impacts too, which takes half a
+            second.
     """
 
     number: str
     scene: str
     version: int
     digest: str
-    truth: str
+    truth: str = UNKNOWN
 
     @property
     def identifier(self) -> str:

@@ -38,6 +38,16 @@ def test_scene_has_the_settings_of_the_course():
     assert scene.wall[0].point == (2.0, 0.0, 0.0)
 
 
+def test_catalogue_has_the_scene_with_a_rounded_mesh():
+    """Its tables, its vertices in their order, to half a micrometre, and its faces."""
+    scene, known = laboratory.scene_of(16), ds.load("laboratory")
+    for table in ("duration", "start", "gravity", "damping", "floor", "wall"):
+        assert getattr(known, table) == getattr(scene, table)
+    np.testing.assert_allclose(known.body.points, scene.body.points, rtol=0, atol=5.01e-7)
+    np.testing.assert_allclose(known.body.inertia_tensor, scene.body.inertia_tensor, rtol=0, atol=1e-5)
+    assert sorted(map(tuple, known.body.faces)) == sorted(map(tuple, scene.body.faces))
+
+
 def test_row_of_the_page_is_that_of_the_program(monkeypatch):
     """With 29,402 vertices, the most of the page."""
     monkeypatch.setattr(laboratory, "CELLS", (70,))

@@ -11,7 +11,7 @@ import numpy as np
 
 from dropspin.comparisons.measuring.metrics import METRICS
 from dropspin.scenarios import load, truth_for
-from dropspin.scenarios.problems import problems
+from dropspin.scenarios.problems import UNKNOWN, problems
 from dropspin.scenarios.state import ORIENTATION, PARTS, RATES
 from support.problem_statements import CONVENTIONS, KINDS, laws, number, statement
 
@@ -44,9 +44,8 @@ def index_table():
     for problem in problems().values():
         scene = load(problem.scene)
         truth = truth_for(scene)
-        rows.append(
-            [f"[{problem.number}](problems/{problem.number}.md)", problem.scene, scene.summary, f"{truth.name}: {KINDS[truth.name]}"]
-        )
+        known = UNKNOWN if truth is None else f"{truth.name}: {KINDS[truth.name]}"
+        rows.append([f"[{problem.number}](problems/{problem.number}.md)", problem.scene, scene.summary, known])
     return table(rows)
 
 
@@ -62,12 +61,9 @@ def sheet(problem):
         table([["", "value"], *map(list, statement(scene).items())]),
         "\n".join(f"- {law}" for law in laws(scene, truth)),
         "## Exact solution",
-        f"By {KINDS[truth.name]}: {truth.statement}. To {DIGITS} significant digits of the largest component of each quantity:",
-        _states(scene, truth),
-        *_impacts(scene, truth),
-        *_horizon(scene, truth),
+        *_solution(scene, truth),
         "## Tolerance",
-        paragraph(TOLERANCE + (ENERGY if any("energy" in one.metric for one in scene.expect) else "")),
+        paragraph(("" if truth is None else EXACT) + TOLERANCE + (ENERGY if any("energy" in one.metric for one in scene.expect) else "")),
         _tolerances(scene),
         "## Source",
         f"{scene.source}.",
@@ -78,12 +74,23 @@ def sheet(problem):
     return "\n\n".join(parts) + "\n"
 
 
-TOLERANCE = """A solution that claims to be exact agrees with every printed digit, within one unit of the last. A solution by time steps
-counts as correct at the time step dt if it is within the bounds below on absolute values, which are those for every engine; the scene's
-file has their reasons ([how metrics are computed](../figures.md))."""
+EXACT = "A solution that claims to be exact agrees with every printed digit, within one unit of the last. "
+TOLERANCE = """A solution by time steps counts as correct at the time step dt if it is within the bounds below on absolute values,
+which are those for every engine; the scene's file has their reasons ([how metrics are computed](../figures.md))."""
 ENERGY = """ The scene's energy is M |g| H, with H the height of the lowest point above the floor at the start, or the body's largest
 distance from the centre of mass if it starts on the floor, or the kinetic energy at the start, whichever is larger; without a floor, the
 largest kinetic energy."""
+
+
+def _solution(scene, truth):
+    if truth is None:
+        return ["None is known."]
+    return [
+        f"By {KINDS[truth.name]}: {truth.statement}. To {DIGITS} significant digits of the largest component of each quantity:",
+        _states(scene, truth),
+        *_impacts(scene, truth),
+        *_horizon(scene, truth),
+    ]
 
 
 def _tolerances(scene):

@@ -21,6 +21,8 @@ CONE = """u_y becomes -e u_y (Newton's restitution), and j is in the cone of Cou
 vertical part j_y. Either the horizontal part of u becomes 0, or it becomes s d with a unit vector d and s > 0, and then
 j = j_y ([0, 1, 0] - f d): friction acts against the slip that is left, which need not have the direction of the slip before."""
 EDGE = "The two ends of an edge strike at once, with equal velocities; r is the middle of the edge."
+SEVERAL = """Where several points touch a plane at once, as when the body rests, these laws do not determine the impulses: a method has a
+rule of its own."""
 PENDULUM = """The body stands on one edge, that of its lowest corners, which stays at rest on the floor. The body turns about it
 without friction or slip, as a rigid pendulum: (I_e + M R²) d²ψ/dt² = M |g| R sin ψ, with ψ the angle from the direction against
 gravity to the line from the edge to the centre of mass, R the length of this line and I_e the moment of inertia about the direction
@@ -94,19 +96,22 @@ KINDS = {
 """The kind of each exact solution, by its name."""
 
 
+MOST_POINTS = 100
+"""Points that are printed."""
 WALLS = """An impact with a wall is one with the floor in axes whose y axis is the wall's normal n: the point that strikes is the one
 behind the wall, and e and the friction are the wall's."""
 
 
 def laws(scene, truth):
-    """The laws of the motion of a scene, sentences."""
-    found = list(LAWS.get(truth.name, ()))
+    """The laws of the motion of a scene, sentences; `truth` is None if no exact solution is known."""
+    name = "" if truth is None else truth.name
+    found = list(LAWS.get(name, ()) if truth else (IMPACT, SEVERAL))
     if scene.damping is not None:
         linear, angular = number(scene.damping.linear), number(scene.damping.angular)
         found.append(f"A medium resists in proportion to the velocities: dv/dt = g - {linear} v, dL/dt = -{angular} L.")
-    if truth.name.endswith("-impact"):
+    if truth is None or name.endswith("-impact"):
         found.append({"none": SMOOTH, "infinite": STICKING}.get(scene.floor.friction, CONE))
-    if truth.name == "bounce-ladder":
+    if name == "bounce-ladder":
         found.append(_bounces(scene, truth))
     if scene.wall is not None:
         found.append(WALLS)
@@ -156,8 +161,11 @@ def _shape(body):
         return f"ball of radius {number(body.radius)} m, centre of mass at its centre"
     if body.shape == "box":
         return f"box with the half extents {vector(body.half_extents)} m along its axes, centre of mass at its centre"
+    count = f"{len(body.vertices)} points"
+    if len(body.vertices) > MOST_POINTS:
+        return f"a mesh; planes touch its {count}, those of the file beside the scene's, taken from the centre of mass"
     points = ", ".join(vector(point, computed) for point in body.vertices)
-    return f"the convex hull of {len(body.vertices)} points, given from the centre of mass [m]: {points}"
+    return f"the convex hull of {count}, given from the centre of mass [m]: {points}"
 
 
 def _inertia(body):

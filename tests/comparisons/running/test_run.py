@@ -56,7 +56,7 @@ def test_long_rest_after_the_bounces_is_no_flight():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", made.SLOW)
+@pytest.mark.parametrize("name", [name for name in made.SLOW if name != "laboratory"])  # of which no exact solution is known
 def test_slow_scenes_pass_too(name):
     """One slow scene at a time; the one of a thousand seconds at time steps that games use."""
     dts = [1 / 60, 1 / 120, 1 / 240] if name == "rest-long" else [4e-3, 2e-3, 1e-3]

@@ -25,7 +25,7 @@ def test_listed_exact_solutions_are_those_of_truth_for(tmp_path):
     """The list reads them from scenarios/problems.toml, where a new scene of the catalogue has a line."""
     truths = {name: truth_for(load(name)) for name in names()}
     listed = {row["scene"]: row["truth"] for row in json.loads(dropspin("list", "--json", cwd=tmp_path).stdout)}
-    assert listed == {name: truth.name if truth else "" for name, truth in truths.items()}
+    assert listed == {name: truth.name if truth else "none known" for name, truth in truths.items()}
 
 
 def test_show_prints_a_scene_or_what_an_engine_builds_of_it(tmp_path):

@@ -94,7 +94,7 @@ def test_corner_whose_contact_depends_on_rounding_does_not_fail(block, seed, mon
     """All starts an eps away: rounding decides for all of them whether they touch; measured 1.4 times what one phase may do."""
     scene, accepted = block
     from_world, moved = mujoco_simulation.from_world, 1.0 + np.finfo(float).eps * np.random.default_rng(seed).uniform(-1.0, 1.0, 13)
-    monkeypatch.setattr(mujoco_simulation, "from_world", lambda states: from_world(states * moved))
+    monkeypatch.setattr(mujoco_simulation, "from_world", lambda states, *axes: from_world(states * moved, *axes))
     checked = check(run(scene, "mujoco", 2e-3), accepted)
     assert failing(checked).empty, failing(checked).to_string()
     assert checked.changes["in_tolerances"].abs().max() > 0.2  # rounding did decide
